@@ -1,0 +1,160 @@
+"""`run`: every question of every study, one summary, and a JUnit report for CI."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mechdesign.cli import terminal
+from mechdesign.cli.execution import COMMANDS, Answer, answer, load_study, study_label, tell
+from mechdesign.cli.failure import INTERRUPTED, explain
+from mechdesign.cli.options import Options
+
+if TYPE_CHECKING:
+    from mechdesign.results import Table
+    from mechdesign.study import Study
+
+_OUTCOMES = {
+    0: "done",
+    1: "requirement not met",
+    2: "wrong study",
+    3: "cannot be assembled",
+    4: "failed",
+    INTERRUPTED: "interrupted",
+}
+
+
+def questions(study: Study) -> tuple[str, ...]:
+    """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing."""
+    from mechdesign.report.requirements import command_of
+
+    judged = {command_of(requirement) for requirement in study.requirements}
+    asked = [command for command in COMMANDS if getattr(study, command) is not None or command in judged]
+    return tuple(asked) or ("kinematics",)
+
+
+def run(paths: Sequence[Path], options: Options, junit: Path | None = None) -> int:
+    """Answer every question of the studies; returns the exit code, the highest of them all.
+
+    A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
+    summary and the JUnit file then tell what was finished.
+    """
+    answers: list[Answer] = []
+    try:
+        for given in _answers(paths or [None], options):
+            answers.append(given)
+            if given.exit_code and options.fail_fast:
+                break
+    except KeyboardInterrupt:
+        terminal.say("interrupted; what was finished is whole")
+        answers.append(Answer("", "", Path(), INTERRUPTED, 0, failed="interrupted"))
+    terminal.show(_summary(answers), as_json=options.json)
+    if junit is not None:
+        from mechdesign.cli.junit import to_xml
+        from mechdesign.report.writer import write_text
+
+        write_text(junit, to_xml(answers))
+    return max(given.exit_code for given in answers)
+
+
+def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Answer]:
+    """Answers of all studies in order; every study is read before the first is computed."""
+    studies: list[Study] = []
+    for path in paths:
+        try:
+            studies.append(load_study(path, options))
+        except Exception as error:
+            yield _failure(path.stem if path else "study", "check", Path(), error)
+    owners: dict[str, str] = {}
+    for study in studies:
+        label = study_label(study)
+        source = str(study.path)
+        if owners.setdefault(label, source) != source:
+            terminal.say(f"{source}: its results would overwrite those of {owners[label]}; rename one of the files")
+            yield Answer(label, "check", Path(), 2, 0, failed=f"same name as {owners[label]}")
+            continue
+        root = options.out or Path("results") / label
+        if options.out is not None and len(paths) > 1:
+            root /= label
+        for command in questions(study):
+            yield _ask(study, command, root / command, options)
+
+
+def _ask(study: Study, command: str, directory: Path, options: Options) -> Answer:
+    label = study_label(study)
+    try:
+        kept = _finished(study, command, directory, options) if options.resume else None
+        given = kept or answer(study, command, directory, options)
+    except Exception as error:
+        return _failure(label, command, directory, error)
+    tell(given, options)
+    return given
+
+
+def _failure(label: str, command: str, directory: Path, error: Exception) -> Answer:
+    code, message = explain(error)
+    terminal.say(message if code == 2 else f"{label}: {command}: {message}")
+    return Answer(label, command, directory, code, 0, failed=message)
+
+
+def _finished(study: Study, command: str, directory: Path, options: Options) -> Answer | None:
+    """The answer that an earlier run left whole in the directory, if this run would give the same."""
+    from mechdesign.report import manifest
+    from mechdesign.report.requirements import Verdict, command_of
+
+    content = manifest.is_current(directory, study, command, plots=options.plots)
+    if content is None:
+        return None
+    verdicts = [
+        Verdict(
+            entry["requirement"],
+            entry["met"],
+            float("nan") if entry["worst"] is None else entry["worst"],
+            entry["place"],
+        )
+        for entry in content["requirements"]
+    ]
+    if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
+        return None
+    failed = content["failed"]
+    return Answer(
+        study=study_label(study),
+        command=command,
+        directory=directory,
+        exit_code=3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1,
+        rows=next(iter(content["tables"].values()))["rows"],
+        warnings=content["warnings"],
+        failed=failed,
+        verdicts=verdicts,
+        kept=True,
+    )
+
+
+def _summary(answers: Sequence[Answer]) -> Table:
+    import numpy as np
+
+    from mechdesign.results import Column, Table
+
+    answers = [given for given in answers if given.command]
+
+    def words(values: list[str]) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
+        return np.array(values, dtype=np.str_)
+
+    def met(given: Answer) -> str:
+        return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
+
+    return Table(
+        "summary",
+        (
+            Column("study", words([given.study for given in answers])),
+            Column("command", words([given.command for given in answers])),
+            Column("outcome", words([_OUTCOMES[given.exit_code] + " (kept)" * given.kept for given in answers])),
+            Column("exit_code", np.array([given.exit_code for given in answers], dtype=int)),
+            Column("requirements", words([met(given) for given in answers])),
+            Column("rows", np.array([given.rows for given in answers], dtype=int)),
+            Column("warnings", np.array([len(given.warnings) for given in answers], dtype=int)),
+            Column("directory", words([str(given.directory) if given.rows else "" for given in answers])),
+        ),
+        meaning="what became of each question",
+    )

@@ -1,0 +1,138 @@
+"""Ask one question of one study: compute, judge, write, show."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mechdesign.cli import terminal
+from mechdesign.cli.options import Options
+
+if TYPE_CHECKING:
+    from mechdesign.report.requirements import Verdict
+    from mechdesign.results import Result
+    from mechdesign.study import Study
+
+# Each command's question and what its answer consists of.
+COMMANDS = {
+    "kinematics": ("How does it move?", "Positions, velocities, accelerations, Jacobians and limits of motion."),
+    "workspace": ("Where can it work?", "The reachable region, its performance indices and its boundary."),
+    "optimize": ("Which dimensions are best?", "The optimum for each set of weights, and every design."),
+    "reliability": ("How precise is it when it is made?", "Error moments, reliability and what contributes to them."),
+    "stiffness": ("How stiff is it?", "Stiffness and compliance matrices, equivalent springs and deflections."),
+}
+BUILT_IN = "two_link_arm"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one command gave.
+
+    Parameters
+    ----------
+    exit_code : int
+        0, 1 (a requirement is not met) or 3 (a pose that was asked for cannot be assembled).
+    rows : int
+        Rows of the main table.
+    """
+
+    study: str
+    command: str
+    directory: Path
+    exit_code: int
+    rows: int
+    warnings: Sequence[str] = ()
+    failed: str = ""
+    verdicts: Sequence[Verdict] = ()
+    seconds: float = 0.0
+    kept: bool = False
+    result: Result | None = None
+
+
+def load_study(path: Path | None, options: Options) -> Study:
+    """Load a study with the options' overrides and seed; without a path, say which one is taken.
+
+    Raises
+    ------
+    StudyError
+        Every mistake of the study or the overrides.
+    """
+    import mechdesign
+    from mechdesign.study import template_path
+
+    if path is None:
+        path = Path("study.yaml")
+        if path.exists():
+            terminal.say("study: study.yaml", quiet=options.quiet)
+        else:
+            terminal.say("study: the built-in two-link arm (no study.yaml here)", quiet=options.quiet)
+            path = template_path(BUILT_IN)
+    return mechdesign.load(path, overrides=options.overrides, seed=options.seed)
+
+
+def study_label(study: Study) -> str:
+    """The name of a study's folder: that of its file."""
+    return study.path.stem if study.path is not None else study.name
+
+
+def answer(study: Study, command: str, directory: Path, options: Options) -> Answer:
+    """Compute one command's result, judge it by the study's requirements and write it.
+
+    Raises
+    ------
+    MechdesignError
+        Whatever the analysis, the requirements or the files run into.
+    """
+    import mechdesign
+    from mechdesign.errors import StudyError
+    from mechdesign.report import requirements, writer
+
+    begun = time.perf_counter()
+    writer.check_writable(directory)
+    with terminal.Bar(quiet=options.quiet) as bar:
+        result: Result = getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar)
+    try:
+        verdicts = requirements.judge(result, study.requirements)
+    except StudyError:
+        # A misspelt requirement should not cost the computation.
+        writer.write(directory, study, result, plots=options.plots)
+        raise
+    writer.write(directory, study, result, verdicts, plots=options.plots)
+    code = 3 if result.failed else 0 if all(verdict.met for verdict in verdicts) else 1
+    return Answer(
+        study=study_label(study),
+        command=command,
+        directory=directory,
+        exit_code=code,
+        rows=len(result.main),
+        warnings=result.warnings,
+        failed=result.failed,
+        verdicts=verdicts,
+        seconds=time.perf_counter() - begun,
+        result=result,
+    )
+
+
+def tell(given: Answer, options: Options) -> None:
+    """Say on stderr what came out; what is not met or failed is said even where quiet is wanted."""
+    for warning in given.warnings:
+        terminal.say(f"warning: {warning}", quiet=options.quiet)
+    for verdict in given.verdicts:
+        terminal.say(f"requirement: {verdict}", quiet=options.quiet and verdict.met)
+    if given.failed:
+        terminal.say(f"{given.study}: {given.command}: {given.failed}")
+    terminal.say(f"{given.study}: {given.command}: {given.rows} rows in {given.directory}", quiet=options.quiet)
+
+
+def ask(path: Path | None, command: str, options: Options) -> int:
+    """One command from end to end; returns its exit code."""
+    study = load_study(path, options)
+    directory = options.out or Path("results") / study_label(study) / command
+    given = answer(study, command, directory, options)
+    assert given.result is not None
+    terminal.show(given.result.main, as_json=options.json, rest=str(directory / f"{given.result.main.name}.csv"))
+    tell(given, options)
+    return given.exit_code

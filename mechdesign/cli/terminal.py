@@ -1,0 +1,135 @@
+"""Talk on stderr, data on stdout: a table for people, CSV for pipes, a bar for what takes long."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from mechdesign.results import Table
+
+_ROWS = 24
+_DIGITS = 6
+_PATIENCE = 1.0  # seconds before a bar appears
+
+
+def say(text: str, *, quiet: bool = False) -> None:
+    """A line to stderr, unless the user wants quiet."""
+    if not quiet:
+        print(text, file=sys.stderr, flush=True)
+
+
+def emit(text: str) -> None:
+    """Data to stdout; whoever closed the pipe early (``| head``) has had enough, which is no error."""
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def show(table: Table, *, as_json: bool, rest: str = "") -> None:
+    """A table to stdout: JSON if asked, else for people on a terminal and CSV in a pipe.
+
+    Parameters
+    ----------
+    rest : str
+        Where the rows and columns are that a terminal has no room for.
+    """
+    from mechdesign.report.tables import to_csv, to_json
+
+    if as_json:
+        emit(to_json(table))
+    elif sys.stdout.isatty():
+        _show_to_people(table, rest)
+    else:
+        emit(to_csv(table))
+
+
+def _show_to_people(table: Table, rest: str) -> None:
+    from rich.console import Console
+    from rich.table import Table as Grid
+    from rich.text import Text
+
+    from mechdesign.report.tables import cells
+
+    console = Console()
+    columns = [column[:_ROWS] for column in cells(table, _DIGITS)]
+    heads = [f"{column.name}\n[{column.unit}]" if column.unit else column.name for column in table.columns]
+    grid = Grid(header_style="bold", box=None, pad_edge=False)
+    room = console.width
+    shown = 0
+    for head, column, texts in zip(heads, table.columns, columns, strict=True):
+        room -= 2 + max(len(text) for text in (*head.splitlines(), *texts))
+        if room < 0 and shown:
+            break
+        number = column.values.dtype.kind in "fiub"
+        grid.add_column(Text(head), justify="right" if number else "left", no_wrap=True)
+        shown += 1
+    for row in zip(*columns[:shown], strict=True):
+        grid.add_row(*(Text(text) for text in row))
+    console.print(grid)
+    left = []
+    if len(table) > _ROWS:
+        left.append(f"{len(table) - _ROWS} more rows")
+    if shown < len(columns):
+        left.append(f"{len(columns) - shown} more columns ({', '.join(table.names[shown:])})")
+    if left:
+        console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest else ''}"), style="dim")
+
+
+class Bar:
+    """A progress bar on stderr, which appears only on a terminal and only after a second."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._wanted = not quiet and sys.stderr.isatty()
+        self._begun = time.monotonic()
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+        self._total = self._done = 0
+        self._what = ""
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def start(self, total: int, what: str) -> None:
+        """Begin a stage."""
+        self._total, self._done, self._what = total, 0, what
+        if self._bar is not None:
+            if self._task is not None:
+                self._bar.remove_task(self._task)
+            self._task = self._bar.add_task(what, total=total)
+
+    def update(self, n: int) -> None:
+        """`n` more steps are done."""
+        self._done += n
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, completed=self._done)
+        elif self._wanted and time.monotonic() - self._begun > _PATIENCE:
+            self._open()
+
+    def _open(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._bar.start()
+        self._task = self._bar.add_task(self._what, total=self._total, completed=self._done)

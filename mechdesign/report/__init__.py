@@ -1,0 +1,1 @@
+"""Results as files: CSV tables, PNG pictures and the manifest that describes them."""

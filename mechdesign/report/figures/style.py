@@ -1,0 +1,83 @@
+"""The look of every picture: fonts, colours and bytes that do not depend on the user's settings."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+DPI = 120
+WIDTH = 8.0  # inches; 960 pixels, which a README shows at about 800
+
+# Okabe and Ito: told apart with every kind of colour vision, and in grey by their order of brightness.
+BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = (
+    "#0072B2",
+    "#E69F00",
+    "#009E73",
+    "#D55E00",
+    "#CC79A7",
+    "#56B4E9",
+    "#F0E442",
+)
+PALETTE = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW)
+INK = "#222222"
+FAINT = "#9A9A9A"
+COLORMAP = "cividis"
+
+_SETTINGS = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10,
+    "axes.titlesize": 11,
+    "axes.labelsize": 10,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.prop_cycle": matplotlib.cycler(color=PALETTE),
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "image.cmap": COLORMAP,
+    "figure.dpi": DPI,
+    "savefig.dpi": DPI,
+}
+
+
+@contextmanager
+def context() -> Iterator[None]:
+    """Matplotlib's defaults and this style for the time of drawing and saving; the user's settings come back after."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_SETTINGS)
+        yield
+
+
+def new_figure(width: float = WIDTH, height: float = 5.0, *, layout: str | None = "constrained") -> Figure:
+    """An empty figure (inches) with the Agg canvas; use inside `context`."""
+    figure = Figure(figsize=(width, height), dpi=DPI, layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def axis_label(name: str, unit: str = "") -> str:
+    """``name [unit]``, or the name alone where there is no unit."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def to_png(figure: Figure) -> bytes:
+    """The figure as PNG bytes without date, software or host."""
+    stream = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(stream, metadata={"Software": None})
+    return stream.getvalue()

@@ -1,0 +1,97 @@
+"""The manifest: what a folder of results was computed from, what its columns mean, and its files' hashes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mechdesign.report.requirements import Verdict
+from mechdesign.report.tables import plain
+from mechdesign.results import Result
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
+
+NAME = "manifest.json"
+_LIBRARIES = ("numpy", "scipy", "matplotlib", "pydantic", "pint", "pyyaml")
+
+
+def origin(study: Study, command: str, *, plots: bool) -> dict[str, Any]:
+    """Everything that decides the bytes of the results: versions, study, overrides, seed."""
+    return {
+        "tool": {"name": "mechdesign", "version": version("mechdesign")},
+        "libraries": {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES},
+        "command": command,
+        "study": {"name": study.name, "sha256": study.text_sha256, "resolved": plain(study.resolved)},
+        "overrides": list(study.overrides),
+        "seed": study.seed,
+        "plots": plots,
+    }
+
+
+def compose(
+    study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, bytes], *, plots: bool
+) -> bytes:
+    """The manifest of a result whose files have these contents."""
+    content = origin(study, result.command, plots=plots) | {
+        "counts": plain(dict(result.counts)),
+        "warnings": list(result.warnings),
+        "failed": result.failed,
+        "requirements": [plain(asdict(verdict)) for verdict in verdicts],
+        "tables": {
+            f"{table.name}.csv": {
+                "meaning": table.meaning,
+                "rows": len(table),
+                "columns": [
+                    {"name": column.name, "unit": column.unit, "meaning": column.meaning} for column in table.columns
+                ],
+            }
+            for table in result.tables.values()
+        },
+        "files": {name: hashlib.sha256(data).hexdigest() for name, data in files.items()},
+    }
+    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def read(directory: Path) -> dict[str, Any] | None:
+    """The manifest in a folder, or None where there is none that can be read."""
+    try:
+        content = json.loads((directory / NAME).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def recorded_files(content: Mapping[str, Any]) -> dict[str, str]:
+    """Names and hashes of the files a manifest lists; names that would lead out of its folder are left out."""
+    files = content.get("files")
+    if not isinstance(files, dict):
+        return {}
+    return {name: str(digest) for name, digest in files.items() if Path(name).name == name}
+
+
+def is_current(directory: Path, study: Study, command: str, *, plots: bool) -> dict[str, Any] | None:
+    """The manifest of a folder if it holds, whole, what this study would give again; else None."""
+    content = read(directory)
+    if content is None:
+        return None
+    expected = origin(study, command, plots=plots)
+    if not plots:
+        expected["plots"] = content.get("plots")
+    files = recorded_files(content)
+    if not files or any(content.get(key) != value for key, value in expected.items()):
+        return None
+    return content if all(_digest(directory / name) == digest for name, digest in files.items()) else None
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""

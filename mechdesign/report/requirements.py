@@ -1,0 +1,182 @@
+"""The gate: does the worst row of a result meet what the study requires of it?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.errors import Problem, StudyError
+from mechdesign.results import Result, Table
+
+_POSE_COLUMNS = 3
+
+
+class Requirement(Protocol):
+    """One entry of the study's ``requirements``."""
+
+    @property
+    def result(self) -> str:
+        """``command.column`` or ``command.table.column``."""
+
+    @property
+    def where(self) -> Mapping[str, Any] | None:
+        """Only rows whose columns have these values count."""
+
+    @property
+    def abs(self) -> bool:
+        """Judge the absolute value."""
+
+    @property
+    def at_least(self) -> float | None:
+        """Lower bound."""
+
+    @property
+    def at_most(self) -> float | None:
+        """Upper bound."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one requirement.
+
+    Parameters
+    ----------
+    requirement : str
+        The requirement in words.
+    met : bool
+        Whether the worst row meets it.
+    worst : float
+        The value of the worst row; nan where a row has none or no row was found.
+    place : str
+        The pose or row where it is worst.
+    """
+
+    requirement: str
+    met: bool
+    worst: float
+    place: str = ""
+
+    def __str__(self) -> str:
+        place = f" at {self.place}" if self.place else ""
+        return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}"
+
+
+def command_of(requirement: Requirement) -> str:
+    """The command whose result a requirement judges."""
+    return requirement.result.partition(".")[0]
+
+
+def judge(result: Result, requirements: Iterable[Requirement]) -> tuple[Verdict, ...]:
+    """Verdicts on the requirements that concern this result, in the study's order.
+
+    The worst row counts: the smallest value for `at_least`, the largest for `at_most`; nan is not met, nor is a
+    requirement that no row answers.
+
+    Raises
+    ------
+    StudyError
+        If a requirement names a column that the result has not, or one of words. Every such mistake in one go.
+    """
+    verdicts: list[Verdict] = []
+    problems: list[Problem] = []
+    for index, requirement in enumerate(requirements):
+        if command_of(requirement) != result.command:
+            continue
+        try:
+            verdicts.append(_judge(result, requirement))
+        except _UnknownColumnError as error:
+            problems.append(Problem(str(error), f"requirements.{index}"))
+    if problems:
+        raise StudyError(problems)
+    return tuple(verdicts)
+
+
+class _UnknownColumnError(Exception):
+    """A requirement asks for a column that the result has not."""
+
+
+def _judge(result: Result, requirement: Requirement) -> Verdict:
+    table, name = _locate(result, requirement.result.partition(".")[2])
+    values = _numbers(table, name)
+    if requirement.abs:
+        values = np.abs(values)
+    where = requirement.where or {}
+    chosen = np.ones(len(table), dtype=bool)
+    for column, wanted in where.items():
+        if column not in table:
+            raise _UnknownColumnError(_unknown("where", column, table.names))
+        chosen &= _equal(table[column], wanted)
+    words = _words(requirement)
+    rows = np.flatnonzero(chosen)
+    if not rows.size:
+        return Verdict(words, met=False, worst=float("nan"), place="no row of " + table.name)
+    undefined = rows[np.isnan(values[rows])]
+    if undefined.size:
+        worst, met = undefined[0], False
+    else:
+        low, high = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
+        low_met = requirement.at_least is None or values[low] >= requirement.at_least
+        high_met = requirement.at_most is None or values[high] <= requirement.at_most
+        met = bool(low_met and high_met)
+        worst = high if requirement.at_least is None or not high_met else low
+    return Verdict(words, met, float(values[worst]), _place(table, int(worst), name))
+
+
+def _locate(result: Result, path: str) -> tuple[Table, str]:
+    """Find a column: the first table that has it, or the table named before it."""
+    for table in result.tables.values():
+        if path in table:
+            return table, path
+    name, _, column = path.partition(".")
+    if name in result.tables and column in result.tables[name]:
+        return result.tables[name], column
+    known = [column for table in result.tables.values() for column in table.names]
+    raise _UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
+
+
+def _unknown(where: str, name: str, known: Iterable[str]) -> str:
+    names = list(dict.fromkeys(known))
+    close = get_close_matches(name, names, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(names)}"
+    return f"{where}: no column {name!r}; {hint}"
+
+
+def _numbers(table: Table, name: str) -> NDArray[np.float64]:
+    values = np.asarray(table[name])
+    if values.dtype.kind not in "fiub":
+        raise _UnknownColumnError(
+            f"column {name!r} of {table.name} holds words, which cannot be compared with a number"
+        )
+    return values.astype(float)
+
+
+def _equal(values: NDArray[Any], wanted: object) -> NDArray[np.bool_]:
+    if values.dtype.kind in "fiub" and isinstance(wanted, (int, float)):
+        return np.isclose(values.astype(float), float(wanted), rtol=1e-9, atol=1e-12)
+    return np.array([str(value) == str(wanted) for value in values.tolist()], dtype=bool)
+
+
+def _words(requirement: Requirement) -> str:
+    value = f"|{requirement.result}|" if requirement.abs else requirement.result
+    where = ", ".join(f"{column} {wanted}" for column, wanted in (requirement.where or {}).items())
+    bounds = [
+        f"{words} {bound:.12g}"
+        for words, bound in (("at least", requirement.at_least), ("at most", requirement.at_most))
+        if bound is not None
+    ]
+    return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
+
+
+def _place(table: Table, row: int, name: str) -> str:
+    """The row in words: its first columns, which are the pose."""
+    names = [column for column in table.names if column != name][:_POSE_COLUMNS]
+    parts = []
+    for column in names:
+        value = table[column][row]
+        parts.append(f"{column} {value:.6g}" if isinstance(value, float) else f"{column} {value}")
+    return ", ".join(parts) or f"row {row + 1}"

@@ -1,0 +1,74 @@
+"""Tables as text: CSV and JSON, 12 significant digits, the same bytes for the same numbers."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from mechdesign.results import Column, Table
+
+_DIGITS = 12
+
+
+def _texts(column: Column, digits: int) -> list[str]:
+    values = np.asarray(column.values)
+    if values.dtype.kind == "f":
+        # Adding zero turns -0.0 into 0.0: the sign of a zero is an accident of rounding.
+        return [format(value, f".{digits}g") for value in (values + 0.0).tolist()]
+    if values.dtype.kind == "b":
+        return ["1" if value else "0" for value in values.tolist()]
+    return [str(value) for value in values.tolist()]
+
+
+def cells(table: Table, digits: int = _DIGITS) -> list[list[str]]:
+    """Text of every cell, column by column; booleans as 1 and 0."""
+    return [_texts(column, digits) for column in table.columns]
+
+
+def to_csv(table: Table) -> str:
+    """The table as CSV: a header, then a line a row, quoted as RFC 4180 asks, ``nan`` and ``inf`` as they are."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(table.names)
+    writer.writerows(zip(*cells(table), strict=True))
+    return stream.getvalue()
+
+
+def plain(value: Any) -> Any:
+    """Anything a study or a table holds, as JSON can say it.
+
+    Floats keep 12 significant digits; nan and infinities, which JSON does not know, become None; booleans of a
+    table's column are the business of `to_json`.
+    """
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, float):
+        return float(format(value + 0.0, f".{_DIGITS}g")) if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return [plain(item) for item in value.tolist()]
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, (set, frozenset)):
+        return sorted(plain(item) for item in value)
+    return str(value)
+
+
+def to_json(table: Table) -> str:
+    """The table as a JSON array with an object a row; booleans are 1 and 0 as in the CSV file, nan is null."""
+    lists = []
+    for column in table.columns:
+        values = np.asarray(column.values)
+        lists.append(plain(values.astype(int) if values.dtype.kind == "b" else values))
+    lines = [
+        json.dumps(dict(zip(table.names, row, strict=True)), ensure_ascii=False) for row in zip(*lists, strict=True)
+    ]
+    return "[\n" + ",\n".join(lines) + "\n]\n" if lines else "[]\n"

@@ -1,0 +1,106 @@
+"""Write a result: tables, pictures, and last the manifest that vouches for them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mechdesign.errors import OutputError
+from mechdesign.report import manifest
+from mechdesign.report.requirements import Verdict
+from mechdesign.report.tables import to_csv
+from mechdesign.results import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from mechdesign.study import Study
+
+
+def check_writable(directory: Path) -> None:
+    """Find out before a long computation that its results could not be written; creates nothing.
+
+    Raises
+    ------
+    OutputError
+        If the directory, or the nearest one above it that exists, does not take files.
+    """
+    place = directory
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir():
+        raise OutputError(f"{directory}: results cannot be written there: {place} is a file; choose another --out")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise OutputError(
+            f"{directory}: results cannot be written there: no permission for {place}; choose another --out"
+        )
+
+
+def write(
+    directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict] = (), *, plots: bool = True
+) -> tuple[str, ...]:
+    """Write a result into a directory and return the names of the files.
+
+    Each file appears whole or not at all. The manifest comes last; files of an older result that the new one does not
+    have are removed, so that the directory never shows two results at once.
+
+    Raises
+    ------
+    OutputError
+        If the directory or a file cannot be written.
+    """
+    files = {f"{table.name}.csv": to_csv(table).encode() for table in result.tables.values()}
+    if plots:
+        files |= pictures(study, result)
+    stale = manifest.recorded_files(manifest.read(directory) or {}).keys() - files.keys()
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for name, data in files.items():
+            _replace(directory / name, data)
+        for name in stale:
+            (directory / name).unlink(missing_ok=True)
+        _replace(directory / manifest.NAME, manifest.compose(study, result, verdicts, files, plots=plots))
+    except OSError as error:
+        raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
+    return (*files, manifest.NAME)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write one text file whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _replace(path, text.encode())
+    except OSError as error:
+        raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
+
+
+def pictures(study: Study, result: Result) -> dict[str, bytes]:
+    """PNG files of a result: those of its command, then the mechanism."""
+    from mechdesign.report.figures import style
+    from mechdesign.report.figures.mechanism import mechanism_figure
+
+    with style.context():
+        figures: dict[str, Figure] = import_module(f"mechdesign.report.figures.{result.command}").figures(study, result)
+        figures["mechanism"] = mechanism_figure(study)
+        return {f"{name}.png": style.to_png(figure) for name, figure in figures.items()}
+
+
+def _replace(path: Path, data: bytes) -> None:
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_bytes(data)
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
