@@ -1,0 +1,70 @@
+"""What can go wrong, as exceptions whose message a designer understands.
+
+Each class maps to one exit code of the command line (`exit_code`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class MechdesignError(Exception):
+    """Base of every error that mechdesign raises on purpose."""
+
+    exit_code = 4
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake in a study: where it stands and what would mend it."""
+
+    message: str
+    key: str = ""
+    file: str = ""
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        place = self.file
+        if self.line:
+            place += f":{self.line}:{self.column}"
+        return ": ".join(part for part in (place, self.key, self.message) if part)
+
+
+class StudyError(MechdesignError):
+    """The study file or a command's arguments are wrong; nothing was computed."""
+
+    exit_code = 2
+
+    def __init__(self, problems: Sequence[Problem] | str) -> None:
+        self.problems = (Problem(problems),) if isinstance(problems, str) else tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class MechanismError(MechdesignError):
+    """The mechanism's description contradicts itself (mobility, drives, sketch)."""
+
+    exit_code = 2
+
+    def __init__(self, message: str, key: str = "mechanism") -> None:
+        self.key = key
+        super().__init__(message)
+
+
+class AssemblyError(MechdesignError):
+    """The study is right, but the mechanism cannot do what is asked (a pose, a design)."""
+
+    exit_code = 3
+
+
+class NumericalError(MechdesignError):
+    """A computation failed to reach a trustworthy result."""
+
+    exit_code = 4
+
+
+class OutputError(MechdesignError):
+    """Results could not be written."""
+
+    exit_code = 4

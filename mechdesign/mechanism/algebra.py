@@ -1,0 +1,53 @@
+"""Plane vectors as complex numbers: the few products that the kernels share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# A scalar or an array that broadcasts against the batch; scalars stay scalars, which keeps constants cheap.
+Value = Any
+
+
+def norm2(z: Value) -> Value:
+    """Squared length of a vector."""
+    return z.real * z.real + z.imag * z.imag
+
+
+def cross(a: Value, b: Value) -> Value:
+    """Third component of a x b."""
+    return a.real * b.imag - a.imag * b.real
+
+
+def dot(a: Value, b: Value) -> Value:
+    """Scalar product of two vectors."""
+    return a.real * b.real + a.imag * b.imag
+
+
+def vector(x: Value, y: Value) -> Value:
+    """Complex number x + i y without the temporaries of ``x + 1j * y``."""
+    shape = np.broadcast_shapes(np.shape(x), np.shape(y))
+    if not shape:
+        return complex(x, y)
+    z = np.empty(shape, dtype=complex)
+    z.real = x
+    z.imag = y
+    return z
+
+
+def rotation(angle: Value) -> Value:
+    """Unit vector at `angle` (radians)."""
+    return vector(np.cos(angle), np.sin(angle))
+
+
+def angle_of(z: Value) -> NDArray[np.float64]:
+    """Angle of a vector in (-pi, pi]."""
+    angle = np.angle(z)
+    return np.where(angle <= -np.pi, np.pi, angle)
+
+
+def wrap(angle: Value) -> Value:
+    """Angle brought into (-pi, pi]."""
+    return np.pi - np.mod(np.pi - angle, 2 * np.pi)

@@ -1,0 +1,121 @@
+"""The solved state of a mechanism for a batch of poses, and the values of coordinates in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.mechanism.algebra import Value, angle_of, norm2
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.geometry import Vectors
+from mechdesign.mechanism.graph import Graph
+
+
+class Reason(IntEnum):
+    """Why a pose is not valid."""
+
+    OK = 0
+    NOT_CLOSED = 1
+    OTHER_ASSEMBLY = 2
+    LIMIT = 3
+
+    @property
+    def text(self) -> str:
+        """Words for tables and messages."""
+        return ("", "cannot be assembled", "other assembly", "limit")[self]
+
+
+@dataclass(frozen=True, eq=False)
+class Configuration:
+    """Positions of a mechanism; every array broadcasts to `shape`, the shape of the batch.
+
+    Parameters
+    ----------
+    nodes : sequence of complex arrays
+        Position of each node, nan where the pose cannot be assembled.
+    rotations : sequence of complex arrays
+        Unit rotation exp(i theta) of each angle class.
+    slides : sequence of arrays
+        Displacement of each slide.
+    closures : sequence of arrays
+        Positive inside the range in which each group closes, zero at its limits.
+    reason : int8 array of `shape`
+        See `Reason`.
+    """
+
+    graph: Graph
+    vectors: Vectors
+    shape: tuple[int, ...]
+    nodes: Sequence[Value]
+    rotations: Sequence[Value]
+    slides: Sequence[Value]
+    closures: Sequence[Value]
+    reason: NDArray[np.int8]
+    places: Mapping[str, Value]
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Whether each pose is assembled and within the limits."""
+        return self.reason == Reason.OK
+
+    def point(self, name: str) -> NDArray[np.complex128]:
+        """World position x + i y of a point, shape of the batch."""
+        return np.broadcast_to(np.asarray(self.nodes[self.graph.node(name)], dtype=complex), self.shape)
+
+    def rotation(self, body: str) -> NDArray[np.complex128]:
+        """Unit vector of a link's x axis in the world, shape of the batch."""
+        return np.broadcast_to(np.asarray(self.body_rotation(body), dtype=complex), self.shape)
+
+    def body_rotation(self, body: str) -> Value:
+        """Unit vector of a body's x axis, unbroadcast."""
+        frame = self.graph.bodies[body][0]
+        offset = self.vectors.offsets[body]
+        turn = self.rotations[frame]
+        return turn if isinstance(offset, float) else turn * offset
+
+    def value(self, coordinate: Coordinate) -> Value:
+        """Value of a coordinate (angles in radians, in (-pi, pi])."""
+        if coordinate.kind == "x":
+            return self.nodes[coordinate.node].real
+        if coordinate.kind == "y":
+            return self.nodes[coordinate.node].imag
+        if coordinate.kind == "slide":
+            return self.slides[coordinate.slide]
+        if coordinate.kind == "distance":
+            return np.sqrt(norm2(self.nodes[coordinate.other] - self.nodes[coordinate.node]))
+        if coordinate.kind == "angle":
+            turn = self.body_rotation(coordinate.body)
+            return angle_of(turn * np.conj(self.body_rotation(coordinate.reference)))
+        assert coordinate.expression is not None
+        return coordinate.expression.evaluate(self.user_values(coordinate))
+
+    def user_values(self, coordinate: Coordinate) -> dict[str, Value]:
+        """Values of the parts of an expression, angles in the study's unit as its text expects."""
+        assert coordinate.expression is not None
+        unit = coordinate.expression.angle_unit
+        return {
+            part.name: self.value(part) / unit if part.quantity == "angle" else self.value(part)
+            for part in coordinate.parts
+        }
+
+    def take(self, index: NDArray[np.intp] | int | tuple[int, ...]) -> Configuration:
+        """Poses of a flat batch by index (shape (n,) or scalar)."""
+
+        def pick(value: Value) -> Value:
+            return np.broadcast_to(np.asarray(value), self.shape)[index]
+
+        reason = self.reason[index]
+        vectors = Vectors(
+            [pick(w) for w in self.vectors.w],
+            [pick(d) for d in self.vectors.d],
+            {body: v if isinstance(v, float) else pick(v) for body, v in self.vectors.offsets.items()},
+        )
+        return Configuration(
+            self.graph, vectors, np.shape(reason), [pick(x) for x in self.nodes], [pick(u) for u in self.rotations],
+            [pick(s) for s in self.slides], [pick(c) for c in self.closures], np.asarray(reason),
+            {name: pick(v) for name, v in self.places.items()},
+        )  # fmt: skip

@@ -1,0 +1,278 @@
+"""Velocities, accelerations, Jacobians and sensitivities at a solved configuration, all in closed form.
+
+One edge is e = m U with m = w + s d and U = exp(i theta). Every derivative of it, of any order, in time or with
+respect to a dimension z, has the highest derivatives of theta and s in the same two places,
+
+    e^ = i m U theta^ + d U s^ + rest
+
+so all of them solve the loop equations of a group with the same small matrix and different right-hand sides
+[S3, eqs. 9-12]. Below, x' is a time derivative and x_z a derivative with respect to a dimension:
+
+    e'    rest = 0
+    e''   rest = (2 i theta' s' d - theta'^2 m) U
+    e_z   rest = (w_z + s d_z) U
+    e'_z  rest = (i theta' m_z + s' d_z + i theta_z m') U + i theta_z i theta' e
+    e''_z rest = (s'' d_z + 2 i theta'_z s' d + 2 i theta' m'_z - 2 theta' theta'_z m + (i theta'' - theta'^2) m_z
+                 + i theta_z (m'' + 2 i theta' m' + (i theta'' - theta'^2) m)) U
+
+The structure used is always that of the drives (their Assur groups), however the configuration was found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value, cross
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.plan import Group, Structure
+from mechdesign.mechanism.solve import State, columns
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """One derivative of everything: node positions (complex), angles of classes, slides, offsets of bodies.
+
+    Arrays broadcast to the batch, with further leading axes where several derivatives are taken at once.
+    """
+
+    nodes: Sequence[Value]
+    angles: Sequence[Value]
+    slides: Sequence[Value]
+    offsets: dict[str, Value]
+
+
+class Linearization:
+    """The loop equations of the drives' groups at a configuration, ready to be solved for any right-hand side."""
+
+    def __init__(self, structure: Structure, geometry: Geometry, configuration: Configuration) -> None:
+        self.structure = structure
+        self.geometry = geometry
+        self.configuration = configuration
+        vectors = configuration.vectors
+        self.state = State(
+            structure, vectors, list(vectors.w), list(configuration.nodes), list(configuration.rotations),
+            [], list(configuration.slides),
+        )  # fmt: skip
+        self._columns: dict[int, list[list[Value]]] = {}
+        self._edges: dict[int, Value] = {}
+
+    def edge(self, k: int) -> Value:
+        """World vector of an edge."""
+        if k not in self._edges:
+            self._edges[k] = self.state.edge(k)
+        return self._edges[k]
+
+    def direction(self, k: int) -> Value:
+        """World direction of an edge's slide."""
+        return self.state.turned(self.state.vectors.d[k], self.structure.edges[k].frame)
+
+    def loop_columns(self, index: int, group: Group) -> list[list[Value]]:
+        """Per loop of a group, the derivatives of its closure with respect to the group's unknowns."""
+        if index not in self._columns:
+            self._columns[index] = [columns(self.state, group, loop.edges) for loop in group.loops]
+        return self._columns[index]
+
+    def solve(
+        self,
+        given: Sequence[Value],
+        rest: Sequence[Value],
+        offsets: dict[str, Value] | None = None,
+    ) -> Rates:
+        """Derivatives of everything for derivatives `given` of the drives and `rest` of the edges.
+
+        Parameters
+        ----------
+        given : sequence of Value
+            Derivative of each drive.
+        rest : sequence of Value
+            Per edge, the part of its derivative without the highest derivatives of angle and slide.
+        offsets : dict, optional
+            Derivative of each body's constant angle within its class.
+        """
+        structure = self.structure
+        offsets = offsets or {}
+        angles: list[Any] = [0.0] * structure.classes
+        for frame, tie in enumerate(structure.ties):
+            total: Value = 0.0
+            for sign, k in tie.given:
+                total = total + sign * given[k]
+            for sign, body in tie.offsets:
+                total = total + sign * offsets.get(body, 0.0)
+            angles[frame] = total
+        slides: list[Any] = [0.0] * len(self.state.slides)
+        for slide, k in structure.known_slides:
+            slides[slide] = given[k]
+        nodes: list[Any] = [None] * len(self.state.nodes)
+        nodes[0] = 0.0
+
+        def step(k: int) -> Value:
+            edge = structure.edges[k]
+            total = rest[k]
+            if not (isinstance(angles[edge.frame], float) and angles[edge.frame] == 0.0):
+                total = total + self.edge(k) * (1j * angles[edge.frame])
+            if edge.slide is not None and not (isinstance(slides[edge.slide], float) and slides[edge.slide] == 0.0):
+                total = total + slides[edge.slide] * self.direction(k)
+            return total
+
+        for index, group in enumerate(structure.groups):
+            if group.form != "place":
+                right = []
+                for loop in group.loops:
+                    total = 0.0 if loop.start == loop.end else nodes[loop.start] - nodes[loop.end]
+                    for k, sign in loop.edges:
+                        total = total + sign * step(k)
+                    right.append(total)
+                unknowns = _solve_small(self.loop_columns(index, group), right)
+                for position, root in enumerate(group.angles):
+                    for frame, tie in enumerate(structure.ties):
+                        if tie.root == root:
+                            angles[frame] = angles[frame] + unknowns[position]
+                for position, slide in enumerate(group.slides):
+                    slides[slide] = unknowns[len(group.angles) + position]
+            for k, sign in group.tree:
+                edge = structure.edges[k]
+                if sign > 0:
+                    nodes[edge.head] = nodes[edge.tail] + step(k)
+                else:
+                    nodes[edge.tail] = nodes[edge.head] - step(k)
+        return Rates(nodes, angles, slides, offsets)
+
+    def drives(self) -> Rates:
+        """Derivatives with respect to each drive; a leading axis runs over the drives."""
+        count = len(self.structure.given)
+        axes = (1,) * len(self.configuration.shape)
+        unit = [np.eye(count)[k].reshape((count, *axes)) for k in range(count)]
+        return self.solve(unit, [0.0] * len(self.structure.edges))
+
+    def velocity(self, rates: Sequence[Value]) -> Rates:
+        """Velocities for given drive rates (radians and lengths per time)."""
+        return self.solve(rates, [0.0] * len(self.structure.edges))
+
+    def acceleration(self, velocity: Rates, accelerations: Sequence[Value]) -> Rates:
+        """Accelerations for given drive accelerations."""
+        rest: list[Value] = []
+        for k, edge in enumerate(self.structure.edges):
+            omega = velocity.angles[edge.frame]
+            total: Value = 0.0
+            if edge.frame != 0:
+                total = self.edge(k) * (-omega * omega)
+            if edge.slide is not None and edge.frame != 0:
+                total = total + self.direction(k) * (2j * omega * velocity.slides[edge.slide])
+            rest.append(total)
+        return self.solve(accelerations, rest)
+
+    def sensitivity(self, places: Sequence[str]) -> Rates:
+        """Derivatives with respect to dimensions, the drives held; a leading axis runs over `places`.
+
+        Drives may be among them: the derivative is then that with respect to the drive. The configuration must be
+        one of nominal dimensions.
+        """
+        given, explicit, offsets = self._explicit(places)
+        rest = [
+            self.state.turned(w + (0.0 if s is None else s * d), edge.frame)
+            for (w, d), s, edge in zip(explicit, self._slide_values(), self.structure.edges, strict=True)
+        ]
+        return self.solve(given, rest, offsets)
+
+    def rate_sensitivity(
+        self, places: Sequence[str], position: Rates, velocity: Rates, acceleration: Rates | None
+    ) -> tuple[Rates, Rates | None]:
+        """Derivatives of velocities and accelerations with respect to dimensions; `position` from `sensitivity`."""
+        _, explicit, _ = self._explicit(places)
+        none = [0.0] * len(self.structure.given)
+        first_rest: list[Value] = []
+        second: list[tuple[Any, ...]] = []
+        for k, edge in enumerate(self.structure.edges):
+            (w_z, d_z), d, frame = explicit[k], self.state.vectors.d[k], edge.frame
+            m = self.state.arm(k)
+            s, s1, s_z = (
+                (0.0, 0.0, 0.0)
+                if edge.slide is None
+                else (self.state.slides[edge.slide], velocity.slides[edge.slide], position.slides[edge.slide])
+            )
+            m_z, m1, omega, turn_z = w_z + s * d_z + s_z * d, s1 * d, velocity.angles[frame], position.angles[frame]
+            rest = 1j * omega * m_z + s1 * d_z + 1j * turn_z * (m1 + 1j * omega * m)
+            first_rest.append(self.state.turned(rest, frame))
+            second.append((m, m_z, m1, s1, d, d_z, omega, turn_z))
+        first = self.solve(none, first_rest)
+        if acceleration is None:
+            return first, None
+        second_rest: list[Value] = []
+        for edge, (m, m_z, m1, s1, d, d_z, omega, turn_z) in zip(self.structure.edges, second, strict=True):
+            s2, s1_z = (
+                (0.0, 0.0) if edge.slide is None else (acceleration.slides[edge.slide], first.slides[edge.slide])
+            )
+            alpha, omega_z = acceleration.angles[edge.frame], first.angles[edge.frame]
+            m1_z, m2, bend = s1_z * d + s1 * d_z, s2 * d, 1j * alpha - omega * omega
+            rest = (
+                s2 * d_z + 2j * omega_z * m1 + 2j * omega * m1_z - 2 * omega * omega_z * m + bend * m_z
+                + 1j * turn_z * (m2 + 2j * omega * m1 + bend * m)
+            )  # fmt: skip
+            second_rest.append(self.state.turned(rest, edge.frame))
+        return first, self.solve(none, second_rest)
+
+    def _slide_values(self) -> list[Value | None]:
+        return [None if edge.slide is None else self.state.slides[edge.slide] for edge in self.structure.edges]
+
+    def _explicit(self, places: Sequence[str]) -> tuple[list[Value], list[tuple[Value, Value]], dict[str, Value]]:
+        axes = (1,) * len(self.configuration.shape)
+
+        def lead(values: Sequence[Value]) -> Value:
+            array = np.array(values)
+            return array.reshape((len(values), *axes)) if array.any() else 0.0
+
+        drives = [coordinate.name for coordinate in self.structure.given]
+        given = [lead([float(place == drive) for place in places]) for drive in drives]
+        each = [self.geometry.derivatives(place) for place in places]
+        explicit = [
+            (lead([w[k] for w, _ in each]), lead([d[k] for _, d in each])) for k in range(len(self.structure.edges))
+        ]
+        offsets = {
+            body: lead([self.geometry.offset_derivative(body, place) for place in places])
+            for body, (_, turns) in self.geometry.graph.bodies.items()
+            if turns
+        }
+        return given, explicit, offsets
+
+
+def _solve_small(loop_columns: list[list[Value]], right: list[Value]) -> list[Value]:
+    """Solve sum_j c_j y_j = -right per loop (complex equations, real unknowns)."""
+    if len(loop_columns) == 1:
+        a, b = loop_columns[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = -1 / cross(a, b)
+            return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
+    rows = [part for line in loop_columns for part in ([c.real for c in line], [c.imag for c in line])]
+    sides = [part for value in right for part in (np.real(value), np.imag(value))]
+    shape = np.broadcast_shapes(*(np.shape(c) for row in rows for c in row))
+    matrix = np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
+    full = np.broadcast_shapes(shape, *(np.shape(s) for s in sides))
+    vector = np.stack([np.broadcast_to(-s, full) for s in sides], axis=-1)
+    good = np.isfinite(matrix).all(axis=(-1, -2))
+    good &= np.linalg.det(np.where(good[..., None, None], matrix, np.eye(len(rows)))) != 0
+    safe = np.where(good[..., None, None], matrix, np.eye(len(rows)))
+    solution = np.linalg.solve(safe, vector[..., None])[..., 0]
+    solution = np.where(good[..., None], solution, np.nan)
+    return [solution[..., j] for j in range(len(rows))]
+
+
+def determinants(linearization: Linearization) -> list[Value]:
+    """Per group of the drives' structure, the determinant of its loop equations; zero at a forward singularity."""
+    found = []
+    for index, group in enumerate(linearization.structure.groups):
+        if group.form == "place":
+            continue
+        lines = linearization.loop_columns(index, group)
+        if len(lines) == 1:
+            found.append(cross(*lines[0]))
+        else:
+            rows = [part for line in lines for part in ([c.real for c in line], [c.imag for c in line])]
+            shape = np.broadcast_shapes(*(np.shape(c) for row in rows for c in row))
+            matrix = np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
+            found.append(np.linalg.det(matrix))
+    return found

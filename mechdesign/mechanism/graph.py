@@ -1,0 +1,202 @@
+"""The mechanism as a graph of vectors: nodes are points, edges are vectors fixed in links or growing along slides.
+
+Every edge reads ``X_j = X_i + (w + s d) U`` with w and d fixed in the frame of an angle class, s a slide's
+displacement (absent for a rigid edge) and U = exp(i theta) the rotation of the class. Links that a prismatic or
+fixed joint ties together turn together: they form one angle class and differ by constant offsets. Loops of this
+graph are the vector loops of the mechanism; nothing else is needed by the solver or the derivatives.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from mechdesign.errors import MechanismError
+from mechdesign.mechanism.model import Description, Fixed, Line, Prismatic, Slot, Term
+
+GROUND = "ground"
+
+
+def rod_of(leg: str) -> str:
+    """Name of the second body of a telescopic leg, the one that carries its far end."""
+    return f"{leg}:rod"
+
+
+def origin_of(link: str) -> str:
+    """Name of the node at the origin of a link's frame."""
+    return f"{link}:origin"
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A contribution to an angle: `sign` times a place or number, or the direction from one point of a link to another."""
+
+    sign: int
+    term: Term = 0.0
+    towards: tuple[str, str, str] | None = None
+
+
+@dataclass(frozen=True)
+class Edge:
+    """``X_head = X_tail + (w + s d) U``; `w` is a sum of signed local points, `d` a unit vector at a sum of turns."""
+
+    tail: int
+    head: int
+    frame: int
+    locals: tuple[tuple[int, str, str], ...] = ()
+    slide: int | None = None
+    turns: tuple[Turn, ...] = ()
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Nodes, edges, angle classes and slides of a mechanism.
+
+    Parameters
+    ----------
+    nodes : tuple of str
+        Point names; node 0 is the origin of the ground, known at 0.
+    bodies : mapping of str to (int, tuple of Turn)
+        Body name to its angle class and its constant offset within the class. Class 0 is the ground's.
+    points : mapping of (str, str) to (Term, Term)
+        Local coordinates of a point of a body.
+    slides : tuple of str
+        Names of the joints and telescopic legs whose displacement is a coordinate.
+    """
+
+    nodes: tuple[str, ...]
+    edges: tuple[Edge, ...]
+    classes: int
+    bodies: Mapping[str, tuple[int, tuple[Turn, ...]]]
+    points: Mapping[tuple[str, str], tuple[Term, Term]]
+    slides: tuple[str, ...]
+    telescopic: frozenset[int]
+
+    def node(self, name: str) -> int:
+        """Index of a point."""
+        return self.nodes.index(name)
+
+
+def _turns_of(line: Line) -> tuple[Turn, ...]:
+    if line.toward is not None and line.through is not None:
+        return (Turn(1, towards=(line.link, line.through, line.toward)),)
+    return (Turn(1, line.direction),) if line.direction != 0.0 else ()
+
+
+def _reverse(turns: Iterable[Turn]) -> tuple[Turn, ...]:
+    return tuple(Turn(-turn.sign, turn.term, turn.towards) for turn in turns)
+
+
+def _classes(
+    bodies: list[str], ties: list[tuple[str, str, tuple[Turn, ...]]]
+) -> tuple[dict[str, tuple[int, tuple[Turn, ...]]], int]:
+    """Walk the ties (a, b, turns from a's to b's x axis) from the ground on; each connected set is a class."""
+    neighbours: dict[str, list[tuple[str, tuple[Turn, ...]]]] = {body: [] for body in bodies}
+    for a, b, turns in ties:
+        neighbours[a].append((b, turns))
+        neighbours[b].append((a, _reverse(turns)))
+    found: dict[str, tuple[int, tuple[Turn, ...]]] = {}
+    count = 0
+    for root in bodies:
+        if root in found:
+            continue
+        found[root] = (count, ())
+        queue = deque([root])
+        while queue:
+            body = queue.popleft()
+            for other, turns in neighbours[body]:
+                if other not in found:
+                    found[other] = (count, found[body][1] + turns)
+                    queue.append(other)
+        count += 1
+    return found, count
+
+
+def build_graph(description: Description) -> Graph:
+    """Compile a description into its graph.
+
+    Raises
+    ------
+    MechanismError
+        Where a joint names a point that its link does not have.
+    """
+    points: dict[tuple[str, str], tuple[Term, Term]] = {}
+    on_body: dict[str, list[str]] = {}
+    ties: list[tuple[str, str, tuple[Turn, ...]]] = []
+    legs: list[tuple[str, str, str]] = []
+
+    def put(body: str, point: str, local: tuple[Term, Term]) -> None:
+        if (body, point) not in points:
+            points[body, point] = local
+            on_body[body].append(point)
+
+    bodies = [GROUND, *(name for name in description.links if name != GROUND)]
+    for name in list(bodies):
+        link = description.links[name]
+        on_body[name] = []
+        if name == GROUND:
+            put(name, origin_of(name), (0.0, 0.0))
+        for point, local in link.points.items():
+            put(name, point, local)
+        if link.telescopic and link.ends is not None:
+            rod = rod_of(name)
+            bodies.append(rod)
+            on_body[rod] = []
+            put(rod, link.ends[1], (0.0, 0.0))
+            ties.append((name, rod, ()))
+            legs.append((name, *link.ends))
+
+    lines: list[tuple[str, Line, str]] = []
+    for joint in description.joints.values():
+        if isinstance(joint, Fixed):
+            a, b = joint.links
+            ties.append((a, b, (Turn(1, joint.angle),)))
+            continue
+        line = joint.line
+        if line.through is None:
+            put(line.link, origin_of(line.link), (0.0, 0.0))
+        lines.append((joint.name, line, joint.point))
+        if isinstance(joint, Prismatic):
+            ties.append((line.link, joint.slider, (*_turns_of(line), Turn(1, joint.angle))))
+
+    for name, joint in description.joints.items():
+        for body, point in _named_points(joint):
+            if (body, point) not in points:
+                raise MechanismError(f"link '{body}' has no point '{point}'", f"mechanism.joints.{name}")
+
+    classes, count = _classes(bodies, ties)
+    nodes = list(dict.fromkeys(point for body in bodies for point in on_body[body]))
+    index = {name: k for k, name in enumerate(nodes)}
+    edges: list[Edge] = []
+    for body in bodies:
+        base, *others = on_body[body] or [""]
+        for point in others:
+            edges.append(
+                Edge(index[base], index[point], classes[body][0], ((1, body, point), (-1, body, base)))
+            )
+    slides: list[str] = []
+    for leg, tail, head in legs:
+        edges.append(
+            Edge(index[tail], index[head], classes[leg][0], ((1, rod_of(leg), head), (-1, leg, tail)),
+                 len(slides), classes[leg][1])
+        )  # fmt: skip
+        slides.append(leg)
+    for name, line, point in lines:
+        through = line.through if line.through is not None else origin_of(line.link)
+        frame, offset = classes[line.link]
+        edges.append(Edge(index[through], index[point], frame, (), len(slides), (*offset, *_turns_of(line))))
+        slides.append(name)
+    return Graph(
+        tuple(nodes), tuple(edges), count, classes, points, tuple(slides), frozenset(range(len(legs)))
+    )
+
+
+def _named_points(joint: Prismatic | Slot | Fixed) -> list[tuple[str, str]]:
+    if isinstance(joint, Fixed):
+        return [(link, joint.point) for link in joint.links]
+    line = joint.line
+    named = [(line.link, point) for point in (line.through, line.toward) if point is not None]
+    if isinstance(joint, Prismatic):
+        named.append((joint.slider, joint.point))
+    return named

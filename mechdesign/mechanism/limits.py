@@ -1,0 +1,52 @@
+"""Limits of motion that a study states, as margins: positive inside, zero at the limit, negative outside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value, norm2, wrap
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.model import Term
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A limit with its coordinate looked up."""
+
+    coordinate: Coordinate
+    minimum: Term | None
+    maximum: Term | None
+    label: str
+
+    def margins(self, configuration: Configuration, places: Mapping[str, Value]) -> list[tuple[str, Value]]:
+        """Margins of this limit, each named; distances as differences of squares, which are smooth at the limit.
+
+        An angle between bounds is judged modulo a turn: it holds if (value - min) mod turn <= max - min.
+        """
+
+        def term(value: Term) -> Value:
+            return places[value] if isinstance(value, str) else value
+
+        low = None if self.minimum is None else term(self.minimum)
+        high = None if self.maximum is None else term(self.maximum)
+        if self.coordinate.kind == "distance":
+            a, b = configuration.nodes[self.coordinate.node], configuration.nodes[self.coordinate.other]
+            value = norm2(b - a)
+            low = None if low is None else low * abs(low)
+            high = None if high is None else high * abs(high)
+        else:
+            value = configuration.value(self.coordinate)
+            if self.coordinate.quantity == "angle" and low is not None and high is not None:
+                half = (high - low) / 2
+                margin = half - np.abs(wrap(value - (low + half)))
+                return [(self.label, np.where(half >= np.pi, np.inf, margin))]
+        found = []
+        if low is not None:
+            found.append((f"{self.label} min", value - low))
+        if high is not None:
+            found.append((f"{self.label} max", high - value))
+        return found

@@ -1,0 +1,431 @@
+"""The compiled mechanism: plans for any given coordinates, and the batch solution of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mechdesign.errors import AssemblyError, MechanismError
+from mechdesign.mechanism import coordinates as names
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.configuration import Configuration, Reason
+from mechdesign.mechanism.continuation import Start, follow, unknowns_of
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.geometry import Geometry, Vectors
+from mechdesign.mechanism.graph import Graph, build_graph
+from mechdesign.mechanism.limits import Bound
+from mechdesign.mechanism.model import Description, Limit, Quantity
+from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.plan import Structure, Undetermined, compile_structure
+from mechdesign.mechanism.sketch import Sketch, assembly_modes, drawn_value, locate, roots_as_drawn
+from mechdesign.mechanism.solve import Guess, State, run, start_state
+
+
+class Plan:
+    """How to find the whole mechanism from given coordinates; made by `Mechanism.plan`."""
+
+    def __init__(self, mechanism: Mechanism, structure: Structure, modes: Sequence[int]) -> None:
+        self.mechanism = mechanism
+        self.structure = structure
+        self.modes = tuple(modes)
+        self.iterative = any(group.form == "newton" for group in structure.groups)
+
+    def _run(self, given: Sequence[Value], vectors: Vectors, guess: Guess | None) -> State:
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            state = start_state(self.mechanism.graph, self.structure, vectors, given)
+            return run(state, self.modes, guess, given)
+
+    def _start(self, at: Configuration | None) -> Start:
+        at = self.mechanism.sketch_configuration if at is None else at
+        given = [at.value(coordinate) for coordinate in self.structure.given]
+        guess = unknowns_of(self.structure, self._all_rotations(at, given), at.slides)
+        state = self._run(given, at.vectors, guess)
+        return Start(given, at.places, guess, [np.sign(d) for d in state.determinants])
+
+    def _all_rotations(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
+        extra = []
+        for position, (_, k) in enumerate(self.structure.spans):
+            edge = self.structure.edges[len(self.mechanism.graph.edges) + position]
+            extra.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
+        return [*at.rotations, *extra]
+
+    def solve(
+        self,
+        given: Sequence[ArrayLike],
+        places: Mapping[str, ArrayLike] | None = None,
+        *,
+        start: Configuration | None = None,
+        limits: bool = True,
+    ) -> Configuration:
+        """Assemble the mechanism for a batch of poses.
+
+        Parameters
+        ----------
+        given : sequence of array_like
+            Values of the plan's coordinates in its order (angles in radians); they broadcast to the batch.
+        places : mapping of str to array_like, optional
+            Dimensions that differ from the nominal ones, by place name; they broadcast against `given`.
+        start : Configuration, optional
+            Solved pose (of batch shape or single) that groups without a closed form are continued from; the sketch
+            where left out.
+        limits : bool
+            Whether the study's limits make a pose invalid.
+
+        Returns
+        -------
+        Configuration
+            nan where the mechanism cannot be assembled; never raises for a pose.
+        """
+        values: list[Value] = [np.asarray(g, dtype=float) for g in given]
+        if len(values) != len(self.structure.given):
+            raise ValueError(f"{len(self.structure.given)} given coordinates needed, {len(values)} passed")
+        dims: dict[str, Value] = {name: np.asarray(v, dtype=float) for name, v in (places or {}).items()}
+        shape = np.broadcast_shapes(*(v.shape for v in values), *(v.shape for v in dims.values()))
+        vectors = self.mechanism.geometry.vectors(dims)
+        reached: NDArray[np.bool_] | None = None
+        if self.iterative:
+            guess, reached = self._follow(values, dims, shape, start)
+            state = self._run(values, vectors, guess)
+        else:
+            state = self._run(values, vectors, None)
+        return self._configuration(state, shape, dims, vectors, reached, limits)
+
+    def _follow(
+        self, values: Sequence[Value], dims: Mapping[str, Value], shape: tuple[int, ...], at: Configuration | None
+    ) -> tuple[Guess, NDArray[np.bool_]]:
+        geometry = self.mechanism.geometry
+        begin = self._start(at)
+
+        def flat(value: Value) -> Value:
+            value = np.asarray(value)
+            return value if value.ndim == 0 else np.broadcast_to(value, shape).reshape(-1)
+
+        begin = Start(
+            [flat(v) for v in begin.given],
+            {name: flat(v) for name, v in begin.places.items()},
+            {k: ([flat(v) for v in a], [flat(v) for v in s]) for k, (a, s) in begin.unknowns.items()},
+            [flat(v) for v in begin.signs],
+        )
+        found, reached = follow(
+            self.structure,
+            lambda given, places, guess: self._run(given, geometry.vectors(places), guess),
+            begin,
+            [flat(v) for v in values],
+            {name: flat(v) for name, v in dims.items()},
+            self.mechanism.nominal,
+            self.mechanism.size,
+            int(np.prod(shape)),
+        )
+        guess = {k: ([v.reshape(shape) for v in a], [v.reshape(shape) for v in s]) for k, (a, s) in found.items()}
+        return guess, reached.reshape(shape)
+
+    def _configuration(
+        self,
+        state: State,
+        shape: tuple[int, ...],
+        dims: Mapping[str, Value],
+        vectors: Vectors,
+        reached: NDArray[np.bool_] | None,
+        limits: bool,
+    ) -> Configuration:
+        graph = self.mechanism.graph
+        with np.errstate(invalid="ignore"):
+            open_: Value = np.zeros((), dtype=bool)
+            for group in self.structure.groups:
+                # A group that does not close leaves nan in its first unknown.
+                for root in group.angles[:1]:
+                    open_ = open_ | ~np.isfinite(np.real(state.rotations[root]))
+                for slide in group.slides[:1]:
+                    open_ = open_ | ~np.isfinite(state.slides[slide])
+            for slide in graph.telescopic:
+                open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
+            for value in self.structure.given:
+                open_ = open_ | ~np.isfinite(self._given_value(state, value))
+        reason = np.zeros(shape, dtype=np.int8)
+        reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
+        if reached is not None:
+            solved = np.ones(shape, dtype=bool)
+            for converged in state.converged:
+                solved &= converged
+            reason[~reached & solved & (reason == Reason.OK)] = Reason.OTHER_ASSEMBLY
+            reason[~reached & ~solved] = Reason.NOT_CLOSED
+        nodes, rotations, slides = state.nodes, state.rotations[: graph.classes], state.slides
+        if (reason != Reason.OK).any():
+            lost = reason != Reason.OK
+            nodes = [_hide(x, lost) for x in nodes]
+            rotations = [_hide(u, lost) for u in rotations]
+            slides = [_hide(s, lost) for s in slides]
+        configuration = Configuration(
+            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims)
+        )
+        if limits and self.mechanism.bounds:
+            with np.errstate(invalid="ignore"):
+                for _, margin in self.mechanism.margins(configuration):
+                    outside = np.broadcast_to(margin, shape) < -LIMIT_ROUNDING * self.mechanism.size**2
+                    reason[outside & (reason == Reason.OK)] = Reason.LIMIT
+        return configuration
+
+    def _given_value(self, state: State, coordinate: Coordinate) -> Value:
+        if coordinate.kind in ("x", "y"):
+            return np.real(state.nodes[coordinate.node])
+        if coordinate.kind == "angle":
+            return np.real(state.rotations[self.mechanism.graph.bodies[coordinate.body][0]])
+        return 0.0
+
+
+# A pose set exactly on a limit must not fall outside by rounding.
+LIMIT_ROUNDING = 1e-14
+
+
+def _hide(value: Value, lost: NDArray[np.bool_]) -> Value:
+    """nan for poses that cannot be assembled; what is the same for every pose (the ground) is left alone."""
+    value = np.asarray(value)
+    if value.ndim == 0 and not lost.all():
+        value = np.broadcast_to(value, lost.shape)
+    elif value.ndim == 0:
+        return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
+    return np.where(lost, np.nan, value)
+
+
+class Mechanism:
+    """A planar mechanism, compiled once; see `mechdesign.mechanism.model.Description` for what it is made from.
+
+    Raises
+    ------
+    MechanismError
+        If drives and mobility disagree, or the sketch cannot be assembled.
+    """
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        self.graph: Graph = build_graph(description)
+        self.geometry = Geometry(self.graph, description.places)
+        self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
+        self._plans: dict[tuple[str, ...], Plan] = {}
+        self._check_mobility()
+        self.sketch: Sketch = locate(description, self.graph, self.geometry)
+        self.drives: tuple[str, ...] = tuple(description.drives)
+        self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
+        self.forward = self.plan(self.drives)
+        self.sketch_configuration = self._assemble_sketch()
+
+    @cached_property
+    def size(self) -> float:
+        """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only."""
+        return max([abs(complex(w)) for w in self.geometry.nominal.w] + [abs(x) for x in self.sketch.nodes if x] + [0.0])
+
+    @property
+    def mobility(self) -> int:
+        """Degrees of freedom by counting: unknowns of the vector loops less their equations."""
+        graph = self.graph
+        return (graph.classes - 1) + len(graph.slides) + 2 * (len(graph.nodes) - 1) - 2 * len(graph.edges)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of all coordinates, drives first."""
+        return names.all_names(self.description, self.graph)
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Names of all points."""
+        return tuple(node for node in self.graph.nodes if ":" not in node)
+
+    def coordinate(self, name: str) -> Coordinate:
+        """Look a coordinate up by name.
+
+        Raises
+        ------
+        MechanismError
+            If there is none of that name.
+        """
+        return names.resolve(name, self.description, self.graph)
+
+    def quantity(self, name: str) -> Quantity:
+        """Kind of a coordinate: ``length``, ``angle`` or ``none``."""
+        return self.coordinate(name).quantity
+
+    def joints(self) -> list[str]:
+        """Joints in words, for messages."""
+        holders: dict[str, list[str]] = {}
+        for body, point in self.graph.points:
+            if ":" not in point:
+                link = body.removesuffix(":rod")
+                if link not in holders.setdefault(point, []):
+                    holders[point].append(link)
+        fixed = {(j.point, j.links) for j in self.description.joints.values() if hasattr(j, "links")}
+        found = []
+        for point, links in holders.items():
+            clamps = sum(1 for p, _ in fixed if p == point)
+            if len(links) - clamps > 1:
+                found.append(f"revolute {point} ({', '.join(links)})")
+        found += [f"prismatic {n} (telescopic)" for n, link in self.description.links.items() if link.telescopic]
+        found += [f"{type(j).__name__.lower()} {name}" for name, j in self.description.joints.items()]
+        return found
+
+    def _check_mobility(self) -> None:
+        count = len(self.description.drives)
+        if count != self.mobility:
+            joints = "; ".join(self.joints())
+            fewer = "remove" if count > self.mobility else "add"
+            change = abs(count - self.mobility)
+            mend = f"{fewer} {change} drive{'s' if change > 1 else ''}" if self.mobility > 0 else "free a joint or a link"
+            raise MechanismError(
+                f"the mobility is {self.mobility} but {count} drive{'s are' if count != 1 else ' is'} given: {mend}. "
+                f"Joints found: {joints or 'none'}",
+                "mechanism.drives",
+            )
+
+    def plan(self, given: Sequence[str]) -> Plan:
+        """Plan for given coordinates, exactly as many as the mobility; compiled once.
+
+        Raises
+        ------
+        MechanismError
+            If they do not determine the mechanism.
+        """
+        key = tuple(given)
+        if key not in self._plans:
+            coordinates = [self.coordinate(name) for name in key]
+            if len(key) != self.mobility:
+                raise MechanismError(
+                    f"a pose gives {self.mobility} coordinate{'s' if self.mobility != 1 else ''} (the mobility), "
+                    f"not {len(key)}: {', '.join(key) or 'none'}",
+                    "poses",
+                )
+            try:
+                structure = compile_structure(self.graph, coordinates)
+            except Undetermined as error:
+                what = "drives" if key == tuple(self.description.drives) else ", ".join(key)
+                where = "mechanism.drives" if what == "drives" else "poses"
+                raise MechanismError(f"{what} do not determine the mechanism: {error}", where) from None
+            modes = assembly_modes(self.graph, self.geometry, structure, self.sketch)
+            self._plans[key] = Plan(self, structure, modes)
+        return self._plans[key]
+
+    def _bound(self, limit: Limit, index: int) -> Bound:
+        if limit.kind == "distance":
+            a, b = (self.graph.node(point) for point in limit.items)
+            coordinate = Coordinate("-".join(limit.items), "distance", "length", node=a, other=b)
+        elif limit.kind == "angle":
+            coordinate = Coordinate("-".join(limit.items), "angle", "angle", body=limit.items[1], reference=limit.items[0])
+        else:
+            coordinate = self.coordinate(limit.items[0])
+        return Bound(coordinate, limit.minimum, limit.maximum, limit.label or f"limits.{index}")
+
+    def margins(self, configuration: Configuration) -> list[tuple[str, Value]]:
+        """Named margins of all limits: positive inside (see `mechdesign.mechanism.limits`)."""
+        places = {**self.nominal, **configuration.places}
+        return [margin for bound in self.bounds for margin in bound.margins(configuration, places)]
+
+    def linearize(self, configuration: Configuration) -> Linearization:
+        """Loop equations of the drives' groups at a configuration, for derivatives of any kind."""
+        return Linearization(self.forward.structure, self.geometry, configuration)
+
+    def jacobian(self, configuration: Configuration, outputs: Sequence[Coordinate]) -> NDArray[np.float64]:
+        """Derivatives of outputs with respect to the drives, per radian; shape (..., outputs, drives)."""
+        rates = self.linearize(configuration).drives()
+        full = (len(self.drives), *configuration.shape)
+        rows = [np.broadcast_to(first(configuration, output, rates), full) for output in outputs]
+        return np.moveaxis(np.stack(rows), (0, 1), (-2, -1))
+
+    def _assemble_sketch(self) -> Configuration:
+        plan = self.forward
+        given: list[float] = []
+        for coordinate in plan.structure.given:
+            value = drawn_value(self.graph, self.geometry, self.sketch, coordinate)
+            if value is None and (coordinate.kind == "slide" and coordinate.slide in self.graph.telescopic):
+                raise MechanismError(
+                    f"the ends of leg '{self.graph.slides[coordinate.slide]}' are needed; add them to the sketch",
+                    "mechanism.sketch",
+                )
+            given.append(0.0 if value is None else value)
+        guess = roots_as_drawn(self.graph, self.geometry, plan.structure, self.sketch) if plan.iterative else None
+        values = [np.asarray(g) for g in given]
+        state = plan._run(values, self.geometry.nominal, guess)
+        reached = None
+        if plan.iterative:
+            reached = np.asarray(all(bool(np.all(c)) for c in state.converged))
+        configuration = plan._configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
+        if not configuration.valid:
+            where = self._open_group(state)
+            values_text = ", ".join(
+                f"{c.name} = {g / (self.description.angle_unit if c.quantity == 'angle' else 1.0):.6g}"
+                for c, g in zip(plan.structure.given, given, strict=True)
+            )
+            raise MechanismError(
+                f"the sketch cannot be assembled at its own drive values ({values_text}): {where}; "
+                "check the lengths, or draw it nearer to a pose that closes",
+                "mechanism.sketch",
+            )
+        return configuration
+
+    def _open_group(self, state: State) -> str:
+        for group in self.forward.structure.groups:
+            bad = [r for r in group.angles if not np.isfinite(np.real(state.rotations[r]))]
+            if bad or group.form == "newton":
+                bodies = [b for b, (frame, _) in self.graph.bodies.items() if frame in group.angles]
+                edges = {k for loop in group.loops for k, _ in loop.edges}
+                nodes = {n for k in edges for n in (self.graph.edges[k].tail, self.graph.edges[k].head)}
+                joints = sorted(self.graph.nodes[n] for n in nodes if ":" not in self.graph.nodes[n])
+                return f"links {', '.join(b.removesuffix(':rod') for b in bodies)} do not meet (joints {', '.join(joints)})"
+        return "its legs have no positive length"
+
+    def solve(self, pose: Mapping[str, ArrayLike], places: Mapping[str, ArrayLike] | None = None) -> Pose:
+        """One pose or a batch, in the study's units: ``mechanism.solve({"theta": 60})["C.x"]``.
+
+        Parameters
+        ----------
+        pose : mapping of str to array_like
+            As many coordinates as the mobility; arrays broadcast.
+        places : mapping of str to array_like, optional
+            Changed dimensions by place name, in the study's units.
+
+        Raises
+        ------
+        AssemblyError
+            If a single pose cannot be assembled; in a batch it is nan with ``valid`` False.
+        MechanismError
+            If the coordinates do not determine the mechanism.
+        """
+        unit = self.description.angle_unit
+        plan = self.plan(tuple(pose))
+        given = [
+            np.asarray(v, dtype=float) * (unit if c.quantity == "angle" else 1.0)
+            for v, c in zip(pose.values(), plan.structure.given, strict=True)
+        ]
+        dims = {}
+        for name, value in (places or {}).items():
+            place = self.description.places.get(name)
+            if place is None and not name.endswith((".dx", ".dy")):
+                raise MechanismError(f"'{name}' is not a dimension of this mechanism", name)
+            angle = place is not None and place.quantity == "angle"
+            dims[name] = np.asarray(value, dtype=float) * (unit if angle else 1.0)
+        configuration = plan.solve(given, dims)
+        if configuration.shape == () and not configuration.valid:
+            where = ", ".join(f"{name} = {value}" for name, value in pose.items())
+            raise AssemblyError(f"pose {where}: {Reason(int(configuration.reason)).text}")
+        return Pose(self, configuration)
+
+
+class Pose:
+    """A solved pose (or batch): ``pose["C.x"]``, ``pose["rocker.angle"]``, in the study's units."""
+
+    def __init__(self, mechanism: Mechanism, configuration: Configuration) -> None:
+        self.mechanism = mechanism
+        self.configuration = configuration
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Whether each pose is assembled and within its limits."""
+        return self.configuration.valid
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        coordinate = self.mechanism.coordinate(name)
+        value = np.asarray(self.configuration.value(coordinate), dtype=float)
+        if coordinate.quantity == "angle":
+            value = value / self.mechanism.description.angle_unit
+        return np.broadcast_to(value, self.configuration.shape)[()]

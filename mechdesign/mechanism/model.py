@@ -1,0 +1,145 @@
+"""A planar mechanism as data: links, joints, drives, measures, limits, and the numbers they depend on.
+
+Every number of the geometry is a *place* with a name (``rod.length``, ``ground.G.y``, ``guide.direction``,
+``limits.0.min``). A `Term` is either the name of a place or a plain number. Lengths are in the study's unit,
+angles in radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from mechdesign.expressions import Expression
+
+Term = str | float
+Quantity = Literal["length", "angle", "none"]
+
+
+@dataclass(frozen=True)
+class Place:
+    """One number of the geometry: its name, nominal value (angles in radians) and kind."""
+
+    name: str
+    nominal: float
+    quantity: Quantity = "length"
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid link, or a telescopic leg (two bodies and a slide).
+
+    Parameters
+    ----------
+    points : mapping
+        Point name to its coordinates (x, y) in the link's frame. A binary link has its first end at (0, 0) and its
+        second at (length, 0). The second end of a telescopic leg is not among them.
+    ends : (str, str) or None
+        The two ends of a binary or telescopic link, in the order from, to; the x axis runs from -> to.
+    telescopic : bool
+        The length is a coordinate.
+    """
+
+    name: str
+    points: Mapping[str, tuple[Term, Term]]
+    ends: tuple[str, str] | None = None
+    telescopic: bool = False
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line fixed in a link: through a point, at an angle to the link's x axis or towards a second point."""
+
+    link: str
+    through: str | None
+    direction: Term = 0.0
+    toward: str | None = None
+
+
+@dataclass(frozen=True)
+class Prismatic:
+    """Point `point` of `slider` slides along `line`; the slider's x axis stays at `angle` to the line."""
+
+    name: str
+    line: Line
+    slider: str
+    point: str
+    angle: Term = 0.0
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A pin, `point` of another link, slides along `line` and is free to turn."""
+
+    name: str
+    line: Line
+    point: str
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Links clamped at a shared point, the x axis of the second at `angle` to the first's."""
+
+    name: str
+    links: tuple[str, str]
+    point: str
+    angle: Term = 0.0
+
+
+Joint = Prismatic | Slot | Fixed
+
+
+@dataclass(frozen=True)
+class Drive:
+    """An actuated coordinate: a link's angle (absolute or relative), a leg's length, or a joint's slide."""
+
+    name: str
+    kind: Literal["angle", "length", "slide"]
+    target: str
+    reference: str = "ground"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A named quantity: the angle from link a's x axis to b's, the distance of two points, or an expression."""
+
+    name: str
+    kind: Literal["angle", "distance", "expression"]
+    items: tuple[str, str] | None = None
+    expression: Expression | None = None
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Bounds of a distance of two points, a drive, the angle between two links, or a measure."""
+
+    kind: Literal["distance", "drive", "angle", "measure"]
+    items: tuple[str, ...]
+    minimum: Term | None = None
+    maximum: Term | None = None
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Description:
+    """All that the study says about the mechanism, resolved to names and numbers.
+
+    Parameters
+    ----------
+    sketch : mapping of str to complex
+        Rough positions of points in the world.
+    angle_unit : float
+        Radians in one of the study's units of angle; only the public door `Mechanism.solve` and measure expressions
+        use it.
+    """
+
+    places: Mapping[str, Place]
+    links: Mapping[str, Link]
+    joints: Mapping[str, Joint] = field(default_factory=dict)
+    drives: Mapping[str, Drive] = field(default_factory=dict)
+    measures: Mapping[str, Measure] = field(default_factory=dict)
+    limits: tuple[Limit, ...] = ()
+    sketch: Mapping[str, complex] = field(default_factory=dict)
+    angle_unit: float = 1.0
+    branch: Literal["side", "follow"] = "side"

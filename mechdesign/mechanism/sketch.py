@@ -1,0 +1,190 @@
+"""The sketch: rough places of points, from which assembly modes, drive values and starting guesses are read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.errors import MechanismError
+from mechdesign.mechanism.algebra import cross, dot
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.model import Description
+from mechdesign.mechanism.plan import Group, Structure
+
+# A joint this near to its dividing line, as a fraction of the distances around it, chooses no side.
+UNDECIDED = 0.01
+KEY = "mechanism.sketch"
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """World position of each node and rotation of each angle class, `None` where the sketch does not tell."""
+
+    nodes: Sequence[complex | None]
+    rotations: Sequence[complex | None]
+
+
+def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch:
+    """Place whole links from the points drawn, and further points from the links so placed."""
+    nodes: list[complex | None] = [None] * len(graph.nodes)
+    rotations: list[complex | None] = [None] * graph.classes
+    nodes[0], rotations[0] = 0j, 1 + 0j
+    vectors = geometry.nominal
+    for k, name in enumerate(graph.nodes):
+        if name in description.sketch:
+            nodes[k] = description.sketch[name]
+    for edge, w in zip(graph.edges, vectors.w, strict=True):
+        if edge.frame == 0 and edge.slide is None and edge.tail == 0:
+            nodes[edge.head] = complex(w)
+    changed = True
+    while changed:
+        changed = False
+        # A link's direction is the best fit to all of its vectors that are drawn.
+        for frame in range(1, graph.classes):
+            if rotations[frame] is None:
+                fit = sum((_drawn(nodes, vectors.w, vectors.d, k, e.tail, e.head, e.slide is not None)
+                           for k, e in enumerate(graph.edges) if e.frame == frame
+                           and (e.slide is None or e.slide in graph.telescopic)), 0j)  # fmt: skip
+                if abs(fit) > 0:
+                    rotations[frame] = fit / abs(fit)
+                    changed = True
+        for edge, w in zip(graph.edges, vectors.w, strict=True):
+            turn = rotations[edge.frame]
+            if edge.slide is None and turn is not None:
+                tail, head = nodes[edge.tail], nodes[edge.head]
+                if tail is not None and head is None:
+                    nodes[edge.head] = tail + complex(w) * turn
+                    changed = True
+                elif head is not None and tail is None:
+                    nodes[edge.tail] = head - complex(w) * turn
+                    changed = True
+    return Sketch(nodes, rotations)
+
+
+def _drawn(
+    nodes: Sequence[complex | None], w: Sequence[complex], d: Sequence[complex], k: int, tail: int, head: int, leg: bool
+) -> complex:
+    a, b = nodes[tail], nodes[head]
+    return 0j if a is None or b is None else (b - a) * np.conj(d[k] if leg else w[k])
+
+
+def _span(graph: Graph, sketch: Sketch, edges: Sequence[tuple[int, int]], structure: Structure) -> complex:
+    total = 0j
+    for k, sign in edges:
+        edge = structure.edges[k]
+        ends = []
+        for node in (edge.tail, edge.head):
+            place = sketch.nodes[node]
+            if place is None:
+                raise MechanismError(
+                    f"point '{graph.nodes[node]}' is needed to choose the assembly; add it to the sketch", KEY
+                )
+            ends.append(place)
+        total += sign * (ends[1] - ends[0])
+    return total
+
+
+def assembly_modes(graph: Graph, geometry: Geometry, structure: Structure, sketch: Sketch) -> tuple[int, ...]:
+    """Assembly mode (+1 or -1) of each group of a structure as drawn; 0 for groups that have none.
+
+    Raises
+    ------
+    MechanismError
+        Where a point that decides is not in the sketch, or lies within 1 % of its dividing line.
+    """
+    return tuple(_mode(graph, geometry, structure, group, sketch) for group in structure.groups)
+
+
+def _mode(graph: Graph, geometry: Geometry, structure: Structure, group: Group, sketch: Sketch) -> int:
+    if group.form in ("place", "newton", "two slides"):
+        return 0
+    edges = group.loops[0].edges
+    parts: dict[int, list[tuple[int, int]]] = {root: [] for root in group.angles}
+    slide: tuple[int, int] | None = None
+    for k, sign in edges:
+        edge = structure.edges[k]
+        root = structure.ties[edge.frame].root
+        if edge.slide is not None and edge.slide in group.slides:
+            slide = (k, sign)
+        if root in parts:
+            parts[root].append((k, sign))
+    if group.form == "two angles":
+        first, second = (_span(graph, sketch, path, structure) for path in parts.values())
+        side, size = cross(first + second, first), abs(first + second) * min(abs(first), abs(second))
+        return _decide(graph, structure, group, side, size, parts[group.angles[0]])
+    assert slide is not None
+    k, sign = slide
+    turn = sketch.rotations[structure.edges[k].frame]
+    along = _span(graph, sketch, [slide], structure)
+    if turn is None:
+        # The link that carries the slide is not drawn: its direction is that of the slide itself.
+        turn = along / abs(along) if abs(along) else 1.0 + 0j
+    direction = complex(geometry.nominal.d[k]) * turn
+    if group.form == "angle and fixed slide":
+        radius = _span(graph, sketch, parts[group.angles[0]], structure)
+        side = -dot(radius, sign * direction)
+        return _decide(graph, structure, group, side, abs(radius), parts[group.angles[0]])
+    rest = [(e, s) for e, s in parts[group.angles[0]] if e != k]
+    whole = along + _span(graph, sketch, rest, structure) / sign
+    return _decide(graph, structure, group, sign * dot(whole, direction), abs(whole), [slide])
+
+
+def _decide(
+    graph: Graph, structure: Structure, group: Group, side: float, size: float, path: Sequence[tuple[int, int]]
+) -> int:
+    if abs(side) <= UNDECIDED * size:
+        ends = {node for k, _ in path for node in (structure.edges[k].tail, structure.edges[k].head)}
+        inner = ends - {group.loops[0].start, group.loops[0].end} or ends
+        names = ", ".join(f"'{graph.nodes[node]}'" for node in sorted(inner))
+        raise MechanismError(
+            f"{names} lies within 1 % of the line that divides the two assemblies; draw it clearly on one side", KEY
+        )
+    return 1 if side > 0 else -1
+
+
+def drawn_value(graph: Graph, geometry: Geometry, sketch: Sketch, coordinate: Coordinate) -> float | None:
+    """Value of a drive as drawn (radians), or `None` where the sketch does not tell."""
+    if coordinate.kind == "angle":
+        turns = []
+        for body in (coordinate.body, coordinate.reference):
+            turn = sketch.rotations[graph.bodies[body][0]]
+            if turn is None:
+                return None
+            turns.append(turn * geometry.nominal.offsets[body])
+        return float(np.angle(turns[0] * np.conj(turns[1])))
+    k, edge = next((k, e) for k, e in enumerate(graph.edges) if e.slide == coordinate.slide)
+    tail, head, turn = sketch.nodes[edge.tail], sketch.nodes[edge.head], sketch.rotations[edge.frame]
+    if tail is None or head is None or turn is None:
+        return None
+    return float(dot(head - tail - complex(geometry.nominal.w[k]) * turn, complex(geometry.nominal.d[k]) * turn))
+
+
+def roots_as_drawn(
+    graph: Graph, geometry: Geometry, structure: Structure, sketch: Sketch
+) -> Mapping[int, tuple[list[float], list[float]]]:
+    """Angles and slides of the groups without a closed form as drawn: where Newton's method starts."""
+    found: dict[int, tuple[list[float], list[float]]] = {}
+    for index, group in enumerate(structure.groups):
+        if group.form != "newton":
+            continue
+        angles, slides = [], []
+        for root in group.angles:
+            turn = sketch.rotations[root] if root < graph.classes else None
+            if turn is None:
+                names = [body for body, (frame, _) in graph.bodies.items() if frame == root]
+                raise MechanismError(
+                    f"the points of link '{names[0] if names else '?'}' are needed as a start; add them to the sketch",
+                    KEY,
+                )
+            angles.append(float(np.angle(turn)))
+        for slide in group.slides:
+            value = drawn_value(graph, geometry, sketch, Coordinate("", "slide", "length", slide=slide))
+            if value is None:
+                raise MechanismError(f"the ends of '{graph.slides[slide]}' are needed as a start", KEY)
+            slides.append(value)
+        found[index] = (angles, slides)
+    return found

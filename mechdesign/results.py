@@ -1,0 +1,99 @@
+"""What an analysis returns: named columns with units and a one-line meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One column of a table.
+
+    Parameters
+    ----------
+    name : str
+        Header in the CSV file, fixed by the study format.
+    values : ndarray, shape (rows,)
+        Floats, integers, booleans (written as 1 and 0) or strings.
+    unit : str
+        Unit as the study declares it; empty for pure numbers and text.
+    meaning : str
+        One line for the manifest.
+    """
+
+    name: str
+    values: NDArray[Any]
+    unit: str = ""
+    meaning: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of equal length; ``table["sigma"]`` is the NumPy array."""
+
+    name: str
+    columns: tuple[Column, ...]
+    meaning: str = ""
+
+    def __post_init__(self) -> None:
+        lengths = {len(column.values) for column in self.columns}
+        if len(lengths) > 1:
+            raise ValueError(f"table {self.name}: columns of unequal length {sorted(lengths)}")
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        for column in self.columns:
+            if column.name == name:
+                return column.values
+        raise KeyError(f"table {self.name!r} has no column {name!r}; it has {', '.join(self.names)}")
+
+    def __contains__(self, name: object) -> bool:
+        return any(column.name == name for column in self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns[0].values) if self.columns else 0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns, in order."""
+        return tuple(column.name for column in self.columns)
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Iterate over rows as dictionaries of Python scalars."""
+        lists = [np.asarray(column.values).tolist() for column in self.columns]
+        for row in zip(*lists, strict=True):
+            yield dict(zip(self.names, row, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Answer of one command.
+
+    Parameters
+    ----------
+    command : str
+        ``kinematics``, ``workspace``, ``optimize``, ``reliability`` or ``stiffness``.
+    tables : mapping of str to Table
+        Named as their files; the first is the main table.
+    warnings : sequence of str
+        What the user must know: poses that failed, near singularities, shared parameters.
+    counts : mapping of str to int
+        Poses, samples, designs, and how many of them were invalid.
+    failed : str
+        Message where a pose that a person asked for could not be assembled (exit code 3); tables are whole.
+    """
+
+    command: str
+    tables: Mapping[str, Table]
+    warnings: Sequence[str] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
+    failed: str = ""
+
+    @property
+    def main(self) -> Table:
+        """The table that a terminal shows."""
+        return next(iter(self.tables.values()))
