@@ -60,7 +60,7 @@ class Configuration:
     @property
     def valid(self) -> NDArray[np.bool_]:
         """Whether each pose is assembled and within the limits."""
-        return self.reason == Reason.OK
+        return np.equal(self.reason, int(Reason.OK))
 
     def point(self, name: str) -> NDArray[np.complex128]:
         """World position x + i y of a point, shape of the batch."""

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, angle_of, wrap
-from mechdesign.mechanism.plan import Structure
 from mechdesign.mechanism.solve import Guess, State
+from mechdesign.mechanism.structure import Structure
 
 MAX_CHANGE = 0.35
 SMALLEST_STEP = 2e-4
@@ -91,7 +91,9 @@ def follow(
             break
         target = np.minimum(1.0, done + step)[moving]
         now = [b[moving] + target * (e[moving] - b[moving]) for b, e in zip(begin, end, strict=True)]
-        dims = {name: _pick(a, moving) + target * (_pick(b, moving) - _pick(a, moving)) for name, (a, b) in path.items()}
+        dims = {
+            name: _pick(a, moving) + target * (_pick(b, moving) - _pick(a, moving)) for name, (a, b) in path.items()
+        }
         old = {index: [v[moving] for v in flat[index]] for index in indices}
         guess = {index: _split(structure, index, old[index]) for index in indices}
         state = solver(now, dims, guess)

@@ -1,4 +1,4 @@
-"""Names of coordinates (``C.x``, ``rocker.angle``, ``leg.length``, ``guide.slide``, drives, measures) and what they mean."""
+"""Coordinates by name: ``C.x``, ``rocker.angle``, ``leg.length``, ``guide.slide``, drives and measures."""
 
 from __future__ import annotations
 

@@ -29,8 +29,8 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, cross
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.plan import Group, Structure
 from mechdesign.mechanism.solve import State, columns
+from mechdesign.mechanism.structure import Group, Structure
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,9 +204,7 @@ class Linearization:
             return first, None
         second_rest: list[Value] = []
         for edge, (m, m_z, m1, s1, d, d_z, omega, turn_z) in zip(self.structure.edges, second, strict=True):
-            s2, s1_z = (
-                (0.0, 0.0) if edge.slide is None else (acceleration.slides[edge.slide], first.slides[edge.slide])
-            )
+            s2, s1_z = (0.0, 0.0) if edge.slide is None else (acceleration.slides[edge.slide], first.slides[edge.slide])
             alpha, omega_z = acceleration.angles[edge.frame], first.angles[edge.frame]
             m1_z, m2, bend = s1_z * d + s1 * d_z, s2 * d, 1j * alpha - omega * omega
             rest = (

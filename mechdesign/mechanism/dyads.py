@@ -32,7 +32,7 @@ def _root(product: Value, tolerance: Value) -> Value:
 
 
 def two_angles(k: Value, z1: Value, z2: Value, mode: int) -> Solution:
-    """Rotations U1, U2 of two links that meet; `mode` +1 where the meeting point lies left of the line from k's tail."""
+    """Rotations U1, U2 of two links that meet; `mode` is the side of the line -k on which they meet (+1 left)."""
     n1, n2, reach = norm2(z1), norm2(z2), norm2(k)
     product = 2 * np.sqrt(n1 * n2)
     outer, inner = (n1 + n2 + product) - reach, reach - (n1 + n2 - product)

@@ -30,7 +30,7 @@ def origin_of(link: str) -> str:
 
 @dataclass(frozen=True)
 class Turn:
-    """A contribution to an angle: `sign` times a place or number, or the direction from one point of a link to another."""
+    """A signed part of an angle: a place or number, or the direction from one point of a link to another."""
 
     sign: int
     term: Term = 0.0
@@ -172,9 +172,7 @@ def build_graph(description: Description) -> Graph:
     for body in bodies:
         base, *others = on_body[body] or [""]
         for point in others:
-            edges.append(
-                Edge(index[base], index[point], classes[body][0], ((1, body, point), (-1, body, base)))
-            )
+            edges.append(Edge(index[base], index[point], classes[body][0], ((1, body, point), (-1, body, base))))
     slides: list[str] = []
     for leg, tail, head in legs:
         edges.append(
@@ -187,9 +185,7 @@ def build_graph(description: Description) -> Graph:
         frame, offset = classes[line.link]
         edges.append(Edge(index[through], index[point], frame, (), len(slides), (*offset, *_turns_of(line))))
         slides.append(name)
-    return Graph(
-        tuple(nodes), tuple(edges), count, classes, points, tuple(slides), frozenset(range(len(legs)))
-    )
+    return Graph(tuple(nodes), tuple(edges), count, classes, points, tuple(slides), frozenset(range(len(legs))))
 
 
 def _named_points(joint: Prismatic | Slot | Fixed) -> list[tuple[str, str]]:

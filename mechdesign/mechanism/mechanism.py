@@ -12,183 +12,18 @@ from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason
-from mechdesign.mechanism.continuation import Start, follow, unknowns_of
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.geometry import Geometry, Vectors
+from mechdesign.mechanism.describe import joints_in_words, report
+from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph, build_graph
 from mechdesign.mechanism.limits import Bound
 from mechdesign.mechanism.model import Description, Limit, Quantity
 from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.plan import Structure, Undetermined, compile_structure
+from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import Sketch, assembly_modes, drawn_value, locate, roots_as_drawn
-from mechdesign.mechanism.solve import Guess, State, run, start_state
-
-
-class Plan:
-    """How to find the whole mechanism from given coordinates; made by `Mechanism.plan`."""
-
-    def __init__(self, mechanism: Mechanism, structure: Structure, modes: Sequence[int]) -> None:
-        self.mechanism = mechanism
-        self.structure = structure
-        self.modes = tuple(modes)
-        self.iterative = any(group.form == "newton" for group in structure.groups)
-
-    def _run(self, given: Sequence[Value], vectors: Vectors, guess: Guess | None) -> State:
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            state = start_state(self.mechanism.graph, self.structure, vectors, given)
-            return run(state, self.modes, guess, given)
-
-    def _start(self, at: Configuration | None) -> Start:
-        at = self.mechanism.sketch_configuration if at is None else at
-        given = [at.value(coordinate) for coordinate in self.structure.given]
-        guess = unknowns_of(self.structure, self._all_rotations(at, given), at.slides)
-        state = self._run(given, at.vectors, guess)
-        return Start(given, at.places, guess, [np.sign(d) for d in state.determinants])
-
-    def _all_rotations(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
-        extra = []
-        for position, (_, k) in enumerate(self.structure.spans):
-            edge = self.structure.edges[len(self.mechanism.graph.edges) + position]
-            extra.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
-        return [*at.rotations, *extra]
-
-    def solve(
-        self,
-        given: Sequence[ArrayLike],
-        places: Mapping[str, ArrayLike] | None = None,
-        *,
-        start: Configuration | None = None,
-        limits: bool = True,
-    ) -> Configuration:
-        """Assemble the mechanism for a batch of poses.
-
-        Parameters
-        ----------
-        given : sequence of array_like
-            Values of the plan's coordinates in its order (angles in radians); they broadcast to the batch.
-        places : mapping of str to array_like, optional
-            Dimensions that differ from the nominal ones, by place name; they broadcast against `given`.
-        start : Configuration, optional
-            Solved pose (of batch shape or single) that groups without a closed form are continued from; the sketch
-            where left out.
-        limits : bool
-            Whether the study's limits make a pose invalid.
-
-        Returns
-        -------
-        Configuration
-            nan where the mechanism cannot be assembled; never raises for a pose.
-        """
-        values: list[Value] = [np.asarray(g, dtype=float) for g in given]
-        if len(values) != len(self.structure.given):
-            raise ValueError(f"{len(self.structure.given)} given coordinates needed, {len(values)} passed")
-        dims: dict[str, Value] = {name: np.asarray(v, dtype=float) for name, v in (places or {}).items()}
-        shape = np.broadcast_shapes(*(v.shape for v in values), *(v.shape for v in dims.values()))
-        vectors = self.mechanism.geometry.vectors(dims)
-        reached: NDArray[np.bool_] | None = None
-        if self.iterative:
-            guess, reached = self._follow(values, dims, shape, start)
-            state = self._run(values, vectors, guess)
-        else:
-            state = self._run(values, vectors, None)
-        return self._configuration(state, shape, dims, vectors, reached, limits)
-
-    def _follow(
-        self, values: Sequence[Value], dims: Mapping[str, Value], shape: tuple[int, ...], at: Configuration | None
-    ) -> tuple[Guess, NDArray[np.bool_]]:
-        geometry = self.mechanism.geometry
-        begin = self._start(at)
-
-        def flat(value: Value) -> Value:
-            value = np.asarray(value)
-            return value if value.ndim == 0 else np.broadcast_to(value, shape).reshape(-1)
-
-        begin = Start(
-            [flat(v) for v in begin.given],
-            {name: flat(v) for name, v in begin.places.items()},
-            {k: ([flat(v) for v in a], [flat(v) for v in s]) for k, (a, s) in begin.unknowns.items()},
-            [flat(v) for v in begin.signs],
-        )
-        found, reached = follow(
-            self.structure,
-            lambda given, places, guess: self._run(given, geometry.vectors(places), guess),
-            begin,
-            [flat(v) for v in values],
-            {name: flat(v) for name, v in dims.items()},
-            self.mechanism.nominal,
-            self.mechanism.size,
-            int(np.prod(shape)),
-        )
-        guess = {k: ([v.reshape(shape) for v in a], [v.reshape(shape) for v in s]) for k, (a, s) in found.items()}
-        return guess, reached.reshape(shape)
-
-    def _configuration(
-        self,
-        state: State,
-        shape: tuple[int, ...],
-        dims: Mapping[str, Value],
-        vectors: Vectors,
-        reached: NDArray[np.bool_] | None,
-        limits: bool,
-    ) -> Configuration:
-        graph = self.mechanism.graph
-        with np.errstate(invalid="ignore"):
-            open_: Value = np.zeros((), dtype=bool)
-            for group in self.structure.groups:
-                # A group that does not close leaves nan in its first unknown.
-                for root in group.angles[:1]:
-                    open_ = open_ | ~np.isfinite(np.real(state.rotations[root]))
-                for slide in group.slides[:1]:
-                    open_ = open_ | ~np.isfinite(state.slides[slide])
-            for slide in graph.telescopic:
-                open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
-            for value in self.structure.given:
-                open_ = open_ | ~np.isfinite(self._given_value(state, value))
-        reason = np.zeros(shape, dtype=np.int8)
-        reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
-        if reached is not None:
-            solved = np.ones(shape, dtype=bool)
-            for converged in state.converged:
-                solved &= converged
-            reason[~reached & solved & (reason == Reason.OK)] = Reason.OTHER_ASSEMBLY
-            reason[~reached & ~solved] = Reason.NOT_CLOSED
-        nodes, rotations, slides = state.nodes, state.rotations[: graph.classes], state.slides
-        if (reason != Reason.OK).any():
-            lost = reason != Reason.OK
-            nodes = [_hide(x, lost) for x in nodes]
-            rotations = [_hide(u, lost) for u in rotations]
-            slides = [_hide(s, lost) for s in slides]
-        configuration = Configuration(
-            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims)
-        )
-        if limits and self.mechanism.bounds:
-            with np.errstate(invalid="ignore"):
-                for _, margin in self.mechanism.margins(configuration):
-                    outside = np.broadcast_to(margin, shape) < -LIMIT_ROUNDING * self.mechanism.size**2
-                    reason[outside & (reason == Reason.OK)] = Reason.LIMIT
-        return configuration
-
-    def _given_value(self, state: State, coordinate: Coordinate) -> Value:
-        if coordinate.kind in ("x", "y"):
-            return np.real(state.nodes[coordinate.node])
-        if coordinate.kind == "angle":
-            return np.real(state.rotations[self.mechanism.graph.bodies[coordinate.body][0]])
-        return 0.0
-
-
-# A pose set exactly on a limit must not fall outside by rounding.
-LIMIT_ROUNDING = 1e-14
-
-
-def _hide(value: Value, lost: NDArray[np.bool_]) -> Value:
-    """nan for poses that cannot be assembled; what is the same for every pose (the ground) is left alone."""
-    value = np.asarray(value)
-    if value.ndim == 0 and not lost.all():
-        value = np.broadcast_to(value, lost.shape)
-    elif value.ndim == 0:
-        return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
-    return np.where(lost, np.nan, value)
+from mechdesign.mechanism.solve import State
+from mechdesign.mechanism.structure import Undetermined, compile_structure
 
 
 class Mechanism:
@@ -216,7 +51,9 @@ class Mechanism:
     @cached_property
     def size(self) -> float:
         """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only."""
-        return max([abs(complex(w)) for w in self.geometry.nominal.w] + [abs(x) for x in self.sketch.nodes if x] + [0.0])
+        return max(
+            [abs(complex(w)) for w in self.geometry.nominal.w] + [abs(x) for x in self.sketch.nodes if x] + [0.0]
+        )
 
     @property
     def mobility(self) -> int:
@@ -248,31 +85,19 @@ class Mechanism:
         """Kind of a coordinate: ``length``, ``angle`` or ``none``."""
         return self.coordinate(name).quantity
 
-    def joints(self) -> list[str]:
-        """Joints in words, for messages."""
-        holders: dict[str, list[str]] = {}
-        for body, point in self.graph.points:
-            if ":" not in point:
-                link = body.removesuffix(":rod")
-                if link not in holders.setdefault(point, []):
-                    holders[point].append(link)
-        fixed = {(j.point, j.links) for j in self.description.joints.values() if hasattr(j, "links")}
-        found = []
-        for point, links in holders.items():
-            clamps = sum(1 for p, _ in fixed if p == point)
-            if len(links) - clamps > 1:
-                found.append(f"revolute {point} ({', '.join(links)})")
-        found += [f"prismatic {n} (telescopic)" for n, link in self.description.links.items() if link.telescopic]
-        found += [f"{type(j).__name__.lower()} {name}" for name, j in self.description.joints.items()]
-        return found
+    def describe(self) -> str:
+        """Links, joints, mobility and the order of solution, in words."""
+        return report(self.description, self.graph, self.mobility, self.forward)
 
     def _check_mobility(self) -> None:
         count = len(self.description.drives)
         if count != self.mobility:
-            joints = "; ".join(self.joints())
+            joints = "; ".join(joints_in_words(self.description, self.graph))
             fewer = "remove" if count > self.mobility else "add"
             change = abs(count - self.mobility)
-            mend = f"{fewer} {change} drive{'s' if change > 1 else ''}" if self.mobility > 0 else "free a joint or a link"
+            mend = (
+                f"{fewer} {change} drive{'s' if change > 1 else ''}" if self.mobility > 0 else "free a joint or a link"
+            )
             raise MechanismError(
                 f"the mobility is {self.mobility} but {count} drive{'s are' if count != 1 else ' is'} given: {mend}. "
                 f"Joints found: {joints or 'none'}",
@@ -311,7 +136,9 @@ class Mechanism:
             a, b = (self.graph.node(point) for point in limit.items)
             coordinate = Coordinate("-".join(limit.items), "distance", "length", node=a, other=b)
         elif limit.kind == "angle":
-            coordinate = Coordinate("-".join(limit.items), "angle", "angle", body=limit.items[1], reference=limit.items[0])
+            coordinate = Coordinate(
+                "-".join(limit.items), "angle", "angle", body=limit.items[1], reference=limit.items[0]
+            )
         else:
             coordinate = self.coordinate(limit.items[0])
         return Bound(coordinate, limit.minimum, limit.maximum, limit.label or f"limits.{index}")
@@ -345,11 +172,11 @@ class Mechanism:
             given.append(0.0 if value is None else value)
         guess = roots_as_drawn(self.graph, self.geometry, plan.structure, self.sketch) if plan.iterative else None
         values = [np.asarray(g) for g in given]
-        state = plan._run(values, self.geometry.nominal, guess)
+        state = plan.run(values, self.geometry.nominal, guess)
         reached = None
         if plan.iterative:
             reached = np.asarray(all(bool(np.all(c)) for c in state.converged))
-        configuration = plan._configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
+        configuration = plan.configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
         if not configuration.valid:
             where = self._open_group(state)
             values_text = ", ".join(
@@ -371,7 +198,8 @@ class Mechanism:
                 edges = {k for loop in group.loops for k, _ in loop.edges}
                 nodes = {n for k in edges for n in (self.graph.edges[k].tail, self.graph.edges[k].head)}
                 joints = sorted(self.graph.nodes[n] for n in nodes if ":" not in self.graph.nodes[n])
-                return f"links {', '.join(b.removesuffix(':rod') for b in bodies)} do not meet (joints {', '.join(joints)})"
+                links = ", ".join(body.removesuffix(":rod") for body in bodies)
+                return f"links {links} do not meet (joints {', '.join(joints)})"
         return "its legs have no positive length"
 
     def solve(self, pose: Mapping[str, ArrayLike], places: Mapping[str, ArrayLike] | None = None) -> Pose:
@@ -406,7 +234,7 @@ class Mechanism:
             dims[name] = np.asarray(value, dtype=float) * (unit if angle else 1.0)
         configuration = plan.solve(given, dims)
         if configuration.shape == () and not configuration.valid:
-            where = ", ".join(f"{name} = {value}" for name, value in pose.items())
+            where = ", ".join(f"{name} = {float(np.asarray(value)):g}" for name, value in pose.items())
             raise AssemblyError(f"pose {where}: {Reason(int(configuration.reason)).text}")
         return Pose(self, configuration)
 

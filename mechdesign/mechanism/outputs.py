@@ -153,7 +153,9 @@ def _directional(coordinate: Coordinate, values: dict[str, Value], direction: li
         return [0.0] * len(direction)
     step = STEP * max(1.0, *(float(np.max(np.abs(v))) for v in values.values())) / largest
     sides = [
-        _gradient(coordinate, {p.name: values[p.name] + h * v for p, v in zip(coordinate.parts, direction, strict=True)})
+        _gradient(
+            coordinate, {p.name: values[p.name] + h * v for p, v in zip(coordinate.parts, direction, strict=True)}
+        )
         for h in (step, -step)
     ]
     return [(a - b) / (2 * step) for a, b in zip(*sides, strict=True)]

@@ -1,318 +1,185 @@
-"""Compile the graph, for given coordinates, into groups that can be solved one after another.
-
-Structural analysis by bipartite matching (Dulmage and Mendelsohn 1958): every edge gives two equations, every
-unknown (the angle of a class, a slide, a node's x and y) a variable. A perfect matching exists if and only if the
-given coordinates determine the mechanism structurally; the strongly connected components of the matched graph are
-the smallest groups that must be solved together, in the order of their dependence. With the drives given these are
-the mechanism's Assur groups; with outputs given, those of the inverse problem.
-"""
+"""The batch solution of a mechanism for given coordinates."""
 
 from __future__ import annotations
 
-import graphlib
-from collections import defaultdict
-from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
+from numpy.typing import ArrayLike, NDArray
 
-from mechdesign.errors import MechanismError
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.configuration import Configuration, Reason
+from mechdesign.mechanism.continuation import Start, follow, unknowns_of
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.graph import Edge, Graph
+from mechdesign.mechanism.geometry import Vectors
+from mechdesign.mechanism.solve import Guess, State, run, start_state
+from mechdesign.mechanism.structure import Structure
 
-Form = Literal["place", "two angles", "angle and fixed slide", "angle and turning slide", "two slides", "newton"]
-Variable = tuple[Literal["angle", "slide", "x", "y"], int]
+if TYPE_CHECKING:
+    from mechdesign.mechanism.mechanism import Mechanism
 
-
-@dataclass(frozen=True)
-class Tie:
-    """Class `frame` turns with class `root`: theta = theta_root + sum(sign * given) + sum(sign * body offset)."""
-
-    root: int
-    given: tuple[tuple[int, int], ...] = ()
-    offsets: tuple[tuple[int, str], ...] = ()
+# A pose set exactly on a limit must not fall outside by rounding.
+LIMIT_ROUNDING = 1e-14
 
 
-@dataclass(frozen=True)
-class Loop:
-    """``X_start + sum(sign * edge) - X_end = 0``."""
+class Plan:
+    """How to find the whole mechanism from given coordinates; made by `Mechanism.plan`."""
 
-    start: int
-    end: int
-    edges: tuple[tuple[int, int], ...]
+    def __init__(self, mechanism: Mechanism, structure: Structure, modes: Sequence[int]) -> None:
+        self.mechanism = mechanism
+        self.structure = structure
+        self.modes = tuple(modes)
+        self.iterative = any(group.form == "newton" for group in structure.groups)
 
+    def run(self, given: Sequence[Value], vectors: Vectors, guess: Guess | None) -> State:
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            state = start_state(self.mechanism.graph, self.structure, vectors, given)
+            return run(state, self.modes, guess, given)
 
-@dataclass(frozen=True)
-class Group:
-    """Unknowns that are solved together.
+    def _start(self, at: Configuration | None) -> Start:
+        at = self.mechanism.sketch_configuration if at is None else at
+        given = [at.value(coordinate) for coordinate in self.structure.given]
+        guess = unknowns_of(self.structure, self._all_rotations(at, given), at.slides)
+        state = self.run(given, at.vectors, guess)
+        return Start(given, at.places, guess, [np.sign(d) for d in state.determinants])
 
-    Parameters
-    ----------
-    angles, slides : tuple of int
-        Unknown angle classes (roots of ties) and slides.
-    loops : tuple of Loop
-        Closures between nodes known before.
-    tree : tuple of (int, int)
-        Edges, each with its sign, that place the group's nodes in order once angles and slides are known.
-    fixed : tuple of (int, str, int)
-        Scalar equations: node, ``x`` or ``y``, and which given coordinate it must equal.
-    """
+    def _all_rotations(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
+        extra = []
+        for position, (_, k) in enumerate(self.structure.spans):
+            edge = self.structure.edges[len(self.mechanism.graph.edges) + position]
+            extra.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
+        return [*at.rotations, *extra]
 
-    form: Form
-    angles: tuple[int, ...]
-    slides: tuple[int, ...]
-    loops: tuple[Loop, ...]
-    tree: tuple[tuple[int, int], ...]
-    fixed: tuple[tuple[int, str, int], ...] = ()
+    def solve(
+        self,
+        given: Sequence[ArrayLike],
+        places: Mapping[str, ArrayLike] | None = None,
+        *,
+        start: Configuration | None = None,
+        limits: bool = True,
+    ) -> Configuration:
+        """Assemble the mechanism for a batch of poses.
 
+        Parameters
+        ----------
+        given : sequence of array_like
+            Values of the plan's coordinates in its order (angles in radians); they broadcast to the batch.
+        places : mapping of str to array_like, optional
+            Dimensions that differ from the nominal ones, by place name; they broadcast against `given`.
+        start : Configuration, optional
+            Solved pose (of batch shape or single) that groups without a closed form are continued from; the sketch
+            where left out.
+        limits : bool
+            Whether the study's limits make a pose invalid.
 
-@dataclass(frozen=True)
-class Structure:
-    """The solution plan of a graph for given coordinates."""
+        Returns
+        -------
+        Configuration
+            nan where the mechanism cannot be assembled; never raises for a pose.
+        """
+        values: list[Value] = [np.asarray(g, dtype=float) for g in given]
+        if len(values) != len(self.structure.given):
+            raise ValueError(f"{len(self.structure.given)} given coordinates needed, {len(values)} passed")
+        dims: dict[str, Value] = {name: np.asarray(v, dtype=float) for name, v in (places or {}).items()}
+        shape = np.broadcast_shapes(*(v.shape for v in values), *(v.shape for v in dims.values()))
+        vectors = self.mechanism.geometry.vectors(dims)
+        reached: NDArray[np.bool_] | None = None
+        if self.iterative:
+            guess, reached = self._follow(values, dims, shape, start)
+            state = self.run(values, vectors, guess)
+        else:
+            state = self.run(values, vectors, None)
+        return self.configuration(state, shape, dims, vectors, reached, limits)
 
-    given: tuple[Coordinate, ...]
-    edges: tuple[Edge, ...]
-    classes: int
-    ties: tuple[Tie, ...]
-    known_slides: tuple[tuple[int, int], ...]
-    known_nodes: tuple[tuple[int, int, int], ...]
-    spans: tuple[tuple[int, int], ...]
-    groups: tuple[Group, ...]
+    def _follow(
+        self, values: Sequence[Value], dims: Mapping[str, Value], shape: tuple[int, ...], at: Configuration | None
+    ) -> tuple[Guess, NDArray[np.bool_]]:
+        geometry = self.mechanism.geometry
+        begin = self._start(at)
 
+        def flat(value: Value) -> Value:
+            value = np.asarray(value)
+            return value if value.ndim == 0 else np.broadcast_to(value, shape).reshape(-1)
 
-class Undetermined(MechanismError):
-    """The given coordinates are too many, too few, or contradict each other."""
+        begin = Start(
+            [flat(v) for v in begin.given],
+            {name: flat(v) for name, v in begin.places.items()},
+            {k: ([flat(v) for v in a], [flat(v) for v in s]) for k, (a, s) in begin.unknowns.items()},
+            [flat(v) for v in begin.signs],
+        )
+        found, reached = follow(
+            self.structure,
+            lambda given, places, guess: self.run(given, geometry.vectors(places), guess),
+            begin,
+            [flat(v) for v in values],
+            {name: flat(v) for name, v in dims.items()},
+            self.mechanism.nominal,
+            self.mechanism.size,
+            int(np.prod(shape)),
+        )
+        guess = {k: ([v.reshape(shape) for v in a], [v.reshape(shape) for v in s]) for k, (a, s) in found.items()}
+        return guess, reached.reshape(shape)
 
+    def configuration(
+        self,
+        state: State,
+        shape: tuple[int, ...],
+        dims: Mapping[str, Value],
+        vectors: Vectors,
+        reached: NDArray[np.bool_] | None,
+        limits: bool,
+    ) -> Configuration:
+        graph = self.mechanism.graph
+        with np.errstate(invalid="ignore"):
+            open_: Value = np.zeros((), dtype=bool)
+            for group in self.structure.groups:
+                # A group that does not close leaves nan in its first unknown.
+                for root in group.angles[:1]:
+                    open_ = open_ | ~np.isfinite(np.real(state.rotations[root]))
+                for slide in group.slides[:1]:
+                    open_ = open_ | ~np.isfinite(state.slides[slide])
+            for slide in graph.telescopic:
+                open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
+            for value in self.structure.given:
+                open_ = open_ | ~np.isfinite(self._given_value(state, value))
+        reason = np.zeros(shape, dtype=np.int8)
+        reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
+        if reached is not None:
+            solved = np.ones(shape, dtype=bool)
+            for converged in state.converged:
+                solved &= converged
+            reason[~reached & solved & (reason == Reason.OK)] = Reason.OTHER_ASSEMBLY
+            reason[~reached & ~solved] = Reason.NOT_CLOSED
+        nodes, rotations, slides = state.nodes, state.rotations[: graph.classes], state.slides
+        if (reason != Reason.OK).any():
+            lost = reason != Reason.OK
+            nodes = [_hide(x, lost) for x in nodes]
+            rotations = [_hide(u, lost) for u in rotations]
+            slides = [_hide(s, lost) for s in slides]
+        configuration = Configuration(
+            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims)
+        )
+        if limits and self.mechanism.bounds:
+            with np.errstate(invalid="ignore"):
+                for _, margin in self.mechanism.margins(configuration):
+                    outside = np.broadcast_to(margin, shape) < -LIMIT_ROUNDING * self.mechanism.size**2
+                    reason[outside & (reason == Reason.OK)] = Reason.LIMIT
+        return configuration
 
-@dataclass
-class _Ties:
-    parent: list[Tie]
-
-    def find(self, frame: int) -> Tie:
-        tie = self.parent[frame]
-        if tie.root == frame:
-            return tie
-        above = self.find(tie.root)
-        return Tie(above.root, above.given + tie.given, above.offsets + tie.offsets)
-
-    def join(self, frame: int, reference: int, step: Tie) -> None:
-        """Tie class `frame` to `reference` with theta_frame = theta_reference + step."""
-        a, b = self.find(frame), self.find(reference)
-        if a.root == b.root:
-            raise Undetermined("the given angles contradict each other: two of them fix the same angle")
-        if a.root == 0:
-            # The ground stays the root: turn the relation round.
-            back = Tie(
-                frame,
-                tuple((-s, k) for s, k in step.given),
-                tuple((-s, body) for s, body in step.offsets),
-            )
-            self.join(reference, frame, back)
-            return
-        undo_given = tuple((-s, k) for s, k in a.given)
-        undo_offsets = tuple((-s, body) for s, body in a.offsets)
-        self.parent[a.root] = Tie(b.root, b.given + step.given + undo_given, b.offsets + step.offsets + undo_offsets)
-
-
-def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
-    """Decompose a graph for given coordinates.
-
-    Raises
-    ------
-    Undetermined
-        If the given coordinates do not determine the mechanism.
-    """
-    edges = list(graph.edges)
-    classes = graph.classes
-    ties = _Ties([Tie(k) for k in range(classes)])
-    known_slides: list[tuple[int, int]] = []
-    node_given: dict[tuple[int, str], int] = {}
-    spans: list[tuple[int, int]] = []
-    for k, coordinate in enumerate(given):
+    def _given_value(self, state: State, coordinate: Coordinate) -> Value:
+        if coordinate.kind in ("x", "y"):
+            return np.real(state.nodes[coordinate.node])
         if coordinate.kind == "angle":
-            frame, reference = graph.bodies[coordinate.body][0], graph.bodies[coordinate.reference][0]
-            step = Tie(reference, ((1, k),), ((1, coordinate.reference), (-1, coordinate.body)))
-            ties.join(frame, reference, step)
-        elif coordinate.kind == "slide":
-            known_slides.append((coordinate.slide, k))
-        elif coordinate.kind in ("x", "y"):
-            node_given[coordinate.node, coordinate.kind] = k
-        elif coordinate.kind == "distance":
-            # A given distance is a rigid link between the two points, in a class of its own.
-            ties.parent.append(Tie(classes))
-            spans.append((len(edges), k))
-            edges.append(Edge(coordinate.node, coordinate.other, classes))
-            classes += 1
-        else:
-            raise Undetermined(f"'{coordinate.name}' is an expression: it can be an output, not a given coordinate")
-    found = [ties.find(k) for k in range(classes)]
-    known = {slide for slide, _ in known_slides}
-    groups = _decompose(graph, edges, [tie.root for tie in found], known, node_given)
-    known_nodes = []
-    for node in {node for node, _ in node_given}:
-        pair = (node_given.get((node, "x"), -1), node_given.get((node, "y"), -1))
-        if min(pair) >= 0:
-            known_nodes.append((node, *pair))
-    return Structure(
-        tuple(given), tuple(edges), classes, tuple(found), tuple(known_slides), tuple(known_nodes), tuple(spans),
-        tuple(groups),
-    )  # fmt: skip
+            return np.real(state.rotations[self.mechanism.graph.bodies[coordinate.body][0]])
+        return 0.0
 
 
-def _decompose(
-    graph: Graph,
-    edges: Sequence[Edge],
-    roots: Sequence[int],
-    known_slides: set[int],
-    node_given: dict[tuple[int, str], int],
-) -> list[Group]:
-    known: set[Variable] = {("x", 0), ("y", 0)}
-    known.update(("x" if part == "x" else "y", node) for node, part in node_given)
-    variables: dict[Variable, int] = {}
-    rows: list[list[int]] = []
-
-    def column(variable: Variable) -> int:
-        return variables.setdefault(variable, len(variables))
-
-    for root in sorted({root for root in roots if root != 0}):
-        column(("angle", root))
-    for slide in range(len(graph.slides)):
-        if slide not in known_slides:
-            column(("slide", slide))
-    for node in range(1, len(graph.nodes)):
-        for part in ("x", "y"):
-            if (part, node) not in known:
-                column((part, node))  # type: ignore[arg-type]
-    for edge in edges:
-        shared: list[Variable] = []
-        if roots[edge.frame] != 0:
-            shared.append(("angle", roots[edge.frame]))
-        if edge.slide is not None and edge.slide not in known_slides:
-            shared.append(("slide", edge.slide))
-        for part in ("x", "y"):
-            ends: list[Variable] = [(part, edge.tail), (part, edge.head)]  # type: ignore[list-item]
-            rows.append([column(v) for v in [*shared, *ends] if v not in known])
-    if len(rows) != len(variables):
-        raise Undetermined(_count_message(len(variables) - len(rows)))
-    matched = _match(rows, len(variables))
-    if matched is None:
-        raise Undetermined("the given coordinates fix one part of the mechanism twice and leave another free")
-
-    # The two equations of an edge stay together, and so do those matched to the two coordinates of a node.
-    units: dict[Hashable, set[int]] = defaultdict(set)
-    names = list(variables)
-    for row in range(len(rows)):
-        units["edge", row // 2].add(row)
-        kind, index = names[matched[row]]
-        if kind in ("x", "y"):
-            units["node", index].add(row)
-    arcs: list[tuple[int, int]] = []
-    for together in units.values():
-        first, *others = sorted(together)
-        arcs += [(first, other) for other in others] + [(other, first) for other in others]
-    solver = {matched[row]: row for row in range(len(rows))}
-    for row, columns in enumerate(rows):
-        arcs += [(row, solver[c]) for c in columns if solver[c] != row]
-    labels = _components(arcs, len(rows))
-    order: dict[int, set[int]] = {int(label): set() for label in labels}
-    for a, b in arcs:
-        if labels[a] != labels[b]:
-            order[int(labels[a])].add(int(labels[b]))
-    groups = []
-    for label in graphlib.TopologicalSorter(order).static_order():
-        members = [row for row in range(len(rows)) if labels[row] == label]
-        groups.append(_group(edges, roots, sorted({row // 2 for row in members}),
-                             [names[matched[row]] for row in members], node_given))  # fmt: skip
-    return groups
-
-
-def _count_message(free: int) -> str:
-    return f"{abs(free)} coordinate{'s' if abs(free) > 1 else ''} too {'few' if free > 0 else 'many'} given"
-
-
-def _match(rows: list[list[int]], columns: int) -> list[int] | None:
-    data = [(r, c) for r, row in enumerate(rows) for c in row]
-    if not data:
-        return []
-    i, j = np.array(data).T
-    matrix = csr_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(len(rows), columns))
-    matched = maximum_bipartite_matching(matrix, perm_type="column")
-    return None if (matched < 0).any() else [int(c) for c in matched]
-
-
-def _components(arcs: list[tuple[int, int]], count: int) -> list[int]:
-    i, j = np.array(arcs).T if arcs else (np.zeros(0, int), np.zeros(0, int))
-    matrix = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(count, count))
-    return [int(label) for label in connected_components(matrix, directed=True, connection="strong")[1]]
-
-
-def _group(
-    edges: Sequence[Edge],
-    roots: Sequence[int],
-    members: list[int],
-    unknowns: list[Variable],
-    node_given: dict[tuple[int, str], int],
-) -> Group:
-    angles = tuple(sorted(index for kind, index in unknowns if kind == "angle"))
-    slides = tuple(sorted(index for kind, index in unknowns if kind == "slide"))
-    free = {index for kind, index in unknowns if kind in ("x", "y")}
-    reached = {node for k in members for node in (edges[k].tail, edges[k].head)} - free
-    paths: dict[int, tuple[int, tuple[tuple[int, int], ...]]] = {node: (node, ()) for node in reached}
-    tree: list[tuple[int, int]] = []
-    loops: list[Loop] = []
-    pending = list(members)
-    # Rigid edges first, then slides, so that a loop closes over as few unknowns as it can.
-    pending.sort(key=lambda k: (edges[k].slide is not None, k))
-    while pending:
-        for k in pending:
-            tail, head = edges[k].tail, edges[k].head
-            if tail in paths and head in paths:
-                loops.append(_loop(paths, k, tail, head))
-                break
-            if tail in paths or head in paths:
-                a, b, sign = (tail, head, 1) if tail in paths else (head, tail, -1)
-                paths[b] = (paths[a][0], (*paths[a][1], (k, sign)))
-                tree.append((k, sign))
-                break
-        else:
-            raise Undetermined("a part of the mechanism is not connected to the ground by given coordinates")
-        pending.remove(k)
-    fixed = tuple(
-        (node, part, which) for (node, part), which in sorted(node_given.items()) if node in free
-    )
-    used = tuple(loop for loop in loops)
-    return Group(_form(edges, roots, angles, slides, used, fixed), angles, slides, used, tuple(tree), fixed)
-
-
-def _loop(paths: dict[int, tuple[int, tuple[tuple[int, int], ...]]], k: int, tail: int, head: int) -> Loop:
-    start, out = paths[tail]
-    end, back = paths[head]
-    common = 0
-    while common < min(len(out), len(back)) and out[common] == back[common]:
-        common += 1
-    if common:
-        start = end
-    return Loop(start, end, (*out[common:], (k, 1), *((edge, -sign) for edge, sign in reversed(back[common:]))))
-
-
-def _form(
-    edges: Sequence[Edge],
-    roots: Sequence[int],
-    angles: tuple[int, ...],
-    slides: tuple[int, ...],
-    loops: tuple[Loop, ...],
-    fixed: tuple[tuple[int, str, int], ...],
-) -> Form:
-    if not angles and not slides and not fixed:
-        return "place"
-    if len(loops) != 1 or fixed or len(angles) + len(slides) != 2:
-        return "newton"
-    if len(angles) == 2:
-        return "two angles"
-    if len(slides) == 2:
-        return "two slides"
-    carrier = next(roots[edges[k].frame] for k, _ in loops[0].edges if edges[k].slide == slides[0])
-    return "angle and turning slide" if carrier == angles[0] else "angle and fixed slide"
+def _hide(value: Value, lost: NDArray[np.bool_]) -> Value:
+    """nan for poses that cannot be assembled; what is the same for every pose (the ground) is left alone."""
+    value = np.asarray(value)
+    if value.ndim == 0 and not lost.all():
+        value = np.broadcast_to(value, lost.shape)
+    elif value.ndim == 0:
+        return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
+    return np.where(lost, np.nan, value)

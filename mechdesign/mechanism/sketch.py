@@ -13,7 +13,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.model import Description
-from mechdesign.mechanism.plan import Group, Structure
+from mechdesign.mechanism.structure import Group, Structure
 
 # A joint this near to its dividing line, as a fraction of the distances around it, chooses no side.
 UNDECIDED = 0.01

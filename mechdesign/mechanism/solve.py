@@ -13,7 +13,7 @@ from mechdesign.mechanism import dyads
 from mechdesign.mechanism.algebra import Value, rotation, vector
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.plan import Group, Loop, Structure
+from mechdesign.mechanism.structure import Group, Loop, Structure
 
 Guess = Mapping[int, tuple[Sequence[Value], Sequence[Value]]]
 NEWTON_STEPS = 10
@@ -110,7 +110,7 @@ def _closed_form(state: State, group: Group, mode: int) -> None:
     structure = state.structure
     loop = group.loops[0]
     k: Value = 0.0 if loop.start == loop.end else state.nodes[loop.start] - state.nodes[loop.end]
-    z: dict[int, Value] = {root: 0.0 for root in group.angles}
+    z: dict[int, Value] = dict.fromkeys(group.angles, 0.0)
     d: dict[int, Value] = {}
     for index, sign in loop.edges:
         edge = structure.edges[index]
@@ -153,8 +153,8 @@ def loop_sum(state: State, loop: Loop) -> Value:
 
 def columns(state: State, group: Group, path: Sequence[tuple[int, int]]) -> list[Value]:
     """Derivatives of the sum of signed edges along `path` with respect to a group's angles and slides."""
-    by_root: dict[int, Value] = {root: 0.0 for root in group.angles}
-    by_slide: dict[int, Value] = {slide: 0.0 for slide in group.slides}
+    by_root: dict[int, Value] = dict.fromkeys(group.angles, 0.0)
+    by_slide: dict[int, Value] = dict.fromkeys(group.slides, 0.0)
     for k, sign in path:
         edge = state.structure.edges[k]
         root = state.structure.ties[edge.frame].root
