@@ -157,7 +157,7 @@ def _numbers(table: Table, name: str) -> NDArray[np.float64]:
 
 def _equal(values: NDArray[Any], wanted: object) -> NDArray[np.bool_]:
     if values.dtype.kind in "fiub" and isinstance(wanted, (int, float)):
-        return np.isclose(values.astype(float), float(wanted), rtol=1e-9, atol=1e-12)
+        return np.asarray(np.isclose(values.astype(float), float(wanted), rtol=1e-9, atol=1e-12))
     return np.array([str(value) == str(wanted) for value in values.tolist()], dtype=bool)
 
 

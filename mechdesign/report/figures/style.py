@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, Literal
 
 import matplotlib
+from cycler import cycler
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -28,14 +30,14 @@ INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
 
-_SETTINGS = {
+_SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 10,
     "axes.titlesize": 11,
     "axes.labelsize": 10,
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
-    "axes.prop_cycle": matplotlib.cycler(color=PALETTE),
+    "axes.prop_cycle": cycler(color=PALETTE),
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.spines.top": False,
@@ -64,7 +66,9 @@ def context() -> Iterator[None]:
         yield
 
 
-def new_figure(width: float = WIDTH, height: float = 5.0, *, layout: str | None = "constrained") -> Figure:
+def new_figure(
+    width: float = WIDTH, height: float = 5.0, *, layout: Literal["constrained", "tight"] | None = "constrained"
+) -> Figure:
     """An empty figure (inches) with the Agg canvas; use inside `context`."""
     figure = Figure(figsize=(width, height), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
@@ -79,5 +83,5 @@ def axis_label(name: str, unit: str = "") -> str:
 def to_png(figure: Figure) -> bytes:
     """The figure as PNG bytes without date, software or host."""
     stream = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(stream, metadata={"Software": None})
+    figure.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
     return stream.getvalue()

@@ -1,0 +1,180 @@
+"""A mechanism in one pose as places and directions in the plane: what a drawing needs to know."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechdesign.mechanism.model import Description, Fixed, Line, Link, Slot, Term
+
+if TYPE_CHECKING:
+    from mechdesign.mechanism import Mechanism
+    from mechdesign.mechanism.configuration import Configuration
+
+GROUND = "ground"
+
+
+@dataclass(frozen=True)
+class Guide:
+    """The line of a slide or slot: through `origin` along the unit vector `along`; what slides is at `pin`."""
+
+    joint: str
+    owner: str
+    point: str
+    origin: complex
+    along: complex
+    pin: complex
+    slider: str | None
+
+    @property
+    def travel(self) -> float:
+        """Distance of the pin from the origin along the line."""
+        return ((self.pin - self.origin) * self.along.conjugate()).real
+
+    def ends(self, travel: Mapping[str, tuple[float, float]], span: float) -> tuple[complex, complex]:
+        """Ends of the part of the line that is drawn: the slide's travel and a tenth of the mechanism's size more."""
+        low, high = travel.get(self.joint, (self.travel, self.travel))
+        low, high = min(low, self.travel) - 0.1 * span, max(high, self.travel) + 0.1 * span
+        return self.origin + low * self.along, self.origin + high * self.along
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One pose of a mechanism.
+
+    Parameters
+    ----------
+    points : mapping of str to complex
+        World place of every named point.
+    rotations : mapping of str to complex
+        Unit vector of every link's x axis.
+    """
+
+    description: Description
+    points: Mapping[str, complex]
+    rotations: Mapping[str, complex]
+    guides: tuple[Guide, ...]
+
+    @property
+    def span(self) -> float:
+        """Width or height of the pose, the larger."""
+        places = self.points.values()
+        widths = [max(part) - min(part) for part in ([p.real for p in places], [p.imag for p in places])]
+        return max(*widths, 1e-12)
+
+    def link_points(self, name: str) -> tuple[str, ...]:
+        """Names of a link's points, its ends first."""
+        return link_points(self.description.links[name])
+
+    def pivot(self, link: str, reference: str) -> str:
+        """The point about which a link is turned: the one it shares with its reference, else its first."""
+        mine = self.link_points(link)
+        return next((point for point in mine if point in self.link_points(reference)), mine[0])
+
+    def kinds(self) -> dict[str, str]:
+        """What stands at each point: ``pin``, ``clamp``, ``tracer`` (a point of one link only) or ``none``."""
+        uses = Counter(point for name in self.description.links for point in self.link_points(name))
+        clamps = Counter(joint.point for joint in self.description.joints.values() if isinstance(joint, Fixed))
+        slots = {joint.point for joint in self.description.joints.values() if isinstance(joint, Slot)}
+        slid = {guide.point for guide in self.guides if guide.slider is not None}
+        kinds = {}
+        for point, count in uses.items():
+            if point in slots or count - clamps[point] > 1:
+                kinds[point] = "pin"
+            elif clamps[point]:
+                kinds[point] = "clamp"
+            elif point in slid or point in self.link_points(GROUND):
+                kinds[point] = "none"
+            else:
+                kinds[point] = "tracer"
+        return kinds
+
+    def pivots(self) -> tuple[str, ...]:
+        """Points of the ground to which something is pinned or clamped."""
+        moving = {point for name in self.description.links if name != GROUND for point in self.link_points(name)}
+        return tuple(point for point in self.link_points(GROUND) if point in moving)
+
+
+def link_points(link: Link) -> tuple[str, ...]:
+    """Names of a link's points, its ends first; those of a telescopic leg include its tip."""
+    return tuple(dict.fromkeys((*(link.ends or ()), *link.points)))
+
+
+def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> Scene | None:
+    """The pose of that index in a (flattened) batch, or None where it cannot be assembled."""
+    description = mechanism.description
+
+    def pick(values: np.ndarray) -> complex:
+        return complex(np.ravel(values)[index])
+
+    names = {point for link in description.links.values() for point in link_points(link)}
+    points = {name: pick(configuration.point(name)) for name in sorted(names)}
+    rotations = {name: pick(configuration.rotation(name)) for name in description.links}
+    if not all(map(cmath.isfinite, (*points.values(), *rotations.values()))):
+        return None
+
+    def number(term: Term) -> float:
+        if not isinstance(term, str):
+            return term
+        value = configuration.places.get(term, description.places[term].nominal)
+        return float(np.ravel(np.broadcast_to(value, configuration.shape))[index])
+
+    def line(of: Line) -> tuple[complex, complex]:
+        rotation, link = rotations[of.link], description.links[of.link]
+        if of.through is not None:
+            start = points[of.through]
+        elif of.link == GROUND or not link.points:
+            start = 0j
+        else:
+            name, (x, y) = next(iter(link.points.items()))
+            start = points[name] - rotation * complex(number(x), number(y))
+        if of.toward is not None:
+            return start, (points[of.toward] - start) / abs(points[of.toward] - start)
+        return start, rotation * cmath.exp(1j * number(of.direction))
+
+    guides = []
+    for name, joint in description.joints.items():
+        if isinstance(joint, Fixed):
+            continue
+        origin, along = line(joint.line)
+        slider = None if isinstance(joint, Slot) else joint.slider
+        guides.append(Guide(name, joint.line.link, joint.point, origin, along, points[joint.point], slider))
+    return Scene(description, points, rotations, tuple(guides))
+
+
+def travels(scenes: Sequence[Scene]) -> dict[str, tuple[float, float]]:
+    """Range of each slide over several poses."""
+    ranges: dict[str, tuple[float, float]] = {}
+    for scene in scenes:
+        for guide in scene.guides:
+            low, high = ranges.get(guide.joint, (math.inf, -math.inf))
+            ranges[guide.joint] = min(low, guide.travel), max(high, guide.travel)
+    return ranges
+
+
+def hull(places: Sequence[complex]) -> list[complex]:
+    """Corners of the convex hull, counter-clockwise; two where the places lie on one line."""
+    ordered = sorted(set(places), key=lambda place: (place.real, place.imag))
+    if len(ordered) < 3:
+        return ordered
+    width = max(abs(place - ordered[0]) for place in ordered)
+
+    def half(sequence: Sequence[complex]) -> list[complex]:
+        chain: list[complex] = []
+        for place in sequence:
+            while len(chain) > 1 and _area(chain[-2], chain[-1], place) <= 1e-3 * width**2:
+                chain.pop()
+            chain.append(place)
+        return chain[:-1]
+
+    return half(ordered) + half(ordered[::-1])
+
+
+def _area(a: complex, b: complex, c: complex) -> float:
+    return ((b - a).conjugate() * (c - a)).imag
