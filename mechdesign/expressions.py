@@ -1,0 +1,341 @@
+"""Arithmetic expressions of a study, such as ``"l_min + 2*R"`` or ``"B.x - A.x"``.
+
+The text is parsed here, by a grammar of numbers, names, operators and a fixed list of functions; nothing of it is ever
+executed as Python. An expression is kept as a postfix program, evaluated with NumPy on whole batches at once.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Number = float | NDArray[np.float64]
+
+MAX_LENGTH = 1000
+"""Longest text accepted: nothing that a person writes comes near it."""
+MAX_DEPTH = 50
+"""Deepest nesting of parentheses accepted."""
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+    r"|(?P<name>[^\W\d]\w*(?:\.\w+)*)"
+    r"|(?P<operator>\*\*|[-+*/(),]))"
+)
+
+
+class ExpressionError(ValueError):
+    """An expression that cannot be read or has no finite value; the message says why."""
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function of the language: on floats, on arrays, and its partial derivatives on arrays."""
+
+    scalar: Callable[..., float]
+    array: Callable[..., Any]
+    partials: Callable[..., tuple[Any, ...]]
+    angles: Literal["", "takes", "gives"] = ""
+
+
+def _divide(a: float, b: float) -> float:
+    if b == 0:
+        raise ExpressionError("division by zero")
+    return a / b
+
+
+_FUNCTIONS: dict[str, _Function] = {
+    "sqrt": _Function(math.sqrt, np.sqrt, lambda x: (0.5 / np.sqrt(x),)),
+    "exp": _Function(math.exp, np.exp, lambda x: (np.exp(x),)),
+    "log": _Function(math.log, np.log, lambda x: (1.0 / np.asarray(x, dtype=float),)),
+    "abs": _Function(abs, np.abs, lambda x: (np.sign(x),)),
+    "sin": _Function(math.sin, np.sin, lambda x: (np.cos(x),), "takes"),
+    "cos": _Function(math.cos, np.cos, lambda x: (-np.sin(x),), "takes"),
+    "tan": _Function(math.tan, np.tan, lambda x: (1.0 + np.tan(x) ** 2,), "takes"),
+    "asin": _Function(math.asin, np.arcsin, lambda x: (1.0 / np.sqrt((1.0 - x) * (1.0 + x)),), "gives"),
+    "acos": _Function(math.acos, np.arccos, lambda x: (-1.0 / np.sqrt((1.0 - x) * (1.0 + x)),), "gives"),
+    "atan": _Function(math.atan, np.arctan, lambda x: (1.0 / (1.0 + np.square(x)),), "gives"),
+    "atan2": _Function(
+        math.atan2,
+        np.arctan2,
+        lambda y, x: (x / (np.square(x) + np.square(y)), -y / (np.square(x) + np.square(y))),
+        "gives",
+    ),
+    "hypot": _Function(math.hypot, np.hypot, lambda x, y: (x / np.hypot(x, y), y / np.hypot(x, y))),
+    "min": _Function(min, np.minimum, lambda x, y: (np.where(x <= y, 1.0, 0.0), np.where(x <= y, 0.0, 1.0))),
+    "max": _Function(max, np.maximum, lambda x, y: (np.where(x >= y, 1.0, 0.0), np.where(x >= y, 0.0, 1.0))),
+    "+": _Function(lambda x, y: x + y, np.add, lambda x, y: (1.0, 1.0)),
+    "-": _Function(lambda x, y: x - y, np.subtract, lambda x, y: (1.0, -1.0)),
+    "*": _Function(lambda x, y: x * y, np.multiply, lambda x, y: (y, x)),
+    "/": _Function(_divide, np.true_divide, lambda x, y: (np.true_divide(1.0, y), -np.true_divide(x, np.square(y)))),
+    "**": _Function(
+        math.pow,
+        np.float_power,
+        lambda x, y: (y * np.float_power(x, np.subtract(y, 1.0)), np.float_power(x, y) * np.log(x)),
+    ),
+    "negate": _Function(lambda x: -x, np.negative, lambda x: (-1.0,)),
+}
+_ARITY = {"atan2": 2, "hypot": 2}
+_BINDING = {"+": 10, "-": 10, "*": 20, "/": 20, "**": 40}
+_UNARY_BINDING = 30
+
+FUNCTIONS = frozenset(name for name in _FUNCTIONS if name.isalnum() and name != "negate")
+"""Names of the functions that an expression may call."""
+RESERVED = FUNCTIONS | {"pi"}
+"""Names that a parameter cannot bear."""
+
+_Step = tuple[Literal["constant", "name", "call"], float | str]
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A parsed expression.
+
+    Parameters
+    ----------
+    text : str
+        As the study gives it.
+    program : tuple of steps
+        Postfix: push a constant, push a named value, or apply a function to the topmost values.
+    angle_unit : float
+        Radians in one of the units that trigonometry takes and gives.
+    names : frozenset of str
+        Variables, dotted ones (``B.x``) included.
+    """
+
+    text: str
+    program: tuple[_Step, ...]
+    angle_unit: float
+    names: frozenset[str]
+
+    @classmethod
+    def parse(cls, text: str, angle_unit: float = 1.0) -> Expression:
+        """Parse a text.
+
+        Raises
+        ------
+        ExpressionError
+            Where the text is not an expression; the message tells what is wrong with it.
+        """
+        program = _Parser(text).parse()
+        names = frozenset(str(item) for kind, item in program if kind == "name")
+        return cls(text, program, angle_unit, names)
+
+    def evaluate(self, env: Mapping[str, ArrayLike]) -> Number:
+        """Value with the variables of `env`, which broadcast against each other.
+
+        Plain floats give a float and raise ExpressionError where there is no finite value; arrays give an array with
+        nan or inf there.
+        """
+        stack: list[Any] = []
+        with np.errstate(all="ignore"):
+            for kind, item in self.program:
+                if kind == "constant":
+                    stack.append(item)
+                elif kind == "name":
+                    stack.append(self._variable(env, str(item)))
+                else:
+                    count = _count(str(item))
+                    arguments = stack[-count:]
+                    del stack[-count:]
+                    stack.append(self._apply(str(item), arguments))
+        result: Number = stack[0]
+        if type(result) is float and not math.isfinite(result) and not _has_nan(env, self.names):
+            raise ExpressionError(f"{self.text!r} has no finite value")
+        return result
+
+    def derivatives(self, env: Mapping[str, ArrayLike]) -> dict[str, Number]:
+        """Exact partial derivative with respect to every variable, at the values of `env` (forward mode)."""
+        stack: list[tuple[Any, dict[str, Any]]] = []
+        with np.errstate(all="ignore"):
+            for kind, item in self.program:
+                if kind == "constant":
+                    stack.append((item, {}))
+                elif kind == "name":
+                    stack.append((self._variable(env, str(item)), {str(item): 1.0}))
+                else:
+                    count = _count(str(item))
+                    arguments = stack[-count:]
+                    del stack[-count:]
+                    stack.append(self._differentiate(str(item), arguments))
+        return {name: _plain(value) for name, value in stack[0][1].items()}
+
+    def _variable(self, env: Mapping[str, ArrayLike], name: str) -> Number:
+        try:
+            value = env[name]
+        except KeyError:
+            raise ExpressionError(f"unknown name {name!r}") from None
+        return float(value) if type(value) in (float, int) else np.asarray(value, dtype=float)  # type: ignore[arg-type]
+
+    def _apply(self, name: str, arguments: list[Any]) -> Number:
+        function = _FUNCTIONS[name]
+        inner, outer = self._angle_factors(function)
+        if not all(type(argument) is float for argument in arguments):
+            result: NDArray[np.float64] = function.array(*(argument * inner for argument in arguments)) * outer
+            return result
+        try:
+            return float(function.scalar(*(argument * inner for argument in arguments)) * outer)
+        except ExpressionError as error:
+            raise ExpressionError(f"{error} in {self.text!r}") from None
+        except OverflowError:
+            raise ExpressionError(f"{self.text!r} is too large a number") from None
+        except ValueError:
+            shown = ", ".join(f"{argument:g}" for argument in arguments)
+            raise ExpressionError(f"{name}({shown}) in {self.text!r} is not a number") from None
+
+    def _differentiate(self, name: str, arguments: list[tuple[Any, dict[str, Any]]]) -> tuple[Any, dict[str, Any]]:
+        function = _FUNCTIONS[name]
+        inner, outer = self._angle_factors(function)
+        values = [np.asarray(value) * inner for value, _ in arguments]
+        total: dict[str, Any] = {}
+        for (_, seeds), partial in zip(arguments, function.partials(*values), strict=True):
+            for variable, seed in seeds.items():
+                total[variable] = total.get(variable, 0.0) + seed * partial * inner * outer
+        return function.array(*values) * outer, total
+
+    def _angle_factors(self, function: _Function) -> tuple[float, float]:
+        inner = self.angle_unit if function.angles == "takes" else 1.0
+        outer = 1.0 / self.angle_unit if function.angles == "gives" else 1.0
+        return inner, outer
+
+
+def _plain(value: Any) -> Number:
+    array = np.asarray(value, dtype=float)
+    return float(array) if array.ndim == 0 else array
+
+
+def _count(name: str) -> int:
+    if name in ("min", "max") or name in _BINDING:
+        return 2
+    return _ARITY.get(name, 1)
+
+
+def _has_nan(env: Mapping[str, ArrayLike], names: frozenset[str]) -> bool:
+    """Whether the value is lost already in a variable, whose own mistake has been told."""
+    return any(bool(np.isnan(np.asarray(env[name], dtype=float)).any()) for name in names)
+
+
+class _Parser:
+    """Precedence climbing over the tokens of one text; `**` binds more tightly than a sign, as in Python."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.program: list[_Step] = []
+        self.depth = 0
+        self.tokens = self._tokenize(text)
+        self.position = 0
+
+    def parse(self) -> tuple[_Step, ...]:
+        if not self.tokens:
+            raise ExpressionError("an empty text where a number is expected")
+        self._operand_chain(0)
+        if self.position < len(self.tokens):
+            raise self._unexpected()
+        return tuple(self.program)
+
+    @staticmethod
+    def _tokenize(text: str) -> list[tuple[str, str]]:
+        if len(text) > MAX_LENGTH:
+            raise ExpressionError(f"an expression longer than {MAX_LENGTH} characters")
+        tokens: list[tuple[str, str]] = []
+        position, end = 0, len(text.rstrip())
+        while position < end:
+            match = _TOKEN.match(text, position)
+            if match is None:
+                rest = text[position:].lstrip()
+                hint = "; powers are written **" if rest.startswith("^") else ""
+                raise ExpressionError(f"{rest[0]!r} has no meaning in the expression {_short(text)!r}{hint}")
+            tokens.append((str(match.lastgroup), match.group(str(match.lastgroup))))
+            position = match.end()
+        return tokens
+
+    def _peek(self) -> tuple[str, str]:
+        return self.tokens[self.position] if self.position < len(self.tokens) else ("end", "")
+
+    def _take(self, operator: str) -> bool:
+        if self._peek() == ("operator", operator):
+            self.position += 1
+            return True
+        return False
+
+    def _unexpected(self) -> ExpressionError:
+        kind, token = self._peek()
+        if kind == "end":
+            return ExpressionError(f"the expression {_short(self.text)!r} ends too early")
+        return ExpressionError(f"unexpected {token!r} in the expression {_short(self.text)!r}")
+
+    def _operand_chain(self, binding: int) -> None:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise ExpressionError(f"an expression nested deeper than {MAX_DEPTH} levels")
+        self._operand()
+        while True:
+            kind, token = self._peek()
+            power = _BINDING.get(token, -1) if kind == "operator" else -1
+            if power <= binding:
+                break
+            self.position += 1
+            # ** groups to the right: 2**3**2 is 2**9.
+            self._operand_chain(power - 1 if token == "**" else power)
+            self.program.append(("call", token))
+        self.depth -= 1
+
+    def _operand(self) -> None:
+        kind, token = self._peek()
+        if kind == "end" or token in (")", ",", "*", "/", "**"):
+            raise self._unexpected()
+        self.position += 1
+        if token == "-":
+            self._operand_chain(_UNARY_BINDING)
+            self.program.append(("call", "negate"))
+        elif token == "+":
+            self._operand_chain(_UNARY_BINDING)
+        elif token == "(":
+            self._operand_chain(0)
+            self._close()
+        elif kind == "number":
+            self.program.append(("constant", float(token)))
+        elif self._take("("):
+            self._call(token)
+        elif token == "pi":
+            self.program.append(("constant", math.pi))
+        elif token in FUNCTIONS:
+            raise ExpressionError(f"the function {token!r} needs its argument in parentheses")
+        else:
+            self.program.append(("name", token))
+
+    def _call(self, name: str) -> None:
+        if name not in FUNCTIONS:
+            known = ", ".join(sorted(FUNCTIONS))
+            raise ExpressionError(f"unknown function {name!r}; the functions are {known}")
+        self._operand_chain(0)
+        count = 1
+        while self._take(","):
+            self._operand_chain(0)
+            count += 1
+            if name in ("min", "max"):
+                self.program.append(("call", name))
+        self._close()
+        if name in ("min", "max"):
+            if count == 1:
+                raise ExpressionError(f"{name} compares two numbers or more")
+            return
+        if count != _count(name):
+            raise ExpressionError(f"{name} takes {_count(name)} number{'s' * (_count(name) > 1)}, not {count}")
+        self.program.append(("call", name))
+
+    def _close(self) -> None:
+        if not self._take(")"):
+            kind, _ = self._peek()
+            if kind == "end":
+                raise ExpressionError(f"a parenthesis is not closed in the expression {_short(self.text)!r}")
+            raise self._unexpected()
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,8 @@
+"""The study file: reading, validation, and the mechanism and questions it describes."""
+
+from mechdesign.study.loading import Study, load
+from mechdesign.study.poses import PoseGroup, Poses
+from mechdesign.study.templates import template, template_path, templates
+from mechdesign.study.units import Units
+
+__all__ = ["PoseGroup", "Poses", "Study", "Units", "load", "template", "template_path", "templates"]

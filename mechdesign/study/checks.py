@@ -1,0 +1,321 @@
+"""Checks of the questions against the mechanism: names, kinds of quantities, what belongs together."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from mechdesign.errors import MechanismError, StudyError
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.model import Quantity
+from mechdesign.study import poses
+from mechdesign.study.document import Path
+from mechdesign.study.names import Names
+from mechdesign.study.numbers import suggestion
+from mechdesign.study.parameters import Parameters
+from mechdesign.study.reporter import Reporter
+from mechdesign.study.sections import (
+    COMMANDS,
+    Condition,
+    Dimension,
+    KinematicsSection,
+    OptimizeSection,
+    PoseSection,
+    ReliabilitySection,
+    StiffnessSection,
+    WorkspaceSection,
+)
+from mechdesign.study.units import KINDS, QUANTITY, QuantityError, describe, measure
+
+INDICES = ("GII", "GRI", "SUI", "area", "box_area")
+_RATE_KINDS: dict[Quantity, str] = {"length": "velocity", "angle": "angular_velocity"}
+_ACCELERATION_KINDS: dict[Quantity, str] = {"length": "acceleration", "angle": "angular_acceleration"}
+_STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
+
+
+def check(parts: Mapping[str, Any], names: Names, parameters: Parameters, reporter: Reporter) -> dict[str, Any]:
+    """Check all questions that validated; returns them with wildcards and defaults filled in."""
+    checker = _Checker(names, parameters, reporter)
+    found = dict(parts)
+    for command in COMMANDS:
+        section = parts.get(command)
+        if isinstance(section, PoseSection):
+            checker.pose_coordinates(command, section)
+        if isinstance(section, KinematicsSection | ReliabilitySection):
+            checker.motion(command, section)
+        if isinstance(section, KinematicsSection):
+            checker.loads(section)
+        elif isinstance(section, WorkspaceSection):
+            checker.workspace(section)
+        elif isinstance(section, OptimizeSection):
+            checker.optimize(section)
+        elif isinstance(section, ReliabilitySection):
+            found[command] = checker.reliability(section)
+        elif isinstance(section, StiffnessSection):
+            found[command] = checker.stiffness(section)
+    checker.conditions(("requirements",), parts["requirements"])
+    return found
+
+
+def check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path) -> None:
+    """Check that the coordinates that poses give determine the mechanism, and that they are not too many."""
+    for command in COMMANDS:
+        section = parts.get(command)
+        if not isinstance(section, PoseSection):
+            continue
+        key = next((key for key in ("poses", "sweep", "path") if getattr(section, key) is not None), None)
+        if key is None:
+            continue
+        try:
+            found = poses.expand(section, folder)
+        except StudyError as error:
+            reporter.report((command, key), str(error))
+            continue
+        for group in found.groups if found is not None else ():
+            try:
+                mechanism.plan(group.names)
+            except MechanismError as error:
+                place: Path = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
+                reporter.report(place, str(error))
+
+
+class _Checker:
+    def __init__(self, names: Names, parameters: Parameters, reporter: Reporter) -> None:
+        self.names = names
+        self.parameters = parameters
+        self.reporter = reporter
+
+    def known(self, name: str, known: Iterable[str], what: str, path: Path, *, at_key: bool = False) -> bool:
+        candidates = list(known)
+        if name in candidates:
+            return True
+        hint = suggestion(name, candidates) or (f"; there are {', '.join(candidates[:12])}" if candidates else "")
+        self.reporter.report(path, f"there is no {what} {name!r}{hint}", at_key=at_key)
+        return False
+
+    def kind(self, path: Path, kind: str) -> None:
+        """Note a quantity whose unit does not fit what its key needs."""
+        raw = self.reporter.raw(path)
+        if not isinstance(raw, str) or not QUANTITY.fullmatch(raw):
+            return
+        try:
+            powers = measure(raw)[1]
+        except QuantityError:
+            return
+        if powers != KINDS[kind] and not (kind == "rotational_stiffness" and powers == KINDS["moment"]):
+            self.reporter.report(path, f"{raw!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected")
+
+    def coordinate(self, name: str, path: Path, *, at_key: bool = False) -> Quantity | None:
+        """Kind of a coordinate; None, and noted, where there is none of that name."""
+        quantity = self.names.coordinates.get(name)
+        if quantity is None:
+            if name in self.names.owners:
+                self.reporter.report(
+                    path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key
+                )
+            elif name in self.names.moving:
+                self.reporter.report(path, f"{name!r} is a link; its coordinate is {name}.angle", at_key=at_key)
+            else:
+                self.known(name, self.names.coordinates, "coordinate", path, at_key=at_key)
+        return quantity
+
+    def pose_coordinates(self, command: str, section: PoseSection) -> None:
+        for index, pose in enumerate(section.poses or ()):
+            self._given(pose, (command, "poses", index))
+        for name in section.sweep or ():
+            path: Path = (command, "sweep", name)
+            quantity = self.coordinate(name, path, at_key=True)
+            for key in ("from", "to", "step"):
+                if quantity in ("length", "angle"):
+                    self.kind((*path, key), quantity)
+        for name in section.path or ():
+            if name not in self.names.owners:
+                self.coordinate(name, (command, "path", name), at_key=True)
+
+    def _given(self, values: Iterable[str], path: Path, kinds: Mapping[Quantity, str] | None = None) -> None:
+        for name in values:
+            quantity = self.coordinate(name, (*path, name), at_key=True)
+            kind = quantity if kinds is None or quantity is None else kinds.get(quantity)
+            if kind is not None and kind != "none":
+                self.kind((*path, name), kind)
+
+    def motion(self, command: str, section: KinematicsSection | ReliabilitySection) -> None:
+        self._given(section.rates, (command, "rates"), _RATE_KINDS)
+        self._given(section.accelerations, (command, "accelerations"), _ACCELERATION_KINDS)
+        for index, name in enumerate(section.outputs or ()):
+            if name not in self.names.owners:
+                self.coordinate(name, (command, "outputs", index))
+
+    def loads(self, section: KinematicsSection) -> None:
+        for index, load in enumerate(section.loads):
+            path: Path = ("kinematics", "loads", index)
+            if load.at is not None:
+                self.known(load.at, self.names.owners, "point", (*path, "at"))
+            if load.link is not None:
+                self.known(load.link, self.names.moving, "moving link", (*path, "link"))
+
+    def workspace(self, section: WorkspaceSection) -> None:
+        self.known(section.point, self.names.owners, "point", ("workspace", "point"))
+        for name, values in section.at.items():
+            path: Path = ("workspace", "at", name)
+            quantity = self.coordinate(name, path, at_key=True)
+            if not values:
+                self.reporter.report(path, "an empty list of values")
+            for index in range(len(values)):
+                if quantity in ("length", "angle"):
+                    self.kind((*path, index), quantity)
+        scan = section.scan
+        if (scan.from_ is None) != (scan.to is None):
+            self.reporter.report(("workspace", "scan"), "'from' and 'to' belong together")
+        elif scan.from_ is not None and scan.to is not None and scan.to <= scan.from_:
+            self.reporter.report(("workspace", "scan", "to"), f"{scan.to:g} is not beyond 'from', {scan.from_:g}")
+
+    def optimize(self, section: OptimizeSection) -> None:
+        root: Path = ("optimize",)
+        if not section.variables:
+            self.reporter.report((*root, "variables"), "an optimisation needs at least one variable")
+        if not section.maximize and not section.minimize:
+            self.reporter.report(root, "say what to 'maximize' or 'minimize'", at_key=True)
+        above = [name for name in self.parameters.nominal if name not in section.variables]
+        for name, variable in section.variables.items():
+            path: Path = (*root, "variables", name)
+            self.known(name, self.parameters.known(), "parameter or dimension", path, at_key=True)
+            if name in self.parameters.formulas:
+                message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
+                self.reporter.report(path, message, at_key=True)
+            for key, bound in (("from", variable.from_), ("to", variable.to)):
+                for unknown in sorted(bound.names - set(above)):
+                    below = " above it" if unknown in section.variables else ""
+                    message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
+                    self.reporter.report((*path, key), message)
+            if name in self.parameters.factors:
+                quantity: Quantity = "angle" if self._is_angle(name) else "length"
+                for key in ("from", "to", "step"):
+                    self.kind((*path, key), quantity)
+            above.append(name)
+        for key, goals in (("maximize", section.maximize), ("minimize", section.minimize)):
+            for index, goal in enumerate(goals):
+                self._result(goal, (*root, key, index))
+        self.conditions((*root, "subject_to"), section.subject_to)
+
+    def _is_angle(self, place: str) -> bool:
+        owner, _, last = place.rpartition(".")
+        if owner.startswith("limits."):
+            index = int(owner.split(".")[1])
+            limit = self.names.section.limits[index]
+            if limit.drive is not None:
+                return self.names.drives.get(limit.drive) == "angle"
+            return limit.angle is not None or self.names.measures.get(limit.measure or "") == "angle"
+        return last in ("direction", "angle")
+
+    def conditions(self, path: Path, conditions: Iterable[Condition]) -> None:
+        """Check the results that conditions name."""
+        for index, condition in enumerate(conditions):
+            self._result(condition.result, (*path, index, "result"), dotted=path[0] == "requirements")
+
+    def _result(self, name: str, path: Path, *, dotted: bool = False) -> None:
+        command, _, rest = name.partition(".")
+        if not rest:
+            if dotted or name not in INDICES:
+                hint = suggestion(name, INDICES) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+                self.reporter.report(path, f"there is no result {name!r}{hint}")
+        else:
+            self.known(command, COMMANDS, "command", path)
+
+    def reliability(self, section: ReliabilitySection) -> ReliabilitySection:
+        dimensions = self._dimensions(section)
+        clearances = {}
+        for point, clearance in section.clearances.items():
+            path: Path = ("reliability", "clearances", point)
+            if not self.known(point, self.names.owners, "point", path, at_key=True):
+                continue
+            links = self.names.owners[point]
+            held = [*links, *(j.slot for j in self.names.section.joints.values() if j.slot and j.point == point)]
+            if len(held) < 2:
+                self.reporter.report(
+                    path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True
+                )
+            link = clearance.link or links[-1]
+            if link not in links:
+                self.known(link, links, f"link at point {point!r} named", (*path, "link"))
+            elif clearance.effect == "length":
+                binary = self.names.section.links[link]
+                if point not in (binary.from_, binary.to) or binary.telescopic:
+                    message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
+                    self.reporter.report((*path, "effect"), message)
+            clearances[point] = clearance.model_copy(update={"link": link})
+        for name, limit in section.limits.items():
+            path = ("reliability", "limits", name)
+            if limit.radius is not None:
+                self.known(name, self.names.owners, "point", path, at_key=True)
+            elif name in self.names.owners:
+                self.reporter.report(
+                    path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True
+                )
+            else:
+                quantity = self.coordinate(name, path, at_key=True)
+                for key in ("min", "max"):
+                    if quantity in ("length", "angle"):
+                        self.kind((*path, key), quantity)
+        return section.model_copy(update={"dimensions": dimensions, "clearances": clearances})
+
+    def _dimensions(self, section: ReliabilitySection) -> dict[str, Dimension]:
+        """Dimensions with wildcards expanded; a dimension that is named itself wins over a wildcard."""
+        found: dict[str, Dimension] = {}
+        for name, dimension in section.dimensions.items():
+            path: Path = ("reliability", "dimensions", name)
+            if "*" in name or "?" in name:
+                matching = self.parameters.match(name)
+                if not matching:
+                    self.reporter.report(path, f"no dimension matches {name!r}", at_key=True)
+                for place in matching:
+                    self._dimension_kind(place, path)
+                    if place not in section.dimensions:
+                        found[place] = dimension
+                continue
+            if name in self.parameters.formulas:
+                message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
+                self.reporter.report(path, message, at_key=True)
+            known = [*self.parameters.known(), *self.names.drives]
+            if self.known(name, known, "parameter, dimension or drive", path, at_key=True):
+                self._dimension_kind(name, path)
+                found[name] = dimension
+        return found
+
+    def _dimension_kind(self, name: str, path: Path) -> None:
+        if name in self.parameters.nominal:
+            return
+        if name in self.parameters.factors:
+            kind: Quantity = "angle" if self._is_angle(name) else "length"
+        else:
+            kind = self.names.drives[name]
+        for key in ("tolerance", "sigma"):
+            self.kind((*path, key), kind)
+
+    def stiffness(self, section: StiffnessSection) -> StiffnessSection:
+        root: Path = ("stiffness",)
+        if self.known(section.at, self.names.owners, "point", (*root, "at")) and section.link is not None:
+            points = self.names.points_of(section.link)
+            if self.known(section.link, self.names.moving, "moving link", (*root, "link")) and section.at not in points:
+                self.known(section.at, points, f"point of link {section.link!r} named", (*root, "at"))
+        for link, profile in section.elastic.items():
+            path: Path = (*root, "elastic", link)
+            self.known(link, self.names.moving, "moving link", path, at_key=True)
+            self.known(profile, section.sections, "section", path)
+        for drive in section.actuators:
+            path = (*root, "actuators", drive)
+            if self.known(drive, self.names.drives, "drive", path, at_key=True):
+                self.kind(path, _STIFFNESS_KINDS[self.names.drives[drive]])
+        loads = []
+        for index, load in enumerate(section.loads):
+            path = (*root, "loads", index)
+            if len(load) not in ((3,) if section.link is not None else (2, 3)):
+                self.reporter.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
+                continue
+            for place, kind in enumerate(("force", "force", "moment")[: len(load)]):
+                self.kind((*path, place), kind)
+            if section.link is None and len(load) == 3 and load[2] != 0.0:
+                self.reporter.report((*path, 2), "a pin carries no moment; name the 'link' that is loaded")
+            loads.append((*load, 0.0)[:3])
+        return section.model_copy(update={"loads": tuple(loads)})

@@ -1,0 +1,258 @@
+"""YAML text as plain data with the line and column of every key and value.
+
+The reader is built on libyaml's events, so that it can stop early: nesting, aliases and the expanded size are bounded
+before anything is built. Scalars follow YAML 1.2: ``1e-3`` is a number, ``on`` and ``no`` are words.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+from mechdesign.errors import Problem, StudyError
+
+Path = tuple[str | int, ...]
+
+MAX_DEPTH = 40
+MAX_NODES = 200_000
+MAX_BYTES = 50_000_000
+MAX_ALIASES = 1000
+
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_INTEGER = re.compile(r"[-+]?[0-9]+")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
+_WORDS = {"": None, "~": None, "null": None, "Null": None, "NULL": None}
+_WORDS_BOOLEAN = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place in a text, counted from 1; line 0 where there is no text (an override)."""
+
+    file: str
+    line: int = 0
+    column: int = 0
+
+    def problem(self, message: str, key: str = "") -> Problem:
+        """Build a problem that stands here."""
+        return Problem(message, key, self.file, self.line, self.column)
+
+
+@dataclass
+class Document:
+    """Plain data (dict, list, str, int, float, bool, None) and where each part of it stands.
+
+    Parameters
+    ----------
+    keys, values : mapping of path to Mark
+        Where a mapping's key, and a value, stands; a path is the sequence of keys and indices from the root.
+    problems : list of Problem
+        Mistakes of writing that leave the rest readable: duplicate keys, expressions split at a comma.
+    spoiled : set of paths
+        Parts in which such a mistake was found, where further complaints would only repeat it.
+    """
+
+    name: str
+    data: Any
+    keys: dict[Path, Mark] = field(default_factory=dict)
+    values: dict[Path, Mark] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    spoiled: set[Path] = field(default_factory=set)
+
+
+def dotted(path: Sequence[str | int]) -> str:
+    """Write a path as the user would: ``mechanism.links.crank.length``."""
+    return ".".join(str(segment) for segment in path)
+
+
+def read(content: bytes, name: str) -> Document:
+    """Read a YAML document.
+
+    Raises
+    ------
+    StudyError
+        Where the bytes are not one YAML document of plain data and reasonable size.
+    """
+    if len(content) > MAX_BYTES:
+        raise StudyError([Mark(name).problem(f"is larger than {MAX_BYTES // 1_000_000} MB: not a study file")])
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise StudyError([Mark(name).problem("is not a text file in UTF-8: not a study file")]) from None
+    try:
+        return _Builder(name).build(text)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        here = Mark(name, mark.line + 1, mark.column + 1) if mark else Mark(name)
+        parts = [str(part) for part in (error.context, error.problem) if part]
+        raise StudyError([here.problem(f"is not YAML: {', '.join(parts)}{_hint(parts)}")]) from None
+    except yaml.YAMLError as error:
+        first = str(getattr(error, "reason", error)).splitlines()[0]
+        raise StudyError([Mark(name).problem(f"is not a text in YAML: {first}")]) from None
+
+
+def _hint(parts: Sequence[str]) -> str:
+    text = " ".join(parts)
+    if "cannot start any token" in text:
+        return " (indent with spaces, not tabs; put special characters in quotes)"
+    if "mapping values are not allowed" in text:
+        return " (a ':' too many on the line, or wrong indentation)"
+    return ""
+
+
+@dataclass
+class _Node:
+    """One node of the YAML tree; aliases share nodes until they are expanded."""
+
+    mark: Mark
+    scalar: str | None = None
+    plain: bool = False
+    in_flow: bool = False
+    items: list[_Node] | None = None
+    pairs: list[tuple[_Node, _Node]] | None = None
+
+
+class _Builder:
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.anchors: dict[str, _Node] = {}
+        self.aliases = 0
+        self.nodes = 0
+        self.document = Document(name, None)
+
+    def build(self, text: str) -> Document:
+        loader = _Loader(text)
+        try:
+            events = self._events(loader)
+            next(events)
+            if isinstance(next(events), yaml.StreamEndEvent):
+                raise StudyError(
+                    [Mark(self.name).problem("is empty: nothing to study (`mechdesign new` prints a start)")]
+                )
+            root = self._node(next(events), events, 0, False)
+            next(events)
+            extra = next(events)
+            if not isinstance(extra, yaml.StreamEndEvent):
+                raise StudyError([self._mark(extra).problem("a second YAML document; a study file holds one")])
+        finally:
+            loader.dispose()
+        self.document.data = self._expand(root, (), 0)
+        return self.document
+
+    @staticmethod
+    def _events(loader: Any) -> Iterator[Any]:
+        while loader.check_event():
+            yield loader.get_event()
+
+    def _mark(self, event: Any) -> Mark:
+        return Mark(self.name, event.start_mark.line + 1, event.start_mark.column + 1)
+
+    def _node(self, event: Any, events: Iterator[Any], depth: int, in_flow: bool) -> _Node:
+        mark = self._mark(event)
+        if depth > MAX_DEPTH:
+            raise StudyError([mark.problem(f"nested deeper than {MAX_DEPTH} levels")])
+        if isinstance(event, yaml.AliasEvent):
+            self.aliases += 1
+            if self.aliases > MAX_ALIASES or event.anchor not in self.anchors:
+                what = f"undefined alias *{event.anchor}" if self.aliases <= MAX_ALIASES else "too many aliases"
+                raise StudyError([mark.problem(f"{what}; quote a word that begins with '*', as in \"*.length\"")])
+            return self.anchors[event.anchor]
+        if event.tag is not None and event.tag != "!":
+            raise StudyError([mark.problem(f"the YAML tag {event.tag!r} has no place in a study; write plain values")])
+        node = _Node(mark, in_flow=in_flow)
+        if isinstance(event, yaml.ScalarEvent):
+            node.scalar, node.plain = event.value, event.style in (None, "")
+        else:
+            inside = in_flow or bool(event.flow_style)
+            children: list[_Node] = []
+            while not isinstance(child := next(events), yaml.CollectionEndEvent):
+                children.append(self._node(child, events, depth + 1, inside))
+            if isinstance(event, yaml.SequenceStartEvent):
+                node.items = children
+            else:
+                node.pairs = list(zip(children[::2], children[1::2], strict=True))
+        if event.anchor is not None:
+            self.anchors[event.anchor] = node
+        return node
+
+    def _expand(self, node: _Node, path: Path, depth: int) -> Any:
+        self.nodes += 1
+        if self.nodes > MAX_NODES:
+            raise StudyError([node.mark.problem(f"more than {MAX_NODES} values once its aliases are expanded")])
+        self.document.values[path] = node.mark
+        if node.items is not None:
+            self._check_split(node.items, path)
+            return [self._expand(item, (*path, index), depth + 1) for index, item in enumerate(node.items)]
+        if node.pairs is not None:
+            self._check_split([scalar for pair in node.pairs for scalar in pair], path)
+            return self._expand_mapping(node.pairs, path, depth)
+        return self._scalar(node, path)
+
+    def _expand_mapping(self, pairs: list[tuple[_Node, _Node]], path: Path, depth: int) -> dict[str, Any]:
+        mapping: dict[str, Any] = {}
+        for key_node, value_node in pairs:
+            if key_node.scalar is None:
+                self.document.problems.append(key_node.mark.problem("a key must be a word", dotted(path)))
+                continue
+            here: Path = (*path, key_node.scalar)
+            if key_node.scalar in mapping:
+                first = self.document.keys[here]
+                message = f"duplicate key; {key_node.scalar!r} is given in line {first.line} already"
+                self.document.problems.append(key_node.mark.problem(message, dotted(here)))
+                continue
+            self.document.keys[here] = key_node.mark
+            mapping[key_node.scalar] = self._expand(value_node, here, depth + 1)
+        return mapping
+
+    def _check_split(self, nodes: list[_Node], path: Path) -> None:
+        """Find ``{to: min(a, b)}``, which YAML splits at the comma into two entries."""
+        if path in self.document.spoiled:
+            return
+        for node in nodes:
+            text = node.scalar
+            if text is None or not (node.plain and node.in_flow) or text.count("(") == text.count(")"):
+                continue
+            message = (
+                f"{text!r} is cut off: inside braces and brackets a comma ends a value; put the expression in quotes"
+            )
+            self.document.problems.append(node.mark.problem(f'{message}, as in "min(a, b)"', dotted(path)))
+            self.document.spoiled.add(path)
+            return
+
+    def _scalar(self, node: _Node, path: Path) -> Any:
+        text = node.scalar or ""
+        if not node.plain:
+            return text
+        if text in _WORDS:
+            return None
+        if text in _WORDS_BOOLEAN:
+            return _WORDS_BOOLEAN[text]
+        if _INTEGER.fullmatch(text) and len(text) < 300:
+            return int(text)
+        if _FLOAT.fullmatch(text):
+            return float(text)
+        if _NOT_FINITE.fullmatch(text):
+            return (
+                math.nan
+                if "n" in text.lower().replace("inf", "")
+                else math.copysign(math.inf, -1 if text[0] == "-" else 1)
+            )
+        return text
+
+
+def parse_value(text: str, name: str) -> Document:
+    """Read the value of an override, which may be empty."""
+    return read(text.encode(), name) if text.strip() else Document(name, None)
+
+
+def plain(data: Any) -> Any:
+    """Copy data down to its plain leaves, so that nothing shares a list or a mapping with it."""
+    if isinstance(data, Mapping):
+        return {key: plain(value) for key, value in data.items()}
+    return [plain(item) for item in data] if isinstance(data, list) else data

@@ -1,0 +1,142 @@
+"""Joints that are not revolutes: their names checked, their defaults filled in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from mechdesign.mechanism.model import Fixed, Line, Prismatic, Slot
+from mechdesign.mechanism.model import Joint as JointModel
+from mechdesign.study import models
+from mechdesign.study.document import Path
+from mechdesign.study.numbers import suggestion
+
+if TYPE_CHECKING:
+    from mechdesign.study.build import Builder
+
+
+def build(builder: Builder) -> dict[str, JointModel]:
+    """Build every joint of the section whose names are right."""
+    joints: dict[str, JointModel] = {}
+    for name, section in builder.section.joints.items():
+        joint: JointModel | None = None
+        if section.prismatic is not None:
+            joint = _prismatic(builder, name, section, *section.prismatic)
+        elif section.slot is not None:
+            joint = _slot(builder, name, section, section.slot)
+        elif section.fixed is not None:
+            joint = _fixed(builder, name, section, section.fixed)
+        if joint is not None:
+            joints[name] = joint
+    return joints
+
+
+def _pair(builder: Builder, path: Path, pair: tuple[str, str]) -> bool:
+    known = [builder.check_name(link, builder.section.links, "link", (*path, k)) for k, link in enumerate(pair)]
+    if all(known) and pair[0] == pair[1]:
+        builder.report(path, f"a joint of link {pair[0]!r} with itself")
+        return False
+    return all(known)
+
+
+def _on_link(builder: Builder, link: str, point: str, path: Path) -> bool:
+    points = builder.names.points_of(link)
+    if point in points:
+        return True
+    hint = suggestion(point, points) or f"; it has {', '.join(points)}"
+    builder.report(path, f"link {link!r} has no point {point!r}{hint}")
+    return False
+
+
+def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line | None:
+    path: Path = ("joints", name)
+    through = section.through or ()
+    if not all(_on_link(builder, link, point, (*path, "through", k)) for k, point in enumerate(through)):
+        return None
+    if len(through) == 2:
+        if through[0] == through[1]:
+            builder.report((*path, "through"), f"a line through {through[0]!r} twice has no direction")
+            return None
+        return Line(link, through[0], 0.0, through[1])
+    direction = builder.place(f"{name}.direction", section.direction or 0.0, "angle")
+    return Line(link, through[0] if through else None, direction)
+
+
+def _prismatic(builder: Builder, name: str, section: models.Joint, guide: str, slider: str) -> Prismatic | None:
+    path: Path = ("joints", name)
+    if not _pair(builder, (*path, "prismatic"), (guide, slider)):
+        return None
+    point = section.point
+    if point is None:
+        points = builder.names.points_of(slider)
+        if len(points) != 1:
+            builder.report(path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
+            return None
+        point = points[0]
+    elif not _on_link(builder, slider, point, (*path, "point")):
+        return None
+    line = _line(builder, name, section, guide)
+    if line is None:
+        return None
+    return Prismatic(name, line, slider, point, builder.place(f"{name}.angle", section.angle or 0.0, "angle"))
+
+
+def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slot | None:
+    path: Path = ("joints", name)
+    if not builder.check_name(guide, builder.section.links, "link", (*path, "slot")):
+        return None
+    if section.point is None:
+        builder.report(path, "a slot needs the 'point' of another link that slides in it")
+        return None
+    if not builder.check_name(section.point, builder.names.owners, "point", (*path, "point")):
+        return None
+    if builder.names.owners[section.point] == [guide]:
+        builder.report((*path, "point"), f"point {section.point!r} is on link {guide!r} itself, which has the slot")
+        return None
+    line = _line(builder, name, section, guide)
+    return None if line is None else Slot(name, line, section.point)
+
+
+def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed | None:
+    path: Path = ("joints", name)
+    if not _pair(builder, (*path, "fixed"), pair):
+        return None
+    shared = [point for point in builder.names.points_of(pair[0]) if point in builder.names.points_of(pair[1])]
+    point = section.point
+    if point is None:
+        if len(shared) != 1:
+            builder.report(path, f"links {pair[0]!r} and {pair[1]!r} share {len(shared)} points: say which, as 'point'")
+            return None
+        point = shared[0]
+    elif not all(_on_link(builder, link, point, (*path, "point")) for link in pair):
+        return None
+    if section.angle is not None:
+        return Fixed(name, pair, point, builder.place(f"{name}.angle", section.angle, "angle"))
+    directions = [builder.link_direction(link) for link in pair]
+    if directions[0] is None or directions[1] is None:
+        lost = pair[0] if directions[0] is None else pair[1]
+        message = f"its angle is left out and so measured from the sketch, which does not show how link {lost!r} lies"
+        builder.report(path, message)
+        return None
+    angle = (directions[1] - directions[0]) / builder.units.angle_factor
+    return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle"))
+
+
+def check_connected(builder: Builder, joints: Mapping[str, JointModel]) -> None:
+    """Note links that hang on nothing: no point shared with another link, and no joint."""
+    jointed: set[str] = set()
+    for section in builder.section.joints.values():
+        jointed.update(section.prismatic or (), section.fixed or (), (section.slot,) if section.slot else ())
+        if section.slot and section.point:
+            jointed.update(builder.names.owners.get(section.point, ()))
+    for name in builder.section.links:
+        points = builder.names.points_of(name)
+        if (
+            name in jointed
+            or any(len(builder.names.owners[point]) > 1 for point in points)
+            or len(builder.section.links) == 1
+        ):
+            continue
+        others = [point for point, links in builder.names.owners.items() if links != [name]]
+        hint = next((text for text in (suggestion(point, others) for point in points) if text), "")
+        builder.report(("links", name), f"no other link shares a point of it ({', '.join(points)}){hint}", at_key=True)

@@ -1,0 +1,265 @@
+"""`load`: from a study file to a validated `Study`."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import pathlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import PydanticCustomError
+
+from mechdesign.errors import MechanismError, Problem, StudyError
+from mechdesign.expressions import Expression
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.model import Description
+from mechdesign.study import checks, overrides, poses
+from mechdesign.study.build import Builder
+from mechdesign.study.document import Document, plain, read
+from mechdesign.study.models import MechanismSection, UnitsSection
+from mechdesign.study.numbers import Context, check_parameter_name, read_number, shown, suggestion
+from mechdesign.study.parameters import Parameters
+from mechdesign.study.reporter import Reporter
+from mechdesign.study.sections import (
+    COMMANDS,
+    KinematicsSection,
+    OptimizeSection,
+    PoseSection,
+    ReliabilitySection,
+    Requirement,
+    StiffnessSection,
+    StudyFile,
+    WorkspaceSection,
+)
+from mechdesign.study.units import Units, units_from
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A validated study.
+
+    Parameters
+    ----------
+    name : str
+        Its name, by default that of its file.
+    path : Path or None
+        Its file.
+    text_sha256 : str
+        SHA-256 of the file as it was read.
+    seed : int
+        Seed of random numbers.
+    overrides : tuple of str
+        As given to `load`.
+    units : Units
+        What bare numbers mean.
+    resolved : dict
+        The study as plain data, overrides applied.
+    mechanism : Mechanism
+        The compiled mechanism.
+    parameters : Parameters
+        Parameters and the places of the geometry that depend on them.
+    kinematics, workspace, optimize, reliability, stiffness : section or None
+        The questions; None where the study does not ask.
+    requirements : tuple of Requirement
+        The gate.
+    """
+
+    name: str
+    path: pathlib.Path | None
+    text_sha256: str
+    seed: int
+    overrides: tuple[str, ...]
+    units: Units
+    resolved: dict[str, Any]
+    mechanism: Mechanism
+    parameters: Parameters
+    kinematics: KinematicsSection | None
+    workspace: WorkspaceSection | None
+    optimize: OptimizeSection | None
+    reliability: ReliabilitySection | None
+    stiffness: StiffnessSection | None
+    requirements: tuple[Requirement, ...]
+
+    @cached_property
+    def questions(self) -> tuple[str, ...]:
+        """Commands that the study has a section for."""
+        return tuple(command for command in COMMANDS if getattr(self, command) is not None)
+
+    def poses(self, section: str) -> poses.Poses:
+        """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
+
+        A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.
+
+        Raises
+        ------
+        StudyError
+            Where nothing sensible can be assumed.
+        """
+        for name in dict.fromkeys((section, "kinematics")):
+            asked: PoseSection | None = getattr(self, name)
+            if asked is not None:
+                folder = self.path.parent if self.path else pathlib.Path()
+                found = poses.expand(asked, folder)
+                if found is not None:
+                    return found
+        return poses.default(self.mechanism.description, 2.0 * math.pi / self.units.angle_factor)
+
+
+def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:
+    """Load a study.
+
+    Parameters
+    ----------
+    path : str or Path
+        The study file.
+    overrides : sequence of str
+        ``a.b.c=value``, applied before validation.
+    seed : int, optional
+        In place of the study's own.
+
+    Raises
+    ------
+    StudyError
+        With every mistake found, each as ``file:line:column: key path: what, and what would mend it``.
+    """
+    file = pathlib.Path(path)
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise StudyError([Problem(f"cannot be read: {error.strerror or error}", file=str(path))]) from None
+    return load_bytes(content, file, overrides, seed)
+
+
+def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), seed: int | None = None) -> Study:
+    """Load a study from the bytes of a file; see `load`."""
+    if seed is not None and seed < 0:
+        raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
+    document = read(content, str(path))
+    if isinstance(changes, str):
+        changes = (changes,)
+    overrides.apply(document, changes)
+    reporter = Reporter(document)
+    data = _sections(document, reporter)
+    context, formulas = _context(data, reporter)
+    parts = _validated(data, context, reporter)
+    section: MechanismSection | None = parts.get("mechanism")
+    if section is None:
+        reporter.done()
+    assert section is not None
+    builder = Builder(section, context.units, context.parameters, reporter)
+    description = builder.build()
+    parameters = builder.parameters(context.parameters, formulas)
+    parts = checks.check(parts, builder.names, parameters, reporter)
+    reporter.done()
+    mechanism = _compiled(description, reporter)
+    checks.check_poses(parts, mechanism, reporter, path.parent)
+    reporter.done()
+    name = parts.get("name") or path.stem
+    seed = parts["seed"] if seed is None else seed
+    units = context.units
+    resolved = plain(document.data) | {
+        "name": name,
+        "seed": seed,
+        "units": {"length": units.length, "angle": units.angle, "time": units.time, "force": units.force},
+    }
+    return Study(
+        name=name,
+        path=path,
+        text_sha256=hashlib.sha256(content).hexdigest(),
+        seed=seed,
+        overrides=tuple(changes),
+        units=units,
+        resolved=resolved,
+        mechanism=mechanism,
+        parameters=parameters,
+        kinematics=parts.get("kinematics"),
+        workspace=parts.get("workspace"),
+        optimize=parts.get("optimize"),
+        reliability=parts.get("reliability"),
+        stiffness=parts.get("stiffness"),
+        requirements=parts["requirements"],
+    )
+
+
+def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
+    """The study's top level with sections that are named but empty as empty mappings."""
+    data = document.data
+    if not isinstance(data, dict):
+        message = "is not a study: a mapping with 'mechanism' is expected, not " + shown(data)
+        raise StudyError([document.values[()].problem(message)])
+    return {key: {} if value is None and key in COMMANDS else value for key, value in data.items()}
+
+
+def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
+    """Units and parameters, which all other numbers are read with."""
+    units = Units()
+    try:
+        given = UnitsSection.model_validate(data.get("units") or {})
+    except ValidationError:
+        given = UnitsSection()
+    units, wrong = units_from(given.length, given.angle, given.time, given.force)
+    for kind, message in wrong.items():
+        reporter.report(("units", kind), message)
+    mechanism = data.get("mechanism")
+    raw = mechanism.get("parameters") if isinstance(mechanism, dict) else None
+    raw = raw if isinstance(raw, dict) else {}
+    nominal: dict[str, float] = {}
+    formulas: dict[str, Expression] = {}
+    for name, value in raw.items():
+        path = ("mechanism", "parameters", name)
+        if wrong_name := check_parameter_name(name):
+            reporter.report(path, wrong_name, at_key=True)
+        try:
+            number = read_number(value, Context(units, nominal))
+        except PydanticCustomError as error:
+            below = [other for other in raw if other not in nominal and f"name {other!r} " in error.message()]
+            hint = f" ({below[0]!r} is not above it)" if below else ""
+            reporter.report(path, f"{error.message()}{hint}")
+            nominal[name] = math.nan
+            continue
+        nominal[name] = number.nominal
+        if number.expression is not None:
+            formulas[name] = number.expression
+    return Context(units, nominal), formulas
+
+
+def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) -> dict[str, Any]:
+    """Validate part by part, so that a mistake in one does not hide those in another; wrong parts are left out."""
+    parts: dict[str, Any] = {"seed": 0, "requirements": ()}
+    fields = StudyFile.model_fields
+    for key in data:
+        if key not in fields:
+            reporter.report((key,), f"unknown key{suggestion(key, fields)}", at_key=True)
+    for key, field in fields.items():
+        raw = data.get(key)
+        if raw is None:
+            if field.is_required():
+                reporter.report((key,), "is missing: a study describes a mechanism")
+            continue
+        if key == "mechanism" and isinstance(raw, dict):
+            # The parameters have been read already, in their order.
+            raw = {name: value for name, value in raw.items() if name != "parameters" or not isinstance(value, dict)}
+        try:
+            parts[key] = _adapter(key).validate_python(raw, context=context)
+        except ValidationError as error:
+            reporter.report_validation(error, StudyFile, (key,))
+    return parts
+
+
+@cache
+def _adapter(key: str) -> TypeAdapter[Any]:
+    """Validator of one top-level key."""
+    return TypeAdapter(StudyFile.model_fields[key].rebuild_annotation())
+
+
+def _compiled(description: Description, reporter: Reporter) -> Mechanism:
+    try:
+        return Mechanism(description)
+    except MechanismError as error:
+        reporter.report(error.key.split("."), str(error))
+        reporter.done()
+        raise

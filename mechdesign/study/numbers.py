@@ -1,0 +1,297 @@
+"""Types of the study's schema that are not plain: numbers, names, choices.
+
+Each is a pydantic annotation. Its validator gets a `Context` and raises with a message for a designer; its JSON Schema
+says what an editor should accept.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from mechdesign.expressions import RESERVED, Expression, ExpressionError
+from mechdesign.study.units import QUANTITY, Powers, QuantityError, Units, measure
+
+NAME = re.compile(r"[^\W\d]\w*")
+COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
+
+
+@dataclass(frozen=True)
+class Context:
+    """What numbers are read with: the units, and the parameters' nominal values (nan where one is wrong)."""
+
+    units: Units = field(default_factory=Units)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number that keeps where it came from.
+
+    Parameters
+    ----------
+    nominal : float
+        In the study's units.
+    expression : Expression or None
+        Where it depends on parameters.
+    powers : powers or None
+        Kind of quantity, where it was given with a unit.
+    """
+
+    nominal: float
+    expression: Expression | None = None
+    powers: Powers | None = None
+
+
+def failure(message: str) -> PydanticCustomError:
+    """Build the error that a validator raises; the message reaches the user as it is."""
+    return PydanticCustomError("study", "{message}", {"message": message})
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Give ``; did you mean 'x'?`` where a known name resembles this one, or else nothing."""
+    candidates = list(dict.fromkeys(known))
+    folded = {candidate.casefold(): candidate for candidate in candidates}
+    close = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.6)
+    return f"; did you mean {folded[close[0]]!r}?" if close else ""
+
+
+def shown(value: object) -> str:
+    """Write a raw value as the user wrote it, shortened."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list):
+        return "a list"
+    text = repr(value) if isinstance(value, str) else f"the number {value}"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def read_number(raw: object, context: Context, kind: str | None = None) -> Value:
+    """Read a number, a quantity or an expression over parameters.
+
+    Raises
+    ------
+    PydanticCustomError
+        Where it is none of them, not finite, or a quantity of another kind than `kind`.
+    """
+    if isinstance(raw, bool) or not isinstance(raw, int | float | str):
+        raise failure(f"expected a number, not {shown(raw)}")
+    if isinstance(raw, str):
+        return _read_text(raw, context, kind)
+    try:
+        number = float(raw)
+    except OverflowError:
+        raise failure("too large a number") from None
+    if not math.isfinite(number):
+        raise failure(f"expected a finite number, not {number:g}")
+    return Value(number)
+
+
+def _read_text(text: str, context: Context, kind: str | None) -> Value:
+    try:
+        if QUANTITY.fullmatch(text):
+            number = context.units.convert(text, kind)
+            if not math.isfinite(number):
+                raise failure(f"{text!r} is too large a number")
+            return Value(number, None, measure(text)[1])
+        expression = Expression.parse(text, context.units.angle_factor)
+        unknown = sorted(expression.names - set(context.parameters))
+        if unknown:
+            hint = suggestion(unknown[0], context.parameters) or (
+                "; write a quantity as '<number> <unit>'"
+                if not context.parameters
+                else f"; the parameters are {', '.join(context.parameters)}"
+            )
+            raise failure(f"unknown name {unknown[0]!r} in {shown(text)}{hint}")
+        result = expression.evaluate(context.parameters)
+        return Value(float(result), expression if expression.names else None)
+    except (QuantityError, ExpressionError) as error:
+        raise failure(str(error)) from None
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Annotation of a number of the study.
+
+    Parameters
+    ----------
+    kind : str or None
+        Kind of quantity expected, a name of `units.KINDS`; None where it depends on the key.
+    minimum, exclusive : float or None, bool
+        Least value, itself excluded or not.
+    keep : {'', 'value', 'expression'}
+        What becomes of it: a float, a `Value`, or an `Expression` whose names are looked up later.
+    """
+
+    kind: str | None = None
+    minimum: float | None = None
+    exclusive: bool = False
+    keep: Literal["", "value", "expression"] = ""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"type": ["number", "string"], "description": "a number, a quantity or an expression"}
+
+    def _validate(self, raw: Any, info: ValidationInfo) -> float | Value | Expression:
+        context: Context = info.context or Context()
+        if self.keep == "expression":
+            return self._deferred(raw, context)
+        value = read_number(raw, context, self.kind)
+        self._check_minimum(value.nominal)
+        return value if self.keep else value.nominal
+
+    def _deferred(self, raw: Any, context: Context) -> Expression:
+        try:
+            if isinstance(raw, str) and not QUANTITY.fullmatch(raw):
+                return Expression.parse(raw, context.units.angle_factor)
+        except ExpressionError as error:
+            raise failure(str(error)) from None
+        return Expression.parse(repr(read_number(raw, context, self.kind).nominal))
+
+    def _check_minimum(self, number: float) -> None:
+        if self.minimum is None or math.isnan(number):
+            return
+        if number < self.minimum or (self.exclusive and number == self.minimum):
+            what = "positive" if self.minimum == 0 and self.exclusive else f"at least {self.minimum:g}"
+            raise failure(f"must be {what}, not {number:g}")
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Annotation of a whole number not below a minimum (and not above a maximum)."""
+
+    minimum: int = 0
+    maximum: int | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"type": ["integer", "number", "string"], "minimum": self.minimum}
+
+    def _validate(self, raw: Any, info: ValidationInfo) -> int:
+        if isinstance(raw, int) and not isinstance(raw, bool):
+            whole = raw
+        else:
+            number = read_number(raw, info.context or Context(), "none").nominal
+            if math.isnan(number):
+                return self.minimum
+            if number != int(number):
+                raise failure(f"expected a whole number, not {number:g}")
+            whole = int(number)
+        if whole < self.minimum:
+            raise failure(f"must be at least {self.minimum}, not {whole}")
+        if self.maximum is not None and whole > self.maximum:
+            raise failure(f"must be at most {self.maximum}, not {shown(whole)}")
+        return whole
+
+
+@dataclass(frozen=True)
+class NameOf:
+    """Annotation of a name, or (dotted) of a coordinate; `what` is for the message: "a point"."""
+
+    what: str
+    dotted: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"type": "string", "description": f"the name of {self.what}"}
+
+    def _validate(self, raw: Any) -> str:
+        if not isinstance(raw, str):
+            raise failure(f"expected the name of {self.what}, not {shown(raw)}")
+        if not (COORDINATE if self.dotted else NAME).fullmatch(raw):
+            rule = "letters, digits and underscores, with a letter first"
+            raise failure(f"expected the name of {self.what}, not {shown(raw)}; a name is {rule}")
+        return raw
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Annotation of a word out of a list; `later` are words of the format that this version does not do yet."""
+
+    words: tuple[str, ...]
+    later: tuple[str, ...] = ()
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"enum": list(self.words)}
+
+    def _validate(self, raw: Any) -> str:
+        if isinstance(raw, str) and raw in self.words:
+            return raw
+        known = ", ".join(self.words)
+        if isinstance(raw, str) and raw in self.later:
+            raise failure(f"{raw!r} is not available in this version; available: {known}")
+        hint = suggestion(raw, self.words) if isinstance(raw, str) else ""
+        raise failure(f"expected one of {known}, not {shown(raw)}{hint}")
+
+
+class _Unavailable:
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"type": "null", "description": "not available in this version"}
+
+    @staticmethod
+    def _validate(raw: Any) -> None:
+        if raw is not None:
+            raise failure("is not available in this version")
+
+
+def check_parameter_name(name: str) -> str | None:
+    """Say what is wrong with a parameter's name, or None."""
+    if not NAME.fullmatch(name):
+        return "a parameter's name is letters, digits and underscores, with a letter first"
+    return f"{name!r} is a word of the expression language; choose another name" if name in RESERVED else None
+
+
+Unavailable = Annotated[None, _Unavailable()]
+Number = Annotated[float, Reader()]
+Pure = Annotated[float, Reader("none")]
+Positive = Annotated[float, Reader("none", 0.0, True)]
+Length = Annotated[float, Reader("length")]
+PositiveLength = Annotated[float, Reader("length", 0.0, True)]
+NonNegativeLength = Annotated[float, Reader("length", 0.0)]
+NonNegative = Annotated[float, Reader(None, 0.0)]
+PositiveNumber = Annotated[float, Reader(None, 0.0, True)]
+Angle = Annotated[float, Reader("angle")]
+NonNegativeAngle = Annotated[float, Reader("angle", 0.0)]
+Force = Annotated[float, Reader("force")]
+Moment = Annotated[float, Reader("moment")]
+PositiveStress = Annotated[float, Reader("stress", 0.0, True)]
+PositiveArea = Annotated[float, Reader("area", 0.0, True)]
+PositiveInertia = Annotated[float, Reader("inertia", 0.0, True)]
+
+LengthValue = Annotated[Value, Reader("length", keep="value")]
+PositiveLengthValue = Annotated[Value, Reader("length", 0.0, True, keep="value")]
+AngleValue = Annotated[Value, Reader("angle", keep="value")]
+AnyValue = Annotated[Value, Reader(keep="value")]
+Bound = Annotated[Expression, Reader(keep="expression")]
+
+LinkName = Annotated[str, NameOf("a link")]
+PointName = Annotated[str, NameOf("a point")]
+JointName = Annotated[str, NameOf("a joint")]
+DriveName = Annotated[str, NameOf("a drive")]
+MeasureName = Annotated[str, NameOf("a measure")]
+AnyName = Annotated[str, NameOf("a link, leg or joint")]
+CoordinateName = Annotated[str, NameOf("a coordinate, such as C.x or rod.angle,", dotted=True)]

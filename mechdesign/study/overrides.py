@@ -1,0 +1,91 @@
+"""``--set a.b.c=value``: changes to the study's data before it is validated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from mechdesign.errors import Problem, StudyError
+from mechdesign.study.document import Document, Mark, Path, dotted, parse_value
+from mechdesign.study.reporter import LIST_FORM, schema_keys
+from mechdesign.study.sections import StudyFile
+
+
+def apply(document: Document, overrides: Sequence[str]) -> None:
+    """Apply overrides to a document in their order.
+
+    Raises
+    ------
+    StudyError
+        Where one cannot be read or has no place to go.
+    """
+    for text in overrides:
+        _apply(document, text)
+
+
+def _apply(document: Document, text: str) -> None:
+    label = f"--set {text if len(text) <= 60 else text[:57] + '...'}"
+    name, separator, value = text.partition("=")
+    segments = name.strip().split(".")
+    if not separator or not all(segments):
+        raise StudyError([Problem("an override is <dotted name>=<value>", file=label)])
+    parsed = parse_value(value, label)
+    if parsed.problems:
+        raise StudyError(parsed.problems)
+    if not isinstance(document.data, dict):
+        return
+    holder, path = _descend(document, segments, label)
+    key: Any = path[-1]
+    if isinstance(holder, list) and key == len(holder):
+        holder.append(parsed.data)
+    else:
+        holder[key] = parsed.data
+    mark = Mark(label)
+    for known in (document.keys, document.values):
+        for old in [place for place in known if place[: len(path)] == path]:
+            del known[old]
+    document.keys[path] = document.values[path] = mark
+    document.spoiled = {place for place in document.spoiled if place[: len(path)] != path}
+
+
+def _descend(document: Document, segments: list[str], label: str) -> tuple[Any, Path]:
+    """Find the mapping or list to change and the path of the entry; mappings on the way are made as needed."""
+    data: Any = document.data
+    path: list[str | int] = []
+    rest = list(segments)
+    while True:
+        segment, rest = _next_key(data, path, rest, label)
+        path.append(segment)
+        key: Any = segment
+        if not rest:
+            return data, tuple(path)
+        inner = data[key] if isinstance(data, list) or key in data else None
+        if inner is None:
+            inner = {}
+            data[key] = inner
+            document.keys.setdefault(tuple(path), Mark(label))
+            document.values[tuple(path)] = Mark(label)
+        if not isinstance(inner, dict | list):
+            raise StudyError([Problem(f"{dotted(path)} is neither a mapping nor a list", file=label)])
+        data = inner
+
+
+def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> tuple[str | int, list[str]]:
+    if isinstance(data, list):
+        index = LIST_FORM.get(rest[0], int(rest[0]) if rest[0].isdigit() else -1)
+        if not 0 <= index <= len(data) or (index == len(data) and len(rest) > 1):
+            raise StudyError([Problem(f"{dotted(path)} is a list of {len(data)}; it has no {rest[0]!r}", file=label)])
+        return index, rest[1:]
+    # The longest existing key wins.
+    for length in range(len(rest), 0, -1):
+        key = ".".join(rest[:length])
+        if key in data:
+            return key, rest[length:]
+    # A new key that contains dots ends where the schema knows what follows.
+    for length in range(1, len(rest)):
+        key = ".".join(rest[:length])
+        if rest[length] in schema_keys(StudyFile, [*path, key]):
+            return key, rest[length:]
+    if schema_keys(StudyFile, path):
+        return rest[0], rest[1:]
+    return ".".join(rest), []

@@ -1,0 +1,220 @@
+"""Poses at which a question is asked: lists, sweeps, grids and paths as arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.errors import StudyError
+from mechdesign.mechanism.model import Description
+from mechdesign.study.sections import PoseSection, Sweep
+
+MAX_POSES = 10_000_000
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseGroup:
+    """Poses that give the same coordinates.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Coordinates given, as many as the mobility.
+    values : mapping of str to ndarray, shape (n,)
+        In the study's units.
+    rows : ndarray of int, shape (n,)
+        Place of each pose in the study's order.
+    """
+
+    names: tuple[str, ...]
+    values: Mapping[str, Floats]
+    rows: NDArray[np.intp]
+
+    def columns(self) -> list[Floats]:
+        """Values in the order of the names."""
+        return [self.values[name] for name in self.names]
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """All poses of a question.
+
+    Parameters
+    ----------
+    groups : tuple of PoseGroup
+        One, unless listed poses give different coordinates.
+    count : int
+        Number of poses over all groups.
+    listed : bool
+        Whether a person listed these very poses, so that one that fails is an error.
+    grid : tuple of int
+        Number of values along each swept coordinate; the last varies fastest. One number for lists and paths.
+    """
+
+    groups: tuple[PoseGroup, ...]
+    count: int
+    listed: bool
+    grid: tuple[int, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Every coordinate that some pose gives, in the order of the study."""
+        return tuple(dict.fromkeys(name for group in self.groups for name in group.names))
+
+    @property
+    def values(self) -> dict[str, Floats]:
+        """Every coordinate over all poses, shape (count,); nan where a pose does not give it."""
+        columns = {name: np.full(self.count, np.nan) for name in self.names}
+        for group in self.groups:
+            for name in group.names:
+                columns[name][group.rows] = group.values[name]
+        return columns
+
+
+def sweep_values(sweep: Sweep) -> Floats:
+    """Values of a sweep, both ends included: ``from + k step <= to + 1e-9 step``.
+
+    Raises
+    ------
+    StudyError
+        If they are more than `MAX_POSES`.
+    """
+    if sweep.number is not None:
+        return np.linspace(sweep.from_, sweep.to, sweep.number)
+    assert sweep.step is not None
+    steps = (sweep.to - sweep.from_) / sweep.step + 1e-9
+    if not steps < MAX_POSES:
+        raise StudyError(f"a sweep of more than {MAX_POSES} poses")
+    return sweep.from_ + sweep.step * np.arange(math.floor(steps) + 1, dtype=np.float64)
+
+
+def expand(section: PoseSection, folder: Path) -> Poses | None:
+    """Poses of a section, None where it gives none.
+
+    Raises
+    ------
+    StudyError
+        Where there are too many, or a path's file or lengths are wrong.
+    """
+    if section.poses is not None:
+        return _listed(section.poses)
+    if section.sweep is not None:
+        return _grid({name: sweep_values(sweep) for name, sweep in section.sweep.items()})
+    if section.path is not None:
+        return _path(section.path, folder)
+    return None
+
+
+def _listed(poses: Sequence[Mapping[str, float]]) -> Poses:
+    rows: dict[frozenset[str], list[int]] = {}
+    for index, pose in enumerate(poses):
+        rows.setdefault(frozenset(pose), []).append(index)
+    groups = []
+    for members in rows.values():
+        names = tuple(poses[members[0]])
+        values = {name: np.array([poses[index][name] for index in members]) for name in names}
+        groups.append(PoseGroup(names, values, np.array(members, dtype=np.intp)))
+    return Poses(tuple(groups), len(poses), True, (len(poses),))
+
+
+def _grid(axes: Mapping[str, Floats]) -> Poses:
+    count = math.prod(len(values) for values in axes.values())
+    if count > MAX_POSES:
+        raise StudyError(f"a grid of {count} poses; at most {MAX_POSES} are possible")
+    mesh = np.meshgrid(*axes.values(), indexing="ij")
+    values = {name: points.ravel() for name, points in zip(axes, mesh, strict=True)}
+    swept = tuple(len(values) for values in axes.values() if len(values) > 1)
+    return _single(values, count, swept or (1,))
+
+
+def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> Poses:
+    return Poses((PoseGroup(tuple(values), values, np.arange(count)),), count, False, grid)
+
+
+def _path(path: Mapping[str, str | tuple[object, ...]], folder: Path) -> Poses:
+    columns: dict[str, Floats] = {}
+    for name, given in path.items():
+        table = read_table(folder / given) if isinstance(given, str) else np.array(given, dtype=float)
+        if table.ndim == 2 and table.shape[1] == 2 and "." not in name:
+            columns[f"{name}.x"], columns[f"{name}.y"] = table[:, 0], table[:, 1]
+        elif table.ndim == 1 or table.shape[1] == 1:
+            columns[name] = table.reshape(-1)
+        else:
+            raise StudyError(f"path: {name!r} needs a list of " + ("numbers" if "." in name else "[x, y]"))
+    count = max(len(column) for column in columns.values())
+    for name, column in columns.items():
+        if len(column) not in (1, count):
+            raise StudyError(f"path: {name!r} has {len(column)} values where another coordinate has {count}")
+    return _single({name: np.broadcast_to(column, (count,)).copy() for name, column in columns.items()}, count, (count,))
+
+
+def read_table(file: Path) -> Floats:
+    """Read a CSV file of one or two columns of numbers, with or without a line of names.
+
+    Raises
+    ------
+    StudyError
+        Where it cannot be read or holds anything else.
+    """
+    try:
+        lines = [line.strip() for line in file.read_text(encoding="utf-8-sig").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'not a text file'}") from None
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        if not line or line.startswith("#"):
+            continue
+        try:
+            row = [float(part) for part in line.replace(";", ",").split(",")]
+        except ValueError:
+            if rows or number > 1:
+                raise StudyError(f"{file}:{number}: {line!r} is not a row of numbers") from None
+            continue
+        if len(row) > 2 or (rows and len(row) != len(rows[0])) or not all(map(math.isfinite, row)):
+            raise StudyError(f"{file}:{number}: a path has one or two columns of finite numbers")
+        rows.append(row)
+    if not rows:
+        raise StudyError(f"{file} holds no numbers")
+    return np.array(rows)
+
+
+def default(description: Description, turn: float) -> Poses:
+    """Poses where a study gives none: a turn of an angle drive in 72 steps, or the drive's limits in 50.
+
+    Parameters
+    ----------
+    description : Description
+        The mechanism.
+    turn : float
+        A full turn in the study's unit.
+
+    Raises
+    ------
+    StudyError
+        Where nothing sensible can be assumed.
+    """
+    if len(description.drives) != 1:
+        raise StudyError(
+            f"the study says no poses, and with {len(description.drives)} drives none can be assumed; "
+            "give 'poses', 'sweep' or 'path'"
+        )
+    drive = next(iter(description.drives.values()))
+    factor = description.angle_unit if drive.kind == "angle" else 1.0
+    for limit in description.limits:
+        low, high = limit.minimum, limit.maximum
+        if limit.kind == "drive" and limit.items[0] == drive.name and low is not None and high is not None:
+            ends = [(description.places[end].nominal if isinstance(end, str) else end) / factor for end in (low, high)]
+            return _single({drive.name: np.linspace(ends[0], ends[1], 51)}, 51, (51,))
+    if drive.kind == "angle":
+        return _single({drive.name: np.linspace(0.0, turn, 73)}, 73, (73,))
+    raise StudyError(
+        f"the study says no poses, and the drive {drive.name!r} has no limits to move between; "
+        "give 'poses', 'sweep' or 'path', or limits of the drive"
+    )

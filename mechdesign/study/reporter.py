@@ -1,0 +1,160 @@
+"""Mistakes of a study, each with the place in the text where it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from mechdesign.errors import Problem, StudyError
+from mechdesign.study.document import Document, Path, dotted
+from mechdesign.study.numbers import shown, suggestion
+
+# A link written as a list has its keys at these places.
+LIST_FORM = {"from": 0, "to": 1, "length": 2}
+
+
+class Reporter:
+    """Collects problems of one document and raises them together."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.problems: list[Problem] = list(document.problems)
+
+    def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
+        """Note a problem at a path of the data; paths through the long form of a short form are understood."""
+        found = self.written(path)
+        if any(found[: len(part)] == part for part in self.document.spoiled):
+            return
+        known = self._nearest(found)
+        mark = self.document.values[known]
+        if (at_key or known != found) and known in self.document.keys:
+            mark = self.document.keys[known]
+        problem = mark.problem(message, dotted(found))
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+    def done(self) -> None:
+        """Raise all problems, in the order of the text.
+
+        Raises
+        ------
+        StudyError
+            If there are any.
+        """
+        if self.problems:
+            ordered = sorted(self.problems, key=lambda problem: (problem.line == 0, problem.line, problem.column))
+            raise StudyError(ordered)
+
+    def raw(self, path: Sequence[str | int]) -> Any:
+        """The data as written at a path, None where there is none."""
+        data = self.document.data
+        for segment in self.written(path):
+            if isinstance(data, dict):
+                data = data.get(str(segment))
+            elif isinstance(data, list) and isinstance(segment, int) and segment < len(data):
+                data = data[segment]
+            else:
+                return None
+        return data
+
+    def written(self, path: Sequence[str | int]) -> Path:
+        """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
+        data, found = self.document.data, []
+        remaining = list(path)
+        while remaining:
+            segment = remaining.pop(0)
+            if isinstance(data, dict) and segment in data:
+                found.append(segment)
+                data = data[str(segment)]
+            elif isinstance(data, list) and isinstance(segment, int) and 0 <= segment < len(data):
+                found.append(segment)
+                data = data[segment]
+            elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
+                found.append(LIST_FORM[str(segment)])
+                data = data[LIST_FORM[str(segment)]]
+            elif isinstance(data, list) and segment in data:
+                found.append(data.index(segment))
+                data = segment
+            elif remaining or not isinstance(data, dict):
+                continue
+            else:
+                found.append(segment)
+        return tuple(found)
+
+    def _nearest(self, path: Path) -> Path:
+        while path and path not in self.document.values:
+            path = path[:-1]
+        return path
+
+    def report_validation(self, error: ValidationError, root: type[BaseModel], prefix: Path) -> None:
+        """Note every error of the validation of the part at `prefix`, in words."""
+        for item in error.errors(include_url=False):
+            location = (*prefix, *item["loc"])
+            at_key = location[-1] == "[key]"
+            if at_key:
+                location = location[:-1]
+            kind = item["type"]
+            if kind == "extra_forbidden":
+                known = schema_keys(root, location[:-1])
+                self.report(location, f"unknown key{suggestion(str(location[-1]), known)}", at_key=True)
+            elif kind == "missing":
+                self.report(location, "is missing", at_key=True)
+            else:
+                self.report(
+                    location, str(item["msg"]) if kind == "study" else _expected(kind, item["input"]), at_key=at_key
+                )
+
+
+def _expected(kind: str, raw: Any) -> str:
+    what = {
+        "string_type": "a text",
+        "dict_type": "a mapping of names",
+        "model_type": "a mapping",
+        "model_attributes_type": "a mapping",
+        "tuple_type": "a list",
+        "list_type": "a list",
+        "bool_type": "true or false",
+        "bool_parsing": "true or false",
+        "too_long": "a shorter list",
+        "none_required": "nothing",
+    }.get(kind, "something else")
+    return f"expected {what}, not {shown(raw)}"
+
+
+def _fields(root: type[BaseModel], location: Sequence[str | int]) -> dict[str, Any]:
+    """Fields of the model at a location, none where there is no model."""
+    current: Any = root
+    for segment in location:
+        current = _strip(current)
+        if isinstance(current, type) and issubclass(current, BaseModel):
+            fields = current.model_fields.items()
+            current = next((field.annotation for name, field in fields if segment in (field.alias, name)), None)
+        elif get_origin(current) is dict:
+            current = get_args(current)[1]
+        elif get_origin(current) is tuple:
+            current = get_args(current)[0]
+        else:
+            return {}
+    current = _strip(current)
+    if isinstance(current, type) and issubclass(current, BaseModel):
+        return dict(current.model_fields)
+    return {}
+
+
+def _strip(annotation: Any) -> Any:
+    """The type under Annotated and Optional."""
+    while True:
+        if get_origin(annotation) is Annotated:
+            annotation = get_args(annotation)[0]
+        elif get_origin(annotation) in (Union, UnionType):
+            annotation = next((arm for arm in get_args(annotation) if arm is not type(None)), None)
+        else:
+            return annotation
+
+
+def schema_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[str]:
+    """Keys that the schema knows at a location."""
+    return [field.alias or name for name, field in _fields(root, location).items()]

@@ -1,0 +1,34 @@
+"""Commented studies to start from, as `mechdesign new` prints them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mechdesign.errors import StudyError
+from mechdesign.study.numbers import suggestion
+
+_FOLDER = Path(__file__).parent
+
+
+def templates() -> tuple[str, ...]:
+    """Names of the templates."""
+    return tuple(sorted(file.stem for file in _FOLDER.glob("*.yaml")))
+
+
+def template_path(name: str) -> Path:
+    """File of a template.
+
+    Raises
+    ------
+    StudyError
+        If there is none of that name.
+    """
+    known = templates()
+    if name not in known:
+        raise StudyError(f"there is no template {name!r}{suggestion(name, known)}; there are {', '.join(known)}")
+    return _FOLDER / f"{name}.yaml"
+
+
+def template(name: str) -> str:
+    """Text of a template."""
+    return template_path(name).read_text(encoding="utf-8")

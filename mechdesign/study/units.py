@@ -1,0 +1,242 @@
+"""The study's units, and quantities such as ``"40 mm"`` converted to them.
+
+A *kind* of quantity is a product of powers of length, angle, time and force. Pint is imported only where a string with
+a unit occurs; its registry here knows the units of mechanics alone and keeps the angle as a dimension of its own, so
+that ``rad/s`` is never taken for a frequency.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+Powers = tuple[int, int, int, int]
+"""Exponents of length, angle, time and force."""
+
+KINDS: dict[str, Powers] = {
+    "none": (0, 0, 0, 0),
+    "length": (1, 0, 0, 0),
+    "angle": (0, 1, 0, 0),
+    "time": (0, 0, 1, 0),
+    "force": (0, 0, 0, 1),
+    "velocity": (1, 0, -1, 0),
+    "acceleration": (1, 0, -2, 0),
+    "angular_velocity": (0, 1, -1, 0),
+    "angular_acceleration": (0, 1, -2, 0),
+    "moment": (1, 0, 0, 1),
+    "area": (2, 0, 0, 0),
+    "inertia": (4, 0, 0, 0),
+    "stress": (-2, 0, 0, 1),
+    "stiffness": (-1, 0, 0, 1),
+    "rotational_stiffness": (1, -1, 0, 1),
+    "coupling_stiffness": (0, -1, 0, 1),
+    "compliance": (1, 0, 0, -1),
+    "rotational_compliance": (-1, 1, 0, -1),
+    "coupling_compliance": (0, 1, 0, -1),
+}
+"""Kinds of quantity by name; stiffness and compliance are per radian whatever the study's angle unit."""
+
+_PER_RADIAN = frozenset(name for name in KINDS if name.endswith(("stiffness", "compliance")))
+
+_FACTOR = r"\(?[A-Za-zµμ°]+(?:\s*(?:\^|\*\*)\s*-?\d)?\)?"
+QUANTITY = re.compile(
+    r"\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+    rf"(?P<unit>(?:1\s*/\s*)?{_FACTOR}(?:\s*[*/·\s]\s*{_FACTOR})*)\s*"
+)
+"""A number and a unit; digits occur in a unit only as powers, so that nothing large can be computed by it."""
+
+_DEFINITIONS = """
+kilo- = 1000 = k-
+mega- = 1e6 = M-
+giga- = 1e9 = G-
+deci- = 0.1 = d-
+centi- = 0.01 = c-
+milli- = 1e-3 = m-
+micro- = 1e-6 = µ- = μ- = u-
+nano- = 1e-9 = n-
+meter = [length] = m = metre
+second = [time] = s = sec
+gram = [mass] = g
+radian = [angle] = rad
+degree = 0.017453292519943295 * radian = deg = ° = degrees
+arcminute = degree / 60 = arcmin
+arcsecond = arcminute / 60 = arcsec
+grade = 0.015707963267948967 * radian = gon
+revolution = 6.283185307179586 * radian = rev = turn = turns = revolutions
+minute = 60 * second = min
+hour = 60 * minute = h
+rpm = revolution / minute
+inch = 0.0254 * meter = in = inches
+foot = 12 * inch = ft = feet
+yard = 3 * foot = yd
+thou = 0.001 * inch = mil
+newton = kilogram * meter / second ** 2 = N
+pound = 0.45359237 * kilogram = lb
+pound_force = 4.4482216152605 * newton = lbf
+kilopond = 9.80665 * newton = kgf = kp
+dyne = 1e-5 * newton = dyn
+pascal = newton / meter ** 2 = Pa
+bar = 1e5 * pascal
+psi = pound_force / inch ** 2
+ksi = 1000 * psi
+joule = newton * meter = J
+"""
+
+
+class QuantityError(ValueError):
+    """A quantity that cannot be read or converted; the message says why."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units that bare numbers of a study mean.
+
+    Parameters
+    ----------
+    length, angle, time, force : str
+        As the study writes them; length may be ``dimensionless``.
+    angle_factor : float
+        Radians in one unit of angle.
+    """
+
+    length: str = "mm"
+    angle: str = "deg"
+    time: str = "s"
+    force: str = "N"
+    angle_factor: float = math.pi / 180.0
+
+    def label(self, kind: str) -> str:
+        """Unit of a kind of quantity as tables show it (``mm/s``, ``N*mm/rad``); empty for pure numbers."""
+        length, angle, time, force = KINDS[kind]
+        angle_name = "rad" if kind in _PER_RADIAN else self.angle
+        length_name = "" if self.length == "dimensionless" else self.length
+        factors = [(self.force, force), (length_name, length), (angle_name, angle), (self.time, time)]
+        above = "*".join(_power(name, power) for name, power in factors if name and power > 0)
+        below = [_power(name, -power) for name, power in factors if name and power < 0]
+        if not below:
+            return above
+        return f"{above or '1'}/{below[0] if len(below) == 1 else '(' + '*'.join(below) + ')'}"
+
+    def convert(self, text: str, kind: str | None = None) -> float:
+        """Convert a quantity to the study's units.
+
+        Parameters
+        ----------
+        text : str
+            A number and a unit.
+        kind : str, optional
+            What is expected, a name of `KINDS`; left out: whatever the unit says.
+
+        Raises
+        ------
+        QuantityError
+            Where the unit is unknown or of another kind.
+        """
+        number, powers, factor = measure(text)
+        if (
+            kind is not None
+            and powers != KINDS[kind]
+            and not (kind == "rotational_stiffness" and powers == (1, 0, 0, 1))
+        ):
+            raise QuantityError(f"{text.strip()!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected")
+        if powers[0] and self.length == "dimensionless":
+            raise QuantityError(f"{text.strip()!r} has a length in it, and this study's lengths are dimensionless")
+        scale = _scale(self.length) ** powers[0] * _scale(self.time) ** powers[2] * _scale(self.force) ** powers[3]
+        # Stiffness is per radian by the format, so an angle below the line is never in the study's unit.
+        scale *= self.angle_factor ** max(powers[1], 0)
+        return number * factor / scale
+
+
+def units_from(length: str, angle: str, time: str, force: str) -> tuple[Units, dict[str, str]]:
+    """Check the units' names and build Units; the second value maps a wrong entry to what is wrong with it."""
+    problems: dict[str, str] = {}
+    given = {"length": length, "angle": angle, "time": time, "force": force}
+    for kind, name in given.items():
+        if name in _COMMON.get(kind, {}) or (kind == "length" and name == "dimensionless"):
+            continue
+        try:
+            powers = measure(f"1 {name}")[1] if QUANTITY.fullmatch(f"1 {name}") else None
+        except QuantityError:
+            powers = None
+        if powers != KINDS[kind]:
+            known = ", ".join(_COMMON[kind])
+            problems[kind] = f"{name!r} is not a unit of {kind}; for example {known}"
+    if problems:
+        return Units(), problems
+    return Units(length, angle, time, force, _scale(angle)), {}
+
+
+_COMMON: dict[str, dict[str, float]] = {
+    "length": {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254},
+    "angle": {"deg": math.pi / 180.0, "rad": 1.0},
+    "time": {"s": 1.0, "min": 60.0},
+    "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605},
+}
+
+
+def _scale(name: str) -> float:
+    """SI value of one unit, for the common ones without the registry."""
+    for common in _COMMON.values():
+        if name in common:
+            return common[name]
+    return 1.0 if name == "dimensionless" else measure(f"1 {name}")[2]
+
+
+def measure(text: str) -> tuple[float, Powers, float]:
+    """Read a quantity: its number, the powers of its unit, and the unit's value in SI units and radians.
+
+    Raises
+    ------
+    QuantityError
+        Where the unit is unknown or no product of powers of length, angle, time and force.
+    """
+    match = QUANTITY.fullmatch(text)
+    if match is None:
+        raise QuantityError(f"{text!r} is not a number with a unit")
+    powers, factor = _unit(match["unit"])
+    return float(match["number"]), powers, factor
+
+
+@cache
+def _unit(unit: str) -> tuple[Powers, float]:
+    registry = _registry()
+    try:
+        parsed = registry.parse_units(unit.replace("^", "**").replace("·", "*"))
+        base = registry.Quantity(1.0, parsed).to_base_units()
+    except Exception:  # pint lets through whatever its tokenizer and its own classes raise
+        raise QuantityError(f"unknown unit {unit!r}") from None
+    dimensions = {str(name): power for name, power in base.dimensionality.items()}
+    mass, length = dimensions.get("[mass]", 0), dimensions.get("[length]", 0)
+    angle, time = dimensions.get("[angle]", 0), dimensions.get("[time]", 0)
+    exponents = (length - mass, angle, time + 2 * mass, mass)
+    if any(exponent != int(exponent) for exponent in exponents):
+        raise QuantityError(f"the unit {unit!r} has a broken power")
+    powers = (int(exponents[0]), int(exponents[1]), int(exponents[2]), int(exponents[3]))
+    # The registry's base of mass is the gram.
+    return powers, float(base.magnitude) * 1e-3**mass
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry(None, on_redefinition="ignore")
+    registry.load_definitions(_DEFINITIONS.strip().splitlines())
+    return registry
+
+
+def describe(powers: Powers) -> str:
+    """Name a kind of quantity for a message."""
+    for name, known in KINDS.items():
+        if known == powers:
+            article = "an" if name[0] in "aeiou" else "a"
+            return "a pure number" if name == "none" else f"{article} {name.replace('_', ' ')}"
+    names = ("length", "angle", "time", "force")
+    return "a quantity of " + " ".join(_power(name, power) for name, power in zip(names, powers, strict=True) if power)
+
+
+def _power(name: str, power: int) -> str:
+    return name if power == 1 else f"{name}^{power}"
