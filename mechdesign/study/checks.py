@@ -14,6 +14,7 @@ from mechdesign.study.document import Path
 from mechdesign.study.names import Names
 from mechdesign.study.numbers import suggestion
 from mechdesign.study.parameters import Parameters
+from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reporter import Reporter
 from mechdesign.study.sections import (
     COMMANDS,
@@ -21,7 +22,6 @@ from mechdesign.study.sections import (
     Dimension,
     KinematicsSection,
     OptimizeSection,
-    PoseSection,
     ReliabilitySection,
     StiffnessSection,
     WorkspaceSection,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 import pathlib
@@ -21,14 +22,14 @@ from mechdesign.study import checks, overrides, poses
 from mechdesign.study.build import Builder
 from mechdesign.study.document import Document, plain, read
 from mechdesign.study.models import MechanismSection, UnitsSection
-from mechdesign.study.numbers import Context, check_parameter_name, read_number, shown, suggestion
+from mechdesign.study.numbers import LOST, Context, check_parameter_name, read_number, shown, suggestion
 from mechdesign.study.parameters import Parameters
+from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reporter import Reporter
 from mechdesign.study.sections import (
     COMMANDS,
     KinematicsSection,
     OptimizeSection,
-    PoseSection,
     ReliabilitySection,
     Requirement,
     StiffnessSection,
@@ -214,13 +215,10 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
         if wrong_name := check_parameter_name(name):
             reporter.report(path, wrong_name, at_key=True)
         try:
-            number = read_number(value, Context(units, nominal))
+            number = read_number(value, Context(units, nominal, [other for other in raw if other not in nominal]))
         except PydanticCustomError as error:
-            below = [other for other in raw if other not in nominal and f"name {other!r} " in error.message()]
-            hint = f" ({below[0]!r} is not above it)" if below else ""
-            reporter.report(path, f"{error.message()}{hint}")
-            nominal[name] = math.nan
-            continue
+            reporter.report(path, error.message())
+            number = LOST
         nominal[name] = number.nominal
         if number.expression is not None:
             formulas[name] = number.expression
@@ -247,6 +245,9 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
             parts[key] = _adapter(key).validate_python(raw, context=context)
         except ValidationError as error:
             reporter.report_validation(error, StudyFile, (key,))
+            # Names are checked all the same where the mistakes told so far are in numbers and keys alone.
+            with contextlib.suppress(ValidationError):
+                parts[key] = _adapter(key).validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts
 
 

@@ -42,7 +42,7 @@ class Model(BaseModel):
 
 def _pair(raw: Any) -> Any:
     if not isinstance(raw, list) or len(raw) != 2:
-        raise failure(f"expected [x, y], not {shown(raw)}" + (f" of {len(raw)}" if isinstance(raw, list) else ""))
+        raise failure(f"expected [x, y], not {shown(raw)}")
     return raw
 
 
@@ -90,6 +90,9 @@ class Link(Model):
             expected = "[from, to, length], {from, to, length} or its points {A: [x, y], ...}"
             raise failure(f"expected a link, {expected}, not {shown(raw)}")
         if any(key in raw for key in LINK_KEYS):
+            for key, value in raw.items():
+                if key not in LINK_KEYS and isinstance(value, list):
+                    raise failure(f"beside 'from', 'to' and 'length' a point stands under 'points': {{{key}: [x, y]}}")
             return raw
         for key, value in raw.items():
             if not isinstance(value, list) and value is not None:

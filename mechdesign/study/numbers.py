@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -26,10 +26,21 @@ COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 
 @dataclass(frozen=True)
 class Context:
-    """What numbers are read with: the units, and the parameters' nominal values (nan where one is wrong)."""
+    """What numbers are read with.
+
+    Parameters
+    ----------
+    units : Units
+        What bare numbers mean.
+    parameters : mapping of str to float
+        Nominal values, nan where one is wrong.
+    below : collection of str
+        Parameters that are not known yet.
+    """
 
     units: Units = field(default_factory=Units)
     parameters: Mapping[str, float] = field(default_factory=dict)
+    below: Collection[str] = ()
 
 
 @dataclass(frozen=True)
@@ -51,17 +62,26 @@ class Value:
     powers: Powers | None = None
 
 
+LOST = Value(math.nan)
+"""Stands for a number whose own mistake has been told, so that the rest can be checked."""
+
+
 def failure(message: str) -> PydanticCustomError:
     """Build the error that a validator raises; the message reaches the user as it is."""
     return PydanticCustomError("study", "{message}", {"message": message})
 
 
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that resembles this one most, None where none does."""
+    folded = {candidate.casefold(): candidate for candidate in known}
+    close = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.6)
+    return folded[close[0]] if close else None
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Give ``; did you mean 'x'?`` where a known name resembles this one, or else nothing."""
-    candidates = list(dict.fromkeys(known))
-    folded = {candidate.casefold(): candidate for candidate in candidates}
-    close = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.6)
-    return f"; did you mean {folded[close[0]]!r}?" if close else ""
+    near = nearest(name, known)
+    return f"; did you mean {near!r}?" if near is not None else ""
 
 
 def shown(value: object) -> str:
@@ -73,7 +93,7 @@ def shown(value: object) -> str:
     if isinstance(value, dict):
         return "a mapping"
     if isinstance(value, list):
-        return "a list"
+        return f"a list of {len(value)}"
     text = repr(value) if isinstance(value, str) else f"the number {value}"
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -86,6 +106,8 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Value
     PydanticCustomError
         Where it is none of them, not finite, or a quantity of another kind than `kind`.
     """
+    if isinstance(raw, Value):
+        return raw
     if isinstance(raw, bool) or not isinstance(raw, int | float | str):
         raise failure(f"expected a number, not {shown(raw)}")
     if isinstance(raw, str):
@@ -107,18 +129,19 @@ def _read_text(text: str, context: Context, kind: str | None) -> Value:
                 raise failure(f"{text!r} is too large a number")
             return Value(number, None, measure(text)[1])
         expression = Expression.parse(text, context.units.angle_factor)
-        unknown = sorted(expression.names - set(context.parameters))
-        if unknown:
-            hint = suggestion(unknown[0], context.parameters) or (
-                "; write a quantity as '<number> <unit>'"
-                if not context.parameters
-                else f"; the parameters are {', '.join(context.parameters)}"
-            )
-            raise failure(f"unknown name {unknown[0]!r} in {shown(text)}{hint}")
+        for name in sorted(expression.names - set(context.parameters)):
+            raise failure(f"unknown name {name!r} in {shown(text)}{_known_names(name, context)}")
         result = expression.evaluate(context.parameters)
         return Value(float(result), expression if expression.names else None)
     except (QuantityError, ExpressionError) as error:
         raise failure(str(error)) from None
+
+
+def _known_names(name: str, context: Context) -> str:
+    if name in context.below:
+        return f"; a parameter may use those above it, and {name!r} is below"
+    known = ", ".join(context.parameters)
+    return suggestion(name, context.parameters) or (f"; the parameters are {known}" if known else "")
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description
-from mechdesign.study.sections import PoseSection, Sweep
+from mechdesign.study.pose_models import PoseSection, Sweep
 
 MAX_POSES = 10_000_000
 
@@ -152,7 +152,9 @@ def _path(path: Mapping[str, str | tuple[object, ...]], folder: Path) -> Poses:
     for name, column in columns.items():
         if len(column) not in (1, count):
             raise StudyError(f"path: {name!r} has {len(column)} values where another coordinate has {count}")
-    return _single({name: np.broadcast_to(column, (count,)).copy() for name, column in columns.items()}, count, (count,))
+    return _single(
+        {name: np.broadcast_to(column, (count,)).copy() for name, column in columns.items()}, count, (count,)
+    )
 
 
 def read_table(file: Path) -> Floats:

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from mechdesign.errors import Problem, StudyError
-from mechdesign.study.document import Document, Path, dotted
-from mechdesign.study.numbers import shown, suggestion
+from mechdesign.study.document import Document, Path, dotted, plain
+from mechdesign.study.numbers import LOST, nearest, shown, suggestion
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
@@ -52,24 +52,19 @@ class Reporter:
         """The data as written at a path, None where there is none."""
         data = self.document.data
         for segment in self.written(path):
-            if isinstance(data, dict):
-                data = data.get(str(segment))
-            elif isinstance(data, list) and isinstance(segment, int) and segment < len(data):
-                data = data[segment]
-            else:
+            if not _has(data, segment):
                 return None
+            data = data[segment]
         return data
 
     def written(self, path: Sequence[str | int]) -> Path:
         """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
-        data, found = self.document.data, []
+        data: Any = self.document.data
+        found: list[str | int] = []
         remaining = list(path)
         while remaining:
             segment = remaining.pop(0)
-            if isinstance(data, dict) and segment in data:
-                found.append(segment)
-                data = data[str(segment)]
-            elif isinstance(data, list) and isinstance(segment, int) and 0 <= segment < len(data):
+            if _has(data, segment):
                 found.append(segment)
                 data = data[segment]
             elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
@@ -106,6 +101,33 @@ class Reporter:
                 self.report(
                     location, str(item["msg"]) if kind == "study" else _expected(kind, item["input"]), at_key=at_key
                 )
+
+    def mended(self, error: ValidationError, root: type[BaseModel], key: str, raw: Any) -> Any:
+        """The data of a top-level part with the mistakes of a validation taken out, as far as that is possible.
+
+        Wrong numbers are lost, unknown keys take the name that they resemble or are left out.
+        """
+        part = plain(raw)
+        for item in error.errors(include_url=False):
+            location = (key, *item["loc"])
+            *inner, last = self.written(location)[1:] or (None,)
+            holder: Any = part
+            for segment in inner:
+                holder = holder[segment] if _has(holder, segment) else None
+            if item["type"] == "extra_forbidden" and isinstance(holder, dict) and last in holder:
+                value = holder.pop(last)
+                near = nearest(str(last), schema_keys(root, location[:-1]))
+                if near is not None:
+                    holder.setdefault(near, value)
+            elif _has(holder, last) and isinstance(holder[last], int | float | str):
+                holder[last] = LOST
+        return part
+
+
+def _has(data: Any, key: Any) -> bool:
+    if isinstance(data, list):
+        return isinstance(key, int) and 0 <= key < len(data)
+    return isinstance(data, dict) and key in data
 
 
 def _expected(kind: str, raw: Any) -> str:

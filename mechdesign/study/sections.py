@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, model_validator
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema
 
 from mechdesign.study.models import MechanismSection, Model, UnitsSection
 from mechdesign.study.numbers import (
@@ -42,6 +42,7 @@ from mechdesign.study.numbers import (
     read_number,
     suggestion,
 )
+from mechdesign.study.pose_models import PoseSection
 
 DISTRIBUTIONS = ("normal", "uniform")
 PIN_MODELS = ("normal", "normal_in_disc", "uniform")
@@ -58,89 +59,6 @@ def _as_list(raw: Any) -> list[Any]:
 
 
 CoordinateNames = Annotated[tuple[CoordinateName, ...], BeforeValidator(_one_or_many)]
-
-
-class Sweep(Model):
-    """Values of one coordinate, both ends included; a bare number is held (``number`` 1)."""
-
-    from_: Number = Field(alias="from")
-    to: Number
-    step: Number | None = None
-    number: Annotated[int, Whole(1, 10_000_000)] | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _held(cls, raw: Any) -> Any:
-        return {"from": raw, "to": raw, "number": 1} if isinstance(raw, int | float | str) else raw
-
-    @model_validator(mode="after")
-    def _spacing(self) -> Sweep:
-        if (self.step is None) == (self.number is None):
-            raise failure("a sweep needs either 'step' or 'number'")
-        if self.step is not None and (self.step == 0 or self.step * (self.to - self.from_) < 0):
-            raise failure(f"a step of {self.step:g} never leads from {self.from_:g} to {self.to:g}")
-        return self
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [dict(handler.resolve_ref_schema(handler(schema))), {"type": ["number", "string"]}]}
-
-
-class _PathValues:
-    """A path's values: a list of numbers or of [x, y], the name of a CSV file, or a number that is held."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"type": ["array", "string", "object", "number"]}
-
-    @staticmethod
-    def _validate(raw: Any, info: ValidationInfo) -> str | tuple[Any, ...]:
-        context = info.context or Context()
-        if isinstance(raw, dict) and set(raw) == {"file"} and isinstance(raw["file"], str):
-            return str(raw["file"])
-        if isinstance(raw, str) and raw.lower().endswith((".csv", ".txt", ".dat")):
-            return raw
-        if not isinstance(raw, list):
-            return (read_number(raw, context).nominal,)
-        values: list[Any] = []
-        for index, item in enumerate(raw):
-            try:
-                if isinstance(item, list) and len(item) == 2:
-                    values.append(tuple(read_number(part, context).nominal for part in item))
-                else:
-                    values.append(read_number(item, context).nominal)
-            except PydanticCustomError as error:
-                raise failure(f"entry {index}: {error.message()}") from None
-        if not values:
-            raise failure("an empty path")
-        if len({isinstance(value, tuple) for value in values}) > 1:
-            raise failure("a path is a list of [x, y] (of a point) or a list of numbers, not a mixture")
-        return tuple(values)
-
-
-def _poses(raw: Any) -> Any:
-    if raw == "workspace":
-        raise failure("'workspace' as poses is not available in this version; use poses, sweep or path")
-    if isinstance(raw, list) and not raw:
-        raise failure("an empty list of poses")
-    return raw
-
-
-class PoseSection(Model):
-    """Where a question is asked: listed poses, a sweep, or a path."""
-
-    poses: Annotated[tuple[dict[CoordinateName, Number], ...], BeforeValidator(_poses)] | None = None
-    sweep: dict[CoordinateName, Sweep] | None = None
-    path: dict[CoordinateName, Annotated[str | tuple[Any, ...], _PathValues()]] | None = None
-
-    @model_validator(mode="after")
-    def _one_source(self) -> PoseSection:
-        given = [key for key in ("poses", "sweep", "path") if getattr(self, key) is not None]
-        if len(given) > 1:
-            raise failure(f"{' and '.join(given)} are both given; poses come from one of them")
-        return self
 
 
 class Load(Model):
