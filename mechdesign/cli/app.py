@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mechdesign.cli import options as given
-from mechdesign.cli.execution import COMMANDS
+from mechdesign.cli.execution import BUILT_IN, COMMANDS
 from mechdesign.cli.failure import guard
 from mechdesign.cli.options import Options
 
@@ -110,10 +110,10 @@ def new(
 ) -> None:
     """Print a commented study to start from."""
     with guard():
-        from mechdesign.cli.checking import template_text
         from mechdesign.cli.terminal import emit
+        from mechdesign.study import template as template_text
 
-        emit(template_text(template))
+        emit(template_text(template or BUILT_IN))
 
 
 @app.command("schema", short_help="Print the JSON Schema of the study file.")

@@ -30,7 +30,7 @@ def questions(study: Study) -> tuple[str, ...]:
     from mechdesign.report.requirements import command_of
 
     judged = {command_of(requirement) for requirement in study.requirements}
-    asked = [command for command in COMMANDS if getattr(study, command) is not None or command in judged]
+    asked = [command for command in COMMANDS if command in study.questions or command in judged]
     return tuple(asked) or ("kinematics",)
 
 

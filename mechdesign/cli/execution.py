@@ -60,8 +60,7 @@ def load_study(path: Path | None, options: Options) -> Study:
     StudyError
         Every mistake of the study or the overrides.
     """
-    import mechdesign
-    from mechdesign.study import template_path
+    from mechdesign.study import load, template_path
 
     if path is None:
         path = Path("study.yaml")
@@ -70,7 +69,7 @@ def load_study(path: Path | None, options: Options) -> Study:
         else:
             terminal.say("study: the built-in two-link arm (no study.yaml here)", quiet=options.quiet)
             path = template_path(BUILT_IN)
-    return mechdesign.load(path, overrides=options.overrides, seed=options.seed)
+    return load(path, options.overrides, options.seed)
 
 
 def study_label(study: Study) -> str:
@@ -95,7 +94,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
     with terminal.Bar(quiet=options.quiet) as bar:
         result: Result = getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar)
     try:
-        verdicts = requirements.judge(result, study.requirements)
+        verdicts = requirements.judge(result, study.requirements, str(study.path or ""))
     except StudyError:
         # A misspelt requirement should not cost the computation.
         writer.write(directory, study, result, plots=options.plots)

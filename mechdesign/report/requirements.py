@@ -71,8 +71,8 @@ def command_of(requirement: Requirement) -> str:
     return requirement.result.partition(".")[0]
 
 
-def judge(result: Result, requirements: Iterable[Requirement]) -> tuple[Verdict, ...]:
-    """Verdicts on the requirements that concern this result, in the study's order.
+def judge(result: Result, requirements: Iterable[Requirement], file: str = "") -> tuple[Verdict, ...]:
+    """Verdicts on the requirements that concern this result, in the order of the study (`file`).
 
     The worst row counts: the smallest value for `at_least`, the largest for `at_most`; nan is not met, nor is a
     requirement that no row answers.
@@ -90,7 +90,7 @@ def judge(result: Result, requirements: Iterable[Requirement]) -> tuple[Verdict,
         try:
             verdicts.append(_judge(result, requirement))
         except _UnknownColumnError as error:
-            problems.append(Problem(str(error), f"requirements.{index}"))
+            problems.append(Problem(str(error), f"requirements.{index}", file))
     if problems:
         raise StudyError(problems)
     return tuple(verdicts)

@@ -156,9 +156,10 @@ def _poses(study: Study) -> tuple[Configuration, list[str]] | None:
     except MechdesignError:
         return None
     labels = [study.units.label(quantity) for quantity in quantities]
+    # A title may be broken between coordinates only.
     words = [
         ", ".join(
-            f"{name} = {value:.4g} {label}".rstrip()
+            f"{name} = {value:.4g} {label}".rstrip().replace(" ", "\N{NO-BREAK SPACE}")
             for name, value, label in zip(group.names, row, labels, strict=True)
         )
         for row in zip(*values, strict=True)

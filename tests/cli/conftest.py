@@ -1,0 +1,70 @@
+"""The command line with analyses of the test's making: what it does with a result, not the result itself."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from mechdesign.cli.app import app
+from mechdesign.results import Column, Result, Table
+
+SLIDER = """\
+name: Offset slider-crank
+mechanism:
+  parameters: {r: 40}
+  links:
+    ground: {O: [0, 0], G: [0, -20]}
+    crank: [O, A, r]
+    rod: [A, B, 120]
+    slider: {B: [0, 0]}
+  joints: {guide: {prismatic: [ground, slider], through: G}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 40], B: [110, -20]}
+kinematics:
+  sweep: {theta: {from: 0, to: 90, step: 45}}
+"""
+
+
+def answer(command="kinematics", **changes):
+    """A small result, with one more column than a pose."""
+    columns = (
+        Column("theta", np.array([0.0, 45.0, 90.0]), "deg", "drive"),
+        Column("B.x", np.array([1 / 3, np.nan, 3.0]), "mm", "position"),
+        Column("valid", np.array([True, False, True])),
+    )
+    defaults = {"tables": {"motion": Table("motion", columns)}, "counts": {"poses": 3, "invalid": 1}}
+    return Result(command, **(defaults | changes))
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty working directory with one study, slider.yaml."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "slider.yaml").write_text(SLIDER)
+    return tmp_path
+
+
+@pytest.fixture
+def analysis(monkeypatch):
+    """Put a function in place of a command's analysis; it gets (study, **options)."""
+
+    def install(function, command="kinematics"):
+        module = ModuleType(f"mechdesign.analyses.{command}")
+        setattr(module, command, function)
+        figures = ModuleType(f"mechdesign.report.figures.{command}")
+        figures.figures = lambda study, result: {}
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+        monkeypatch.setitem(sys.modules, figures.__name__, figures)
+
+    install(lambda study, **options: answer())
+    return install
+
+
+@pytest.fixture
+def invoke():
+    """Run the command line in this process."""
+    return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])

@@ -1,0 +1,51 @@
+"""Help: every command and option has it, and it is quick."""
+
+import subprocess
+import sys
+
+import pytest
+import typer.main
+
+from mechdesign.cli.app import app
+from mechdesign.cli.execution import COMMANDS
+
+GROUP = typer.main.get_command(app)
+EVERY = ("--out", "--set", "--seed", "--jobs", "--json", "--quiet", "--no-plots")
+
+
+@pytest.mark.parametrize("name", sorted(GROUP.commands))
+def test_every_command_and_parameter_has_help(name, invoke):
+    command = GROUP.commands[name]
+    assert command.help
+    assert all(getattr(parameter, "help", None) for parameter in command.params)
+    shown = invoke(name, "--help")
+    assert shown.exit_code == 0
+    assert " ".join(command.help.split())[:40] in " ".join(shown.stdout.split())
+
+
+def test_the_commands_are_those_of_the_study_format():
+    assert set(GROUP.commands) == {*COMMANDS, "run", "check", "new", "schema"}
+
+
+@pytest.mark.parametrize("name", [*COMMANDS, "run"])
+def test_options_that_stand_everywhere(name):
+    known = {option for parameter in GROUP.commands[name].params for option in parameter.opts}
+    assert known >= set(EVERY)
+    assert (name == "run") == ({"--junit", "--fail-fast", "--resume"} <= known)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["reliability", "--help"], ["--version"]])
+def test_help_imports_nothing_heavy(arguments):
+    code = (
+        "import sys\nfrom mechdesign.cli.app import main\n"
+        f"sys.argv = ['mechdesign', *{arguments!r}]\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
+        "heavy = {'numpy', 'scipy', 'matplotlib', 'pint', 'yaml', 'rich'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_no_command_shows_the_help(invoke):
+    assert "kinematics" in invoke().output

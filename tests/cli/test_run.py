@@ -1,0 +1,176 @@
+"""`run`: every question of several studies, one summary, JUnit, resume."""
+
+import csv
+import io
+import json
+
+import pytest
+from junitparser import JUnitXml
+
+from mechdesign.errors import AssemblyError
+
+from .conftest import SLIDER, answer
+
+STIFF = """\
+stiffness:
+  link: rod
+  at: B
+  sections: {beam: {E: 200 GPa, area: 100, inertia: 1000}}
+  elastic: {rod: beam}
+"""
+WRONG = SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]")
+
+
+@pytest.fixture
+def studies(folder, analysis):
+    analysis(lambda study, **options: answer("stiffness"), "stiffness")
+    (folder / "both.yaml").write_text(SLIDER + STIFF)
+    (folder / "wrong.yaml").write_text(WRONG)
+    return folder
+
+
+def summary(done):
+    return [tuple(row.values())[:4] for row in csv.DictReader(io.StringIO(done.stdout))]
+
+
+def test_every_question_a_study_asks_gets_a_folder(studies, invoke):
+    done = invoke("run", "both.yaml", "--no-plots")
+    assert done.exit_code == 0
+    assert summary(done) == [("both", "kinematics", "done", "0"), ("both", "stiffness", "done", "0")]
+    for command in ("kinematics", "stiffness"):
+        assert (studies / "results/both" / command / "manifest.json").exists()
+
+
+def test_out_of_one_study_and_of_several(studies, invoke):
+    invoke("run", "slider.yaml", "--no-plots", "--out", "one")
+    assert (studies / "one/kinematics/motion.csv").exists()
+    invoke("run", "slider.yaml", "both.yaml", "--no-plots", "--out", "several")
+    assert (studies / "several/slider/kinematics/motion.csv").exists()
+    assert (studies / "several/both/stiffness/motion.csv").exists()
+
+
+def test_a_study_that_asks_nothing_is_asked_how_it_moves(studies, invoke):
+    (studies / "bare.yaml").write_text(SLIDER[: SLIDER.index("kinematics:")])
+    assert summary(invoke("run", "bare.yaml", "--no-plots")) == [("bare", "kinematics", "done", "0")]
+
+
+def test_a_requirement_is_a_question(studies, invoke):
+    bare = SLIDER + "requirements: [{result: stiffness.theta, at_most: 80}]\n"
+    (studies / "gate.yaml").write_text(bare)
+    done = invoke("run", "gate.yaml", "--no-plots")
+    assert done.exit_code == 1
+    assert summary(done)[1] == ("gate", "stiffness", "requirement not met", "1")
+
+
+def test_a_wrong_study_does_not_stop_the_others(studies, invoke):
+    done = invoke("run", "wrong.yaml", "slider.yaml", "--no-plots")
+    assert done.exit_code == 2
+    assert summary(done) == [("wrong", "check", "wrong study", "2"), ("slider", "kinematics", "done", "0")]
+    assert "wrong.yaml:6:19: mechanism.links.crank" in done.stderr
+
+
+def test_fail_fast_stops_at_the_first_failure(studies, invoke):
+    done = invoke("run", "slider.yaml", "wrong.yaml", "both.yaml", "--no-plots", "--fail-fast")
+    assert done.exit_code == 2
+    assert not (studies / "results").exists()
+
+
+def test_a_question_that_fails_does_not_stop_the_next(studies, analysis, invoke):
+    def fail(study, **options):
+        raise AssemblyError("cannot reach")
+
+    analysis(fail)
+    done = invoke("run", "both.yaml", "--no-plots")
+    assert done.exit_code == 3
+    assert [row[3] for row in summary(done)] == ["3", "0"]
+
+
+def test_interrupt_ends_the_run_and_what_was_finished_is_whole(studies, analysis, invoke):
+    def interrupt(study, **options):
+        raise KeyboardInterrupt
+
+    analysis(interrupt, "stiffness")
+    done = invoke("run", "both.yaml", "slider.yaml", "--no-plots", "--junit", "report.xml")
+    assert done.exit_code == 130
+    assert summary(done) == [("both", "kinematics", "done", "0")]
+    assert (studies / "results/both/kinematics/manifest.json").exists()
+    assert not (studies / "results/both/stiffness").exists()
+    assert not (studies / "results/slider").exists()
+    assert JUnitXml.fromfile("report.xml").errors == 1
+
+
+def test_two_studies_of_one_name_do_not_overwrite_each_other(studies, invoke):
+    (studies / "deep").mkdir()
+    (studies / "deep/slider.yaml").write_text(SLIDER)
+    done = invoke("run", "slider.yaml", "deep/slider.yaml", "--no-plots")
+    assert done.exit_code == 2
+    assert "would overwrite" in done.stderr
+
+
+def test_json_summary(studies, invoke):
+    rows = json.loads(invoke("run", "both.yaml", "--no-plots", "--json").stdout)
+    assert [row["command"] for row in rows] == ["kinematics", "stiffness"]
+
+
+def test_junit_has_a_case_for_each_question_and_requirement(studies, invoke):
+    gate = "requirements:\n  - {result: kinematics.theta, at_least: 0}\n  - {result: kinematics.theta, at_most: 80}\n"
+    (studies / "gate.yaml").write_text(SLIDER + gate)
+    done = invoke("run", "gate.yaml", "wrong.yaml", "--no-plots", "--junit", "ci/report.xml")
+    assert done.exit_code == 2
+    report = JUnitXml.fromfile(str(studies / "ci/report.xml"))
+    assert (report.tests, report.failures, report.errors) == (4, 1, 1)
+    names = [case.name for suite in report for case in suite]
+    assert "kinematics" in names
+    assert any("kinematics.theta at most 80" in name for name in names)
+
+
+@pytest.mark.parametrize("spoil", ["nothing", "file", "study", "seed", "override", "plots"])
+def test_resume_computes_again_only_what_is_not_whole_and_the_same(studies, analysis, invoke, spoil):
+    computed = []
+    analysis(lambda study, **options: computed.append(study) or answer())
+    arguments = ["run", "slider.yaml", "--no-plots", "--resume"]
+    invoke(*arguments)
+    if spoil == "file":
+        (studies / "results/slider/kinematics/motion.csv").write_text("theta\n")
+    elif spoil == "study":
+        (studies / "slider.yaml").write_text(SLIDER + "# changed\n")
+    elif spoil == "seed":
+        arguments += ["--seed", "7"]
+    elif spoil == "override":
+        arguments += ["--set", "mechanism.parameters.r=39"]
+    elif spoil == "plots":
+        arguments.remove("--no-plots")
+    done = invoke(*arguments)
+    assert done.exit_code == 0
+    assert len(computed) == (1 if spoil == "nothing" else 2)
+    assert ("kept" in done.stdout) == (spoil == "nothing")
+
+
+def test_resume_keeps_the_verdict(studies, analysis, invoke):
+    (studies / "slider.yaml").write_text(SLIDER + "requirements: [{result: kinematics.theta, at_most: 80}]\n")
+    assert [invoke("run", "slider.yaml", "--no-plots", "--resume").exit_code for _ in range(2)] == [1, 1]
+
+
+def test_check_says_joints_mobility_and_every_mistake(studies, invoke):
+    done = invoke("check", "slider.yaml")
+    assert done.exit_code == 0
+    assert "mobility: 1" in done.stdout
+    assert "revolute" in done.stdout
+    done = invoke("check", "slider.yaml", "wrong.yaml")
+    assert done.exit_code == 2
+    assert "mobility: 1" in done.stdout
+    assert "wrong.yaml:6:19: mechanism.links.crank" in done.stderr
+    assert not (studies / "results").exists()
+
+
+def test_new_prints_a_study_that_passes_the_check(studies, invoke):
+    text = invoke("new").stdout
+    (studies / "study.yaml").write_text(text)
+    assert invoke("check").exit_code == 0
+    unknown = invoke("new", "two_link_amr")
+    assert unknown.exit_code == 2
+    assert "two_link_arm" in unknown.stderr
+
+
+def test_schema_is_json(invoke):
+    assert "properties" in json.loads(invoke("schema").stdout)

@@ -1,0 +1,105 @@
+"""Drawings of mechanisms: what is in them, where, and the same bytes twice."""
+
+import numpy as np
+import pytest
+from matplotlib.patches import PathPatch
+
+import mechdesign
+from mechdesign.report.figures import style
+from mechdesign.report.figures.mechanism import draw_mechanism, mechanism_figure
+from mechdesign.report.figures.scene import hull, pose
+
+SLIDER = """
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [0, -20]}
+    crank: [O, A, 40]
+    rod: {from: A, to: B, length: 120, points: {P: [60, 15]}}
+    slider: {B: [0, 0]}
+  joints: {guide: {prismatic: [ground, slider], through: G}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 40], B: [110, -20]}
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "slider.yaml"
+    path.write_text(SLIDER)
+    return mechdesign.load(path)
+
+
+def drawn(study):
+    with style.context():
+        figure = mechanism_figure(study)
+        return figure, style.to_png(figure)
+
+
+def test_every_joint_drive_slide_and_link_is_named_in_both_poses(study):
+    figure, _ = drawn(study)
+    assert [axes.get_title(loc="left")[:5] for axes in figure.axes] == ["sketc", "first"]
+    for axes in figure.axes:
+        names = {text.get_text() for text in axes.texts}
+        assert names >= {"O", "A", "B", "P", "theta", "crank", "rod"}
+
+
+def test_names_do_not_overlap(study):
+    figure, _ = drawn(study)
+    for axes in figure.axes:
+        boxes = [text.get_window_extent() for text in axes.texts]
+        for k, box in enumerate(boxes):
+            assert not any(box.overlaps(other) for other in boxes[:k])
+
+
+def test_one_length_is_as_long_in_x_as_in_y(study):
+    figure, _ = drawn(study)
+    for axes in figure.axes:
+        (x0, y0), (x1, y1) = axes.transData.transform([(0, 0), (1, 1)])
+        assert x1 - x0 == pytest.approx(y1 - y0)
+
+
+def test_the_picture_has_the_same_bytes_again_and_no_metadata(study):
+    _, first = drawn(study)
+    _, second = drawn(study)
+    assert first == second
+    assert first[:8] == b"\x89PNG\r\n\x1a\n"
+    assert b"Software" not in first
+
+
+def test_joints_stand_where_the_mechanism_has_them(study):
+    figure = style.new_figure(layout=None)
+    axes = figure.add_subplot()
+    axes.set(xlim=(-60, 180), ylim=(-80, 80))
+    configuration = study.mechanism.plan(("theta",)).solve([np.radians(60.0)])
+    draw_mechanism(axes, study.mechanism, configuration)
+    shown = [patch.get_window_extent() for patch in axes.findobj(PathPatch)]
+    for point in "OAB":
+        place = complex(configuration.point(point))
+        x, y = axes.transData.transform((place.real, place.imag))
+        assert any(abs((box.x0 + box.x1) / 2 - x) < 1 and abs((box.y0 + box.y1) / 2 - y) < 1 for box in shown)
+
+
+def test_a_pose_that_cannot_be_assembled_draws_nothing(study):
+    figure = style.new_figure(layout=None)
+    axes = figure.add_subplot()
+    configuration = study.mechanism.plan(("B.x",)).solve([1000.0])
+    draw_mechanism(axes, study.mechanism, configuration)
+    assert not axes.lines
+    assert not axes.texts
+    assert pose(study.mechanism, configuration) is None
+
+
+def test_user_settings_do_not_reach_the_picture_and_come_back(study):
+    import matplotlib
+
+    _, plain = drawn(study)
+    with matplotlib.rc_context({"lines.linewidth": 9, "axes.facecolor": "red", "font.size": 22}):
+        _, under_settings = drawn(study)
+        assert matplotlib.rcParams["font.size"] == 22
+    assert plain == under_settings
+
+
+def test_hull_of_a_plate_and_of_a_bar():
+    assert set(hull([0, 4, 4 + 4j, 4j, 2 + 2j])) == {0, 4, 4 + 4j, 4j}
+    assert hull([3 + 3j, 1 + 1j, 2 + 2j]) == [1 + 1j, 3 + 3j]
+    assert hull([1j, 1j]) == [1j]

@@ -1,0 +1,91 @@
+"""The gate: the worst row counts."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from mechdesign.errors import StudyError
+from mechdesign.report.requirements import judge
+from mechdesign.results import Column, Result, Table
+
+
+@dataclass(frozen=True)
+class Asked:
+    result: str
+    where: dict = field(default_factory=dict)
+    abs: bool = False
+    at_least: float | None = None
+    at_most: float | None = None
+
+
+def result(**columns):
+    columns = {"theta": [0.0, 90.0, 180.0]} | columns
+    first = Table("motion", tuple(Column(name, np.asarray(values)) for name, values in columns.items()))
+    second = Table("extremes", (Column("output", np.array(["B.x"])), Column("range", np.array([80.0]))))
+    return Result("kinematics", {"motion": first, "extremes": second})
+
+
+def verdict(asked, **columns):
+    (given,) = judge(result(**columns), [asked])
+    return given
+
+
+def test_the_smallest_row_counts_for_at_least():
+    given = verdict(Asked("kinematics.mu", at_least=40), mu=[50.0, 39.0, 60.0])
+    assert not given.met
+    assert given.worst == 39
+    assert "theta 90" in given.place
+
+
+def test_the_largest_row_counts_for_at_most():
+    assert verdict(Asked("kinematics.mu", at_most=60), mu=[50.0, 39.0, 60.0]).met
+    assert verdict(Asked("kinematics.mu", at_most=59.9), mu=[50.0, 39.0, 60.0]).worst == 60
+
+
+def test_both_bounds_and_the_one_that_fails_is_told():
+    given = verdict(Asked("kinematics.mu", at_least=30, at_most=55), mu=[50.0, 39.0, 60.0])
+    assert (given.met, given.worst) == (False, 60)
+
+
+def test_nan_is_not_met():
+    given = verdict(Asked("kinematics.mu", at_least=0), mu=[50.0, np.nan, 60.0])
+    assert not given.met
+    assert np.isnan(given.worst)
+
+
+def test_absolute_value():
+    assert not verdict(Asked("kinematics.mu", at_least=40), mu=[-50.0, 45.0, 60.0]).met
+    assert verdict(Asked("kinematics.mu", abs=True, at_least=40), mu=[-50.0, 45.0, 60.0]).met
+
+
+@pytest.mark.parametrize(
+    ("where", "worst"), [({"theta": 90}, 39.0), ({"kind": "b"}, 60.0), ({"kind": "b", "theta": 180}, 60.0)]
+)
+def test_where_chooses_rows_by_number_and_word(where, worst):
+    given = verdict(Asked("kinematics.mu", where=where, at_least=1), mu=[50.0, 39.0, 60.0], kind=["a", "a", "b"])
+    assert given.worst == worst
+
+
+def test_no_row_is_not_met():
+    assert not verdict(Asked("kinematics.mu", where={"theta": 91}, at_least=1), mu=[50.0, 39.0, 60.0]).met
+
+
+def test_columns_of_other_tables_and_names_with_dots():
+    assert verdict(Asked("kinematics.range", at_least=80)).met
+    assert verdict(Asked("kinematics.extremes.range", at_least=80)).met
+    assert verdict(Asked("kinematics.B.x", at_least=1), **{"B.x": [1.0, 2.0, 3.0]}).met
+
+
+def test_other_commands_are_left_alone():
+    assert judge(result(), [Asked("stiffness.k_y", at_least=1)]) == ()
+
+
+def test_unknown_columns_are_mistakes_of_the_study_all_in_one_go():
+    asked = [Asked("kinematics.muu", at_least=1), Asked("kinematics.output", at_least=1)]
+    with pytest.raises(StudyError) as caught:
+        judge(result(mu=[1.0, 2.0, 3.0]), asked, "study.yaml")
+    lines = str(caught.value).splitlines()
+    assert "study.yaml: requirements.0: " in lines[0]
+    assert "did you mean 'mu'" in lines[0]
+    assert "words" in lines[1]
