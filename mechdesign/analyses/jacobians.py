@@ -1,0 +1,57 @@
+"""Scalars of a Jacobian: determinant and inverse condition, with a length where lengths and angles mix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.mechanism.coordinates import Coordinate
+
+Array = NDArray[np.float64]
+
+
+def mixes(rows: Sequence[Coordinate], columns: Sequence[Coordinate]) -> bool:
+    """Whether a Jacobian's rows, or its columns, have different units, so that its norm means nothing."""
+    return len({c.quantity for c in rows}) > 1 or len({c.quantity for c in columns}) > 1
+
+
+def homogeneous(jacobian: Array, rows: Sequence[Coordinate], columns: Sequence[Coordinate], length: float) -> Array:
+    """The Jacobian with angles turned into lengths by a characteristic length.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (..., rows, columns)
+    length : float
+        Arc of one radian.
+    """
+    up = np.array([length if c.quantity == "angle" else 1.0 for c in rows])
+    down = np.array([length if c.quantity == "angle" else 1.0 for c in columns])
+    return jacobian * up[:, None] / down
+
+
+def determinant(jacobian: Array) -> Array:
+    """Determinant; nan where an entry is."""
+    if jacobian.shape[-1] == 2:
+        return jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+    finite = np.isfinite(jacobian).all(axis=(-1, -2))
+    safe = np.where(finite[..., None, None], jacobian, 0.0)
+    return np.where(finite, np.linalg.det(safe), np.nan)
+
+
+def inverse_condition(jacobian: Array) -> Array:
+    """Smallest over largest singular value, 0 at a singularity; nan where an entry is.
+
+    For 2 x 2 without a decomposition: kappa + 1/kappa = ||J||_F^2 / |det J| [S1, eq. 8].
+    """
+    if jacobian.shape[-1] == 2:
+        squares = np.einsum("...ij,...ij->...", jacobian, jacobian)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            half = squares / (2 * np.abs(determinant(jacobian)))
+            return 1 / (half + np.sqrt(np.maximum(half * half - 1, 0.0)))
+    finite = np.isfinite(jacobian).all(axis=(-1, -2))
+    safe = np.where(finite[..., None, None], jacobian, 0.0)
+    values = np.linalg.svd(safe, compute_uv=False)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(finite, values[..., -1] / values[..., 0], np.nan)

@@ -1,0 +1,132 @@
+"""The poses of a question, solved: shared by kinematics, reliability and stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.mechanism import Configuration, Mechanism, Reason
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.results import Column
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedPoses:
+    """Poses that give the same coordinates, solved for the nominal dimensions.
+
+    Parameters
+    ----------
+    rows : ndarray of int
+        Place of each pose in the study's order.
+    given : tuple of str
+        The coordinates given.
+    drives : sequence of ndarray
+        Value of each drive (radians and lengths): as given, or from the inverse problem.
+    """
+
+    rows: NDArray[np.intp]
+    given: tuple[str, ...]
+    configuration: Configuration
+    drives: tuple[Value, ...]
+
+
+def radians(study: Study, coordinate: Coordinate, value: Value) -> Value:
+    """A value in the study's units as the core takes it."""
+    return value * study.units.angle_factor if coordinate.quantity == "angle" else value
+
+
+def in_study_units(study: Study, coordinate: Coordinate, value: Value) -> Value:
+    """A value of the core in the study's units."""
+    return value / study.units.angle_factor if coordinate.quantity == "angle" else value
+
+
+def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
+    """Solve each group of poses with the plan of its coordinates.
+
+    Raises
+    ------
+    MechanismError
+        Where the coordinates of a pose do not determine the mechanism.
+    """
+    mechanism: Mechanism = study.mechanism
+    for group in poses.groups:
+        plan = mechanism.plan(group.names)
+        given = [radians(study, c, v) for c, v in zip(plan.structure.given, group.columns(), strict=True)]
+        configuration = plan.solve(given)
+        known = dict(zip(group.names, given, strict=True))
+        drives = tuple(
+            np.broadcast_to(known.get(name, configuration.value(mechanism.coordinate(name))), configuration.shape)
+            for name in mechanism.drives
+        )
+        yield SolvedPoses(group.rows, group.names, configuration, drives)
+
+
+def pose_columns(study: Study, poses: Poses) -> list[Column]:
+    """The coordinates that the study gives, as columns."""
+    columns = []
+    for name, values in poses.values.items():
+        quantity = study.mechanism.quantity(name)
+        columns.append(Column(name, values, study.units.label(quantity), "given"))
+    return columns
+
+
+def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tuple[list[str], str]:
+    """Warnings for poses that failed, and the message where that is an error (exit code 3).
+
+    Parameters
+    ----------
+    reason : int8 array, shape (poses,)
+        See `mechdesign.mechanism.Reason`.
+
+    Raises
+    ------
+    AssemblyError
+        If every pose failed.
+    """
+    bad = np.flatnonzero(reason)
+    if not len(bad):
+        return [], ""
+    counts = [f"{np.count_nonzero(reason == kind)} {kind.text}" for kind in Reason if kind and (reason == kind).any()]
+    told = f"{len(bad)} of {poses.count} poses are not valid ({', '.join(counts)})"
+    named = [f"{pose_in_words(study, poses, int(row))}: {Reason(int(reason[row])).text}" for row in bad[:5]]
+    if len(bad) == poses.count:
+        raise AssemblyError(f"no pose is valid; {'; '.join(named)}" + ("; ..." if len(bad) > len(named) else ""))
+    if poses.listed:
+        return [told], f"pose {'; pose '.join(named)}"
+    return [f"{told}; the first: {named[0]}"], ""
+
+
+def pose_in_words(study: Study, poses: Poses, row: int) -> str:
+    """``theta1 = 30 deg, theta2 = 60 deg`` for the pose of a row."""
+    parts = []
+    for name, values in poses.values.items():
+        if np.isfinite(values[row]):
+            unit = study.units.label(study.mechanism.quantity(name))
+            parts.append(f"{name} = {values[row]:g} {unit}".rstrip())
+    return ", ".join(parts)
+
+
+def expand_outputs(study: Study, names: tuple[str, ...]) -> list[Coordinate]:
+    """Outputs as coordinates, a point as its x and y.
+
+    Raises
+    ------
+    StudyError
+        For a name that is neither.
+    """
+    mechanism = study.mechanism
+    found = []
+    for name in names:
+        parts = [f"{name}.x", f"{name}.y"] if name in mechanism.points else [name]
+        found += [mechanism.coordinate(part) for part in parts]
+    doubles = {c.name for c in found if sum(d.name == c.name for d in found) > 1}
+    if doubles:
+        raise StudyError(f"outputs: {', '.join(sorted(doubles))} listed twice")
+    return found
