@@ -295,10 +295,12 @@ class _Checker:
 
     def stiffness(self, section: StiffnessSection) -> StiffnessSection:
         root: Path = ("stiffness",)
-        if self.known(section.at, self.names.owners, "point", (*root, "at")) and section.link is not None:
+        right = self.known(section.at, self.names.owners, "point", (*root, "at"))
+        if section.link is not None and self.known(section.link, self.names.moving, "moving link", (*root, "link")):
             points = self.names.points_of(section.link)
-            if self.known(section.link, self.names.moving, "moving link", (*root, "link")) and section.at not in points:
-                self.known(section.at, points, f"point of link {section.link!r} named", (*root, "at"))
+            if right and section.at not in points:
+                message = f"link {section.link!r} has no point {section.at!r}; it has {', '.join(points)}"
+                self.reporter.report((*root, "at"), message)
         for link, profile in section.elastic.items():
             path: Path = (*root, "elastic", link)
             self.known(link, self.names.moving, "moving link", path, at_key=True)

@@ -13,6 +13,9 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from mechdesign.study.numbers import (
+    NAME_FORM,
+    NAMES_FORM,
+    NUMBER_FORM,
     AngleValue,
     AnyName,
     AnyValue,
@@ -22,11 +25,13 @@ from mechdesign.study.numbers import (
     LengthValue,
     LinkName,
     MeasureName,
+    OrShort,
     PointName,
     PositiveLengthValue,
     Unavailable,
     Value,
     failure,
+    or_short,
     shown,
     suggestion,
 )
@@ -77,7 +82,7 @@ class Link(Model):
     to: PointName | None = None
     length: PositiveLengthValue | None = None
     telescopic: bool = False
-    points: Annotated[dict[PointName, Point | None], BeforeValidator(names_to_mapping)] = {}
+    points: Annotated[dict[PointName, Point | None], BeforeValidator(names_to_mapping), OrShort((NAMES_FORM,))] = {}
 
     @model_validator(mode="before")
     @classmethod
@@ -120,22 +125,14 @@ class Link(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        long_form = handler.resolve_ref_schema(handler(schema))
-        number = {"type": ["number", "string"]}
-        place = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
-        points = {"anyOf": [{"type": "object", "additionalProperties": {"anyOf": [place, {"type": "null"}]}}, _NAMES]}
-        long_form.get("properties", {})["points"] = points
-        short = {"type": "array", "prefixItems": [_NAME, _NAME, number], "minItems": 2, "maxItems": 3}
+        place = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
+        short = {"type": "array", "prefixItems": [NAME_FORM, NAME_FORM, NUMBER_FORM], "minItems": 2, "maxItems": 3}
         own_frame = {
             "type": "object",
             "additionalProperties": {"anyOf": [place, {"type": "null"}]},
             "not": {"anyOf": [{"required": [key]} for key in LINK_KEYS]},
         }
-        return {"anyOf": [short, dict(long_form), own_frame]}
-
-
-_NAME: dict[str, Any] = {"type": "string"}
-_NAMES: dict[str, Any] = {"type": "array", "items": {"type": "string"}}
+        return or_short(schema, handler, short, own_frame)
 
 
 def _through(raw: Any) -> Any:
@@ -152,9 +149,7 @@ class Joint(Model):
     prismatic: TwoLinks | None = None
     slot: LinkName | None = None
     fixed: TwoLinks | None = None
-    through: Annotated[tuple[PointName, ...], BeforeValidator(_through)] | None = Field(
-        None, json_schema_extra={"anyOf": [_NAME, _NAMES]}
-    )
+    through: Annotated[tuple[PointName, ...], BeforeValidator(_through), OrShort((NAME_FORM,))] | None = None
     direction: AngleValue | None = None
     point: PointName | None = None
     angle: AngleValue | None = None
@@ -211,7 +206,7 @@ class Measure(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [dict(handler.resolve_ref_schema(handler(schema))), {"type": "string"}]}
+        return or_short(schema, handler, NAME_FORM)
 
 
 class Limit(Model):
@@ -240,9 +235,7 @@ class MechanismSection(Model):
     parameters: dict[str, AnyValue] = {}
     links: dict[LinkName, Link]
     joints: dict[JointName, Joint] = {}
-    drives: Annotated[dict[AnyName, Drive | None], BeforeValidator(names_to_mapping)] = Field(
-        {}, json_schema_extra={"anyOf": [_NAMES, {"type": "object", "additionalProperties": {"$ref": "#/$defs/Drive"}}]}
-    )
+    drives: Annotated[dict[AnyName, Drive | None], BeforeValidator(names_to_mapping), OrShort((NAMES_FORM,))] = {}
     branch: Annotated[str, Choice(("side", "follow"))] = "side"
     sketch: dict[PointName, Point] = {}
     measures: dict[MeasureName, Measure] = {}

@@ -245,6 +245,21 @@ class NameOf:
         return raw
 
 
+@dataclass(frozen=True, eq=False)
+class OrShort:
+    """Annotation that adds short forms, which a validator brings to the long one, to the JSON Schema."""
+
+    forms: tuple[dict[str, Any], ...]
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [handler(schema), *self.forms]}
+
+
+def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *forms: dict[str, Any]) -> JsonSchemaValue:
+    """JSON Schema of a model that may also be written in short forms."""
+    return {"anyOf": [dict(handler.resolve_ref_schema(handler(schema))), *forms]}
+
+
 @dataclass(frozen=True)
 class Choice:
     """Annotation of a word out of a list; `later` are words of the format that this version does not do yet."""
@@ -287,6 +302,10 @@ def check_parameter_name(name: str) -> str | None:
         return "a parameter's name is letters, digits and underscores, with a letter first"
     return f"{name!r} is a word of the expression language; choose another name" if name in RESERVED else None
 
+
+NAME_FORM: dict[str, Any] = {"type": "string"}
+NAMES_FORM: dict[str, Any] = {"type": "array", "items": NAME_FORM}
+NUMBER_FORM: dict[str, Any] = {"type": ["number", "string"]}
 
 Unavailable = Annotated[None, _Unavailable()]
 Number = Annotated[float, Reader()]

@@ -38,6 +38,9 @@ def _apply(document: Document, text: str) -> None:
     key: Any = path[-1]
     if isinstance(holder, list) and key == len(holder):
         holder.append(parsed.data)
+    elif isinstance(holder, dict) and parsed.data is None:
+        # Nothing takes the entry away: `--set kinematics.sweep=` makes room for other poses.
+        holder.pop(key, None)
     else:
         holder[key] = parsed.data
     mark = Mark(label)

@@ -9,7 +9,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from mechdesign.study.models import Model
-from mechdesign.study.numbers import Context, CoordinateName, Number, Whole, failure, read_number
+from mechdesign.study.numbers import NUMBER_FORM, Context, CoordinateName, Number, Whole, failure, or_short, read_number
 
 
 class Sweep(Model):
@@ -35,7 +35,7 @@ class Sweep(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [dict(handler.resolve_ref_schema(handler(schema))), {"type": ["number", "string"]}]}
+        return or_short(schema, handler, NUMBER_FORM)
 
 
 class _PathValues:

@@ -14,6 +14,8 @@ from pydantic_core import CoreSchema
 
 from mechdesign.study.models import MechanismSection, Model, UnitsSection
 from mechdesign.study.numbers import (
+    NAME_FORM,
+    NUMBER_FORM,
     Angle,
     AnyName,
     Bound,
@@ -28,6 +30,7 @@ from mechdesign.study.numbers import (
     NonNegativeAngle,
     NonNegativeLength,
     Number,
+    OrShort,
     PointName,
     Positive,
     PositiveArea,
@@ -39,6 +42,7 @@ from mechdesign.study.numbers import (
     Unavailable,
     Whole,
     failure,
+    or_short,
     read_number,
     suggestion,
 )
@@ -58,7 +62,11 @@ def _as_list(raw: Any) -> list[Any]:
     return raw if isinstance(raw, list) else [] if raw is None else [raw]
 
 
-CoordinateNames = Annotated[tuple[CoordinateName, ...], BeforeValidator(_one_or_many)]
+CoordinateNames = Annotated[tuple[CoordinateName, ...], BeforeValidator(_one_or_many), OrShort((NAME_FORM,))]
+
+
+Numbers = Annotated[tuple[Number, ...], BeforeValidator(_as_list), OrShort((NUMBER_FORM,))]
+Weights = Annotated[tuple[Pure, ...], OrShort(({"type": "object", "additionalProperties": NUMBER_FORM},))]
 
 
 class Load(Model):
@@ -115,7 +123,9 @@ class WorkspaceSection(Model):
     """Where can it work?"""
 
     point: PointName
-    at: dict[CoordinateName, Annotated[tuple[Number, ...], BeforeValidator(_as_list)]] = Field(default_factory=dict)
+    at: dict[CoordinateName, Annotated[tuple[Number, ...], BeforeValidator(_as_list), OrShort((NUMBER_FORM,))]] = Field(
+        default_factory=dict
+    )
     scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
     integrate: Integrate = Integrate()
     margin: NonNegativeAngle = 0.0
@@ -160,7 +170,10 @@ class OptimizeSection(Model):
     variables: dict[CoordinateName, Variable]
     maximize: CoordinateNames = ()
     minimize: CoordinateNames = ()
-    weights: tuple[tuple[Pure, ...], ...] | None = None
+    weights: (
+        tuple[Annotated[tuple[Pure, ...], OrShort(({"type": "object", "additionalProperties": NUMBER_FORM},))], ...]
+        | None
+    ) = None
     subject_to: tuple[Condition, ...] = ()
     method: Annotated[str, Choice(("grid",), later=("search", "pareto"))] = "grid"
 
@@ -221,7 +234,7 @@ class Dimension(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [dict(handler.resolve_ref_schema(handler(schema))), {"type": ["number", "string"]}]}
+        return or_short(schema, handler, NUMBER_FORM)
 
 
 class PinModel(Model):
@@ -237,7 +250,7 @@ class PinModel(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [dict(handler.resolve_ref_schema(handler(schema))), {"enum": list(PIN_MODELS)}]}
+        return or_short(schema, handler, {"enum": list(PIN_MODELS)})
 
 
 class Clearance(Model):
@@ -295,7 +308,7 @@ class ErrorLimit(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [dict(handler.resolve_ref_schema(handler(schema))), {"type": ["number", "string"]}]}
+        return or_short(schema, handler, NUMBER_FORM)
 
 
 class ReliabilitySection(PoseSection):
@@ -315,6 +328,7 @@ class ReliabilitySection(PoseSection):
             ...,
         ],
         BeforeValidator(_one_or_many),
+        OrShort(({"enum": list(METHODS)},)),
     ] = METHODS
     samples: Annotated[int, Whole(2, 10**15)] = 40_000
     precision: Unavailable = None
