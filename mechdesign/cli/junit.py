@@ -21,8 +21,8 @@ def to_xml(answers: Sequence[Answer]) -> str:
         for given in group:
             suite.add_testcases(_cases(given))
         report.add_testsuite(suite)
-    report.update_statistics()
-    text = report.tostring()
+    report.update_statistics()  # type: ignore[no-untyped-call]
+    text = report.tostring()  # type: ignore[no-untyped-call]
     return text.decode() if isinstance(text, bytes) else str(text)
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _ROWS = 24
 _DIGITS = 6
+_NAMES = 6
 _PATIENCE = 1.0  # seconds before a bar appears
 
 
@@ -78,7 +79,8 @@ def _show_to_people(table: Table, rest: str) -> None:
     if len(table) > _ROWS:
         left.append(f"{len(table) - _ROWS} more rows")
     if shown < len(columns):
-        left.append(f"{len(columns) - shown} more columns ({', '.join(table.names[shown:])})")
+        names = [*table.names[shown : shown + _NAMES], *(["..."] if len(columns) > shown + _NAMES else [])]
+        left.append(f"{len(columns) - shown} more columns ({', '.join(names)})")
     if left:
         console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest else ''}"), style="dim")
 

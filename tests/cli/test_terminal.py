@@ -1,0 +1,111 @@
+"""What a person at a terminal sees, and what Ctrl-C does, in a process of its own on a pseudo-terminal."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from .conftest import SLIDER
+
+pty = pytest.importorskip("pty")
+
+# The analysis takes its time in steps, tells how far it is, and gives a table that no terminal has room for.
+PROGRAM = """
+import sys, time
+from types import ModuleType
+import numpy as np
+from mechdesign.cli.app import main
+from mechdesign.results import Column, Result, Table
+
+def kinematics(study, *, seed, jobs, progress):
+    progress.start(10, "poses")
+    for _ in range(10):
+        time.sleep({pause})
+        progress.update(1)
+    columns = [Column(f"point_{{k}}.x", np.arange(100) / 7, "mm") for k in range(20)]
+    return Result("kinematics", {{"motion": Table("motion", tuple(columns))}})
+
+module = ModuleType("mechdesign.analyses.kinematics")
+module.kinematics = kinematics
+sys.modules[module.__name__] = module
+sys.argv = ["mechdesign", "kinematics", "slider.yaml", "--no-plots", *sys.argv[1:]]
+main()
+"""
+
+
+def at_terminal(folder, pause, *arguments, interrupt_after=None):
+    """Run PROGRAM on a terminal of 80 columns; returns its exit code and everything it showed."""
+    (folder / "slider.yaml").write_text(SLIDER)
+    ours, theirs = pty.openpty()
+    environment = os.environ | {"COLUMNS": "80", "LINES": "40", "TERM": "xterm"}
+    command = [sys.executable, "-c", PROGRAM.format(pause=pause), *arguments]
+    process = subprocess.Popen(command, cwd=folder, stdout=theirs, stderr=theirs, stdin=theirs, env=environment)
+    os.close(theirs)
+    shown = b""
+    while True:
+        try:
+            part = os.read(ours, 65536)
+        except OSError:  # Linux says so when the other end is closed.
+            break
+        if not part:
+            break
+        shown += part
+        if interrupt_after is not None and interrupt_after in shown:
+            process.send_signal(signal.SIGINT)
+            interrupt_after = None
+    os.close(ours)
+    return process.wait(), re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
+
+
+def test_a_table_with_what_there_is_room_for_and_where_the_rest_is(tmp_path):
+    code, shown = at_terminal(tmp_path, 0)
+    assert code == 0
+    lines = [line.rstrip() for line in shown.splitlines()]
+    assert lines[0].split()[0] == "point_0.x"
+    assert lines[1].split()[0] == "[mm]"
+    assert max(map(len, lines[:26])) <= 80
+    assert "... 76 more rows and" in shown
+    assert "motion.csv" in shown
+    assert "0.142857" in shown
+    assert "0.142857142857" not in shown
+
+
+def test_no_bar_for_what_is_quick_and_one_for_what_is_not(tmp_path):
+    _, quick = at_terminal(tmp_path, 0)
+    assert "%" not in quick
+    code, slow = at_terminal(tmp_path, 0.15)
+    assert code == 0
+    assert "poses" in slow
+    assert "%" in slow
+    _, quiet = at_terminal(tmp_path, 0.15, "--quiet")
+    assert "%" not in quiet
+
+
+def test_interrupt_is_130_and_writes_nothing(tmp_path):
+    begun = time.monotonic()
+    code, shown = at_terminal(tmp_path, 1.5, interrupt_after=b"%")
+    assert code == 130
+    assert time.monotonic() - begun < 10
+    assert "interrupted" in shown
+    assert "Traceback" not in shown
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_reader_that_has_had_enough_is_no_error(tmp_path):
+    (tmp_path / "slider.yaml").write_text(SLIDER)
+    source = PROGRAM.format(pause=0).replace("np.arange(100)", "np.arange(20000)")
+    process = subprocess.Popen(
+        [sys.executable, "-c", source], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.stderr is not None
+    talk = process.stderr.read().decode()
+    process.stderr.close()
+    assert process.wait() == 0, talk
+    assert "Error" not in talk
