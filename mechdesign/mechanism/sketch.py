@@ -43,12 +43,9 @@ def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch
     changed = True
     while changed:
         changed = False
-        # A link's direction is the best fit to all of its vectors that are drawn.
         for frame in range(1, graph.classes):
             if rotations[frame] is None:
-                fit = sum((_drawn(nodes, vectors.w, vectors.d, k, e.tail, e.head, e.slide is not None)
-                           for k, e in enumerate(graph.edges) if e.frame == frame
-                           and (e.slide is None or e.slide in graph.telescopic)), 0j)  # fmt: skip
+                fit = _fit(graph, geometry, nodes, frame)
                 if abs(fit) > 0:
                     rotations[frame] = fit / abs(fit)
                     changed = True
@@ -65,11 +62,25 @@ def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch
     return Sketch(nodes, rotations)
 
 
-def _drawn(
-    nodes: Sequence[complex | None], w: Sequence[complex], d: Sequence[complex], k: int, tail: int, head: int, leg: bool
-) -> complex:
-    a, b = nodes[tail], nodes[head]
-    return 0j if a is None or b is None else (b - a) * np.conj(d[k] if leg else w[k])
+def _fit(graph: Graph, geometry: Geometry, nodes: Sequence[complex | None], frame: int) -> complex:
+    """Direction of a class as the least-squares fit to all points drawn on its links; 0 where fewer than two are."""
+    total = 0j
+    for body, (its_frame, _) in graph.bodies.items():
+        if its_frame != frame:
+            continue
+        pairs = [
+            (complex(geometry.local(body, point, {})) * geometry.nominal.offsets[body], place)
+            for owner, point in graph.points
+            if owner == body and (place := nodes[graph.node(point)]) is not None
+        ]
+        if len(pairs) > 1:
+            middle = [sum(part, 0j) / len(pairs) for part in zip(*pairs, strict=True)]
+            total += sum(((place - middle[1]) * (local - middle[0]).conjugate() for local, place in pairs), 0j)
+    for k, edge in enumerate(graph.edges):
+        tail, head = nodes[edge.tail], nodes[edge.head]
+        if edge.frame == frame and edge.slide in graph.telescopic and tail is not None and head is not None:
+            total += (head - tail) * complex(geometry.nominal.d[k]).conjugate()
+    return total
 
 
 def _span(graph: Graph, sketch: Sketch, edges: Sequence[tuple[int, int]], structure: Structure) -> complex:

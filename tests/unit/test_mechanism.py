@@ -1,0 +1,212 @@
+"""The compiled core: groups, assembly modes, inverse problems, errors that a designer understands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+from mechdesign.errors import AssemblyError, MechanismError, StudyError
+from mechdesign.mechanism import Mechanism, Reason
+
+FOUR_BAR = """
+mechanism:
+  links: {ground: {O: [0, 0], D: [4, 0]}, crank: [O, A, 1], rod: [A, B, 3.5], rocker: [D, B, 3]}
+  drives: [crank]
+  sketch: {A: [0.5, 0.9], B: [3.3, 2.9]}
+"""
+
+PLATFORM = """
+units: {length: m}
+mechanism:
+  links:
+    ground: {A1: [-0.6, 0], A2: [0.6, 0], A3: [0.3, -0.2]}
+    l1: {from: A1, to: B1, telescopic: true}
+    l2: {from: A2, to: B2, telescopic: true}
+    l3: {from: A3, to: B3, telescopic: true}
+    platform: {P: [0, 0], B1: [-0.2, 0], B2: [0.2, 0], B3: [0.25, 0.15]}
+  drives: [l1, l2, l3]
+  sketch: {B1: [-0.2, 1], B2: [0.2, 1], B3: [0.25, 1.15]}
+"""
+
+
+def forms(mechanism: Mechanism, *given: str) -> list[str]:
+    groups = mechanism.plan(given or mechanism.drives).structure.groups
+    return [group.form for group in groups if group.form != "place"]
+
+
+def test_four_bar_agrees_with_its_textbook_solution() -> None:
+    # Lengths 1, 3.5, 3, 4 (crank, coupler, rocker, ground) at 60 deg, open.
+    pose = study_of(FOUR_BAR).mechanism.solve({"crank": 60})
+    assert pose["rod.angle"] == pytest.approx(36.022723, abs=5e-7)
+    assert pose["rocker.angle"] == pytest.approx(102.890327, abs=5e-7)
+    assert pose["B.x"] == pytest.approx(3.330743, abs=5e-7)
+    assert pose["B.y"] == pytest.approx(2.924397, abs=5e-7)
+
+
+def test_the_sketch_chooses_the_assembly_mode() -> None:
+    open_, crossed = study_of(FOUR_BAR), study_of(FOUR_BAR.replace("[3.3, 2.9]", "[3.3, -2.0]"))
+    assert open_.mechanism.solve({"crank": 60})["B.y"] > 0 > crossed.mechanism.solve({"crank": 60})["B.y"]
+
+
+def test_each_mechanism_splits_into_the_groups_of_its_question() -> None:
+    five_bar = study_of("""
+mechanism:
+  links:
+    ground: {B1: [1, 0], B2: [-1, 0]}
+    lower_1: [B1, E1, 1]
+    upper_1: [E1, C, 2]
+    lower_2: [B2, E2, 1]
+    upper_2: [E2, C, 2]
+  drives: [lower_1, lower_2]
+  sketch: {E1: [1.7, 0.7], E2: [-1.7, 0.7], C: [0, 1.7]}
+""").mechanism
+    assert forms(five_bar) == ["two angles"]
+    assert forms(five_bar, "C.x", "C.y") == ["two angles", "two angles"]
+    platform = study_of(PLATFORM).mechanism
+    assert forms(platform) == ["newton"]
+    # Each leg of a platform whose pose is given is found alone, as a vector's length and direction.
+    assert forms(platform, "P.x", "P.y", "platform.angle") == ["angle and turning slide"] * 3
+
+
+@pytest.mark.parametrize(
+    ("links", "joints", "sketch", "form"),
+    [
+        ("rod: [A, B, 3], slider: {B: [0, 0]}", "g: {prismatic: [ground, slider], through: D}", "B: [3, 0]",
+         "angle and fixed slide"),
+        ("rod: [A, B, 3]", "g: {slot: ground, through: D, point: B}", "B: [3, 0]", "angle and fixed slide"),
+        ("arm: {D: [0, 0]}, block: {A: [0, 0]}", "g: {prismatic: [arm, block], through: D}", "D: [4, 0]",
+         "angle and turning slide"),
+        ("arm: {D: [0, 0], Q: [5, 0]}", "g: {slot: arm, through: D, point: A}", "Q: [-1, 0]",
+         "angle and turning slide"),
+        ("yoke: {Y: [0, 0]}", "h: {prismatic: [ground, yoke], through: D, point: Y}, "
+         "g: {slot: yoke, through: Y, direction: 90, point: A}", "Y: [1, 0]", "two slides"),
+    ],
+)  # fmt: skip
+def test_every_dyad_has_a_closed_form(links: str, joints: str, sketch: str, form: str) -> None:
+    mechanism = study_of(f"""
+mechanism:
+  links: {{ground: {{O: [0, 0], D: [4, 0]}}, crank: [O, A, 1], {links}}}
+  joints: {{{joints}}}
+  drives: [crank]
+  sketch: {{A: [0.6, 0.8], {sketch}}}
+""").mechanism
+    assert forms(mechanism) == [form]
+    pose = mechanism.solve({"crank": np.linspace(0, 350, 36)})
+    assert pose.valid.all()
+    assert np.hypot(pose["A.x"], pose["A.y"]) == pytest.approx(1, abs=1e-14)
+
+
+def test_a_scotch_yoke_moves_as_a_cosine() -> None:
+    mechanism = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0], D: [0, 0.5]}, crank: [O, A, 2], yoke: {Y: [0, 0]}}
+  joints:
+    guide: {prismatic: [ground, yoke], through: D, point: Y}
+    slot: {slot: yoke, through: Y, direction: 90, point: A}
+  drives: [crank]
+  sketch: {A: [1, 1], Y: [1, 0.5]}
+""").mechanism
+    angle = np.arange(0.0, 360.0, 7.0)
+    assert mechanism.solve({"crank": angle})["Y.x"] == pytest.approx(2 * np.cos(np.radians(angle)), abs=1e-13)
+
+
+def test_newton_group_and_inverse_problem_agree_on_a_platform() -> None:
+    mechanism = study_of(PLATFORM).mechanism
+    rng = np.random.default_rng(5)
+    x, y, angle = rng.uniform(-0.3, 0.3, 50), rng.uniform(0.8, 1.3, 50), rng.uniform(-20, 20, 50)
+    inverse = mechanism.solve({"P.x": x, "P.y": y, "platform.angle": angle})
+    forward = mechanism.solve({name: inverse[name] for name in ("l1", "l2", "l3")})
+    assert forward.valid.all()
+    for name, value in (("P.x", x), ("P.y", y), ("platform.angle", angle)):
+        assert forward[name] == pytest.approx(value, abs=1e-11)
+
+
+def test_what_newton_cannot_reach_is_not_passed_off_as_the_asked_assembly() -> None:
+    mechanism = study_of(PLATFORM).mechanism
+    pose = mechanism.solve({"l1": [1.0, 0.1], "l2": [1.0, 3.0], "l3": [1.2, 0.1]})
+    assert list(pose.valid) == [True, False]
+    assert np.isnan(pose["P.x"][1])
+
+
+def test_relative_drive_turns_with_the_link_it_is_mounted_on() -> None:
+    text = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 10], forearm: [E, P, 8]}
+  drives: {shoulder: {angle: upper}, elbow: {angle: forearm, from: upper}}
+"""
+    pose = study_of(text).mechanism.solve({"shoulder": 30, "elbow": 45})
+    expected = 10 * np.exp(1j * np.radians(30)) + 8 * np.exp(1j * np.radians(75))
+    assert pose["P.x"] + 1j * pose["P.y"] == pytest.approx(expected, abs=1e-13)
+
+
+def test_clamped_links_turn_as_one() -> None:
+    mechanism = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, a: [O, E, 2], b: [E, P, 1]}
+  joints: {weld: {fixed: [a, b], point: E, angle: 90}}
+  drives: [a]
+  sketch: {E: [2, 0], P: [2, 1]}
+""").mechanism
+    pose = mechanism.solve({"a": 90})
+    assert (pose["P.x"], pose["P.y"]) == pytest.approx((-1.0, 2.0), abs=1e-14)
+
+
+def test_pin_offsets_move_a_point_in_its_links_frame() -> None:
+    mechanism = study_of(FOUR_BAR).mechanism
+    configuration = mechanism.forward.solve([np.pi / 2], {"crank.A.dx": 0.1, "crank.A.dy": 0.02})
+    assert configuration.point("A") == pytest.approx(-0.02 + 1.1j, abs=1e-15)
+    changed = study_of(FOUR_BAR.replace("A, 1]", "A, 1.1]")).mechanism.solve({"crank": 90})
+    moved = mechanism.forward.solve([np.pi / 2], {"crank.A.dx": 0.1})
+    assert moved.point("B") == pytest.approx(changed["B.x"] + 1j * changed["B.y"], abs=1e-14)
+
+
+def test_a_pose_out_of_reach_raises_alone_and_is_nan_in_a_batch() -> None:
+    mechanism = study_of(FOUR_BAR.replace("crank: [O, A, 1]", "crank: [O, A, 3]")).mechanism
+    batch = mechanism.solve({"crank": [60.0, 180.0]})
+    assert list(batch.valid) == [True, False]
+    assert np.isnan(batch["B.x"][1])
+    assert batch["A.x"][0] == pytest.approx(1.5)
+    with pytest.raises(AssemblyError, match="crank = 180"):
+        mechanism.solve({"crank": 180})
+
+
+def test_limits_keep_the_position_and_say_why() -> None:
+    limited = FOUR_BAR + "  limits: [{angle: [rod, rocker], min: 60, max: 90}]\n"
+    configuration = study_of(limited).mechanism.solve({"crank": np.arange(0, 360, 5)}).configuration
+    outside = configuration.reason == Reason.LIMIT
+    assert outside.any()
+    assert not outside.all()
+    assert np.isfinite(configuration.point("B")).all()
+    turn = configuration.rotation("rocker") * configuration.rotation("rod").conj()
+    held = (np.degrees(np.angle(turn)) - 60) % 360 <= 30
+    assert np.array_equal(held, configuration.valid)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("drives: [crank]", "drives: [crank, rocker]"), "mobility is 1 but 2 drives"),
+        (("drives: [crank]", "drives: []"), "mobility is 1 but 0 drives"),
+        (("A: [0.5, 0.9], ", ""), "'A'"),
+        (("B: [3.3, 2.9]", "B: [2.25, 0.45]"), "within 1 %"),
+        (("rod: [A, B, 3.5]", "rod: [A, B, 0.1]"), "cannot be assembled"),
+    ],
+)
+def test_mistakes_are_named(change: tuple[str, str], message: str) -> None:
+    with pytest.raises(StudyError, match=message):
+        study_of(FOUR_BAR.replace(*change))
+
+
+def test_given_coordinates_must_determine_the_mechanism() -> None:
+    arm = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 10], forearm: [E, P, 8]}
+  drives: {a: {angle: upper}, b: {angle: forearm}}
+""").mechanism
+    with pytest.raises(MechanismError, match="do not determine"):
+        arm.plan(("a", "upper.angle"))
+    with pytest.raises(MechanismError, match="2 coordinates"):
+        arm.plan(("a",))
+    with pytest.raises(MechanismError, match=r"did you mean 'P\.y'"):
+        arm.plan(("P.c", "P.y"))
