@@ -172,12 +172,10 @@ def kinematics(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     columns.append(Column("valid", reason == 0, meaning="1 where the pose is assembled and within its limits"))
     tables = {"motion": Table("motion", tuple(columns), "positions, velocities and accelerations per pose")}
     named = [c for c in columns if c.name in {o.name for o in outputs}]
-    single = poses.names[0] if not poses.listed and len(poses.groups) == 1 and len(poses.grid) == 1 else None
-    swept = None
-    if single is not None:
-        swept = next((name for name in poses.names if np.ptp(poses.values[name]) > 0), poses.names[0])
+    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
+    swept = moving[0] if not poses.listed and len(moving) == 1 else None
     tables["extremes"] = extremes(study, named, poses, swept, reason)
-    if swept is not None and len(poses.groups) == 1:
+    if swept is not None:
         tables["limits"] = limits_of_motion(study, poses.groups[0], swept, reason)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(reason))}
     return Result("kinematics", tables, warnings, counts, failed)
