@@ -94,7 +94,9 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
     with terminal.Bar(quiet=options.quiet) as bar:
         result: Result = getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar)
     try:
-        verdicts = requirements.judge(result, study.requirements, str(study.path or ""))
+        verdicts = requirements.judge(
+            result, study.requirements, file=str(study.path or ""), freedom=study.mechanism.mobility
+        )
     except StudyError:
         # A misspelt requirement should not cost the computation.
         writer.write(directory, study, result, plots=options.plots)

@@ -23,7 +23,8 @@ def to_xml(answers: Sequence[Answer]) -> str:
         report.add_testsuite(suite)
     report.update_statistics()  # type: ignore[no-untyped-call]
     text = report.tostring()  # type: ignore[no-untyped-call]
-    return text.decode() if isinstance(text, bytes) else str(text)
+    body = text.decode() if isinstance(text, bytes) else str(text)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'
 
 
 def _cases(given: Answer) -> list[TestCase]:

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from mechdesign.errors import Problem, StudyError
 from mechdesign.results import Result, Table
 
-_POSE_COLUMNS = 3
-
 
 class Requirement(Protocol):
     """One entry of the study's ``requirements``."""
@@ -71,11 +69,20 @@ def command_of(requirement: Requirement) -> str:
     return requirement.result.partition(".")[0]
 
 
-def judge(result: Result, requirements: Iterable[Requirement], file: str = "") -> tuple[Verdict, ...]:
-    """Verdicts on the requirements that concern this result, in the order of the study (`file`).
+def judge(
+    result: Result, requirements: Iterable[Requirement], *, file: str = "", freedom: int = 1
+) -> tuple[Verdict, ...]:
+    """Verdicts on the requirements that concern this result, in the order of the study.
 
     The worst row counts: the smallest value for `at_least`, the largest for `at_most`; nan is not met, nor is a
     requirement that no row answers.
+
+    Parameters
+    ----------
+    file : str
+        The study's file, for messages.
+    freedom : int
+        How many numbers make a pose: the mobility.
 
     Raises
     ------
@@ -88,7 +95,7 @@ def judge(result: Result, requirements: Iterable[Requirement], file: str = "") -
         if command_of(requirement) != result.command:
             continue
         try:
-            verdicts.append(_judge(result, requirement))
+            verdicts.append(_judge(result, requirement, freedom))
         except _UnknownColumnError as error:
             problems.append(Problem(str(error), f"requirements.{index}", file))
     if problems:
@@ -100,7 +107,7 @@ class _UnknownColumnError(Exception):
     """A requirement asks for a column that the result has not."""
 
 
-def _judge(result: Result, requirement: Requirement) -> Verdict:
+def _judge(result: Result, requirement: Requirement, freedom: int) -> Verdict:
     table, name = _locate(result, requirement.result.partition(".")[2])
     values = _numbers(table, name)
     if requirement.abs:
@@ -124,7 +131,7 @@ def _judge(result: Result, requirement: Requirement) -> Verdict:
         high_met = requirement.at_most is None or values[high] <= requirement.at_most
         met = bool(low_met and high_met)
         worst = high if requirement.at_least is None or not high_met else low
-    return Verdict(words, met, float(values[worst]), _place(table, int(worst), name))
+    return Verdict(words, met, float(values[worst]), _place(table, int(worst), name, freedom))
 
 
 def _locate(result: Result, path: str) -> tuple[Table, str]:
@@ -172,11 +179,15 @@ def _words(requirement: Requirement) -> str:
     return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
 
 
-def _place(table: Table, row: int, name: str) -> str:
-    """The row in words: its first columns, which are the pose."""
-    names = [column for column in table.names if column != name][:_POSE_COLUMNS]
-    parts = []
-    for column in names:
-        value = table[column][row]
-        parts.append(f"{column} {value:.6g}" if isinstance(value, float) else f"{column} {value}")
+def _place(table: Table, row: int, judged: str, freedom: int) -> str:
+    """The row in words: its leading columns, which are the pose and words such as the method."""
+    parts: list[str] = []
+    for column in table.columns:
+        if column.values.dtype.kind in "fiub":
+            freedom -= 1
+            if freedom < 0 or column.name == judged:
+                break
+            parts.append(f"{column.name} {column.values[row]:.6g}")
+        else:
+            parts.append(f"{column.name} {column.values[row]}")
     return ", ".join(parts) or f"row {row + 1}"

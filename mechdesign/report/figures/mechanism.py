@@ -193,7 +193,7 @@ def _compose(
         width, height = _room(columns)
         return min((width - 2 * _PAD) / wide, (height - 2 * _PAD) / tall)
 
-    columns = count if count == 1 or scale(count) >= 0.6 * scale(1) else 1
+    columns = count if count == 1 or scale(count) >= 0.55 * scale(1) else 1
     rows = count // columns
     inches = scale(columns)
     width, _ = _room(columns)
@@ -223,4 +223,4 @@ def _compose(
 
 def _room(columns: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    return (style.WIDTH - 0.15 - _LEFT * columns) / columns, 4.2 if columns > 1 else 3.4
+    return (style.WIDTH - 0.15 - _LEFT * columns) / columns, 4.2 if columns > 1 else 3.0
