@@ -25,7 +25,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
-from mechdesign.study import Study
+from mechdesign.study import Poses, Study
 from mechdesign.study.sections import KinematicsSection
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
@@ -52,12 +52,12 @@ class _Motion:
     section: KinematicsSection
     outputs: list[Coordinate]
     square: bool
-    count: int
+    poses: Poses
     arrays: dict[str, Array] = field(default_factory=dict)
 
     def put(self, name: str, rows: NDArray[np.intp], values: object) -> None:
         if name not in self.arrays:
-            self.arrays[name] = np.full(self.count, np.nan)
+            self.arrays[name] = np.full(self.poses.count, np.nan)
         self.arrays[name][rows] = np.broadcast_to(np.asarray(values, dtype=float), rows.shape)
 
     def fill(self, solved: SolvedPoses) -> None:
@@ -69,7 +69,8 @@ class _Motion:
             coordinate = mechanism.coordinate(name)
             self.put(f"drive {name}", rows, np.where(lost, np.nan, in_study_units(study, coordinate, value)))
             if name in solved.given:
-                self.put(f"drive {name}", rows, in_study_units(study, coordinate, value))
+                # As the study gives it, not there and back through radians; also where the pose fails.
+                self.put(f"drive {name}", rows, self.poses.values[name][rows])
         for output in self.outputs:
             self.put(output.name, rows, in_study_units(study, output, configuration.value(output)))
         if self.section.rates or self.section.accelerations:
@@ -151,7 +152,7 @@ def kinematics(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     poses = study.poses("kinematics")
     outputs = expand_outputs(study, section.outputs or default_outputs(mechanism))
     square = section.outputs is not None and len(outputs) == len(mechanism.drives)
-    motion = _Motion(study, section, outputs, square, poses.count)
+    motion = _Motion(study, section, outputs, square, poses)
     progress.start(poses.count, "poses")
     reason = np.zeros(poses.count, dtype=np.int8)
     for solved in solve_poses(study, poses):

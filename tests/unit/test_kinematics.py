@@ -1,0 +1,125 @@
+"""`mechdesign kinematics`: columns, continuity, efforts, extremes, limits of motion, failures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+from mechdesign.analyses.kinematics import kinematics
+from mechdesign.errors import AssemblyError
+
+SLIDER_CRANK = """
+mechanism:
+  links: {ground: {O: [0, 0]}, crank: [O, A, 1], rod: [A, B, 3], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], point: B}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 1], B: [2.8, 0]}
+kinematics:
+  sweep: {theta: {from: 0, to: 360, step: 15}}
+  rates: {theta: 1 rad/s}
+  outputs: [B.x, rod.angle]
+  loads: [{at: B, force: [-7, 0]}]
+"""
+
+LINKAGE = """
+mechanism:
+  links: {ground: {O: [0, 0], D: [4, 0]}, crank: [O, A, 3], rod: [A, B, 3.5], rocker: [D, B, 3]}
+  drives: {q: {angle: crank}}
+  sketch: {A: [2, 2.2], B: [5, 3]}
+kinematics:
+  sweep: {q: {from: 0, to: 180, step: 1}}
+"""
+
+ARM = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 10], forearm: [E, P, 8]}
+  drives: {t1: {angle: upper}, t2: {angle: forearm}}
+  sketch: {E: [9, 4], P: [12, 11]}
+kinematics:
+  poses: [{t1: 30, t2: 60}, {P.x: 3, P.y: 12}]
+  outputs: [P]
+"""
+
+
+def test_slider_crank_agrees_with_its_textbook_solution() -> None:
+    # r = 1, l = 3 at 15 deg and 1 rad/s.
+    table = kinematics(study_of(SLIDER_CRANK)).tables["motion"]
+    row = int(np.flatnonzero(table["theta"] == 15)[0])
+    assert table["B.x"][row] == pytest.approx(3.954740, abs=5e-7)
+    assert table["B.x_velocity"][row] == pytest.approx(-0.342464, abs=5e-7)
+    assert table["B.x_acceleration"][row] == pytest.approx(-1.258022, abs=5e-7)
+
+
+def test_effort_balances_the_load_by_virtual_work() -> None:
+    table = kinematics(study_of(SLIDER_CRANK)).tables["motion"]
+    # Power in equals power out: effort * 1 rad/s + force * velocity = 0.
+    assert table["theta_effort"] == pytest.approx(7 * table["B.x_velocity"], abs=1e-12)
+
+
+def test_crank_angle_is_continuous_over_turns() -> None:
+    study = study_of(SLIDER_CRANK, "kinematics.sweep.theta.to=1080", "kinematics.outputs=[crank.angle]")
+    table = kinematics(study).tables["motion"]
+    assert table["crank.angle"] == pytest.approx(table["theta"], abs=1e-9)
+
+
+def test_extremes_are_the_stroke() -> None:
+    table = kinematics(study_of(SLIDER_CRANK)).tables["extremes"]
+    stroke = table["output"] == "B.x"
+    assert table["range"][stroke] == pytest.approx(2)
+    assert table["min_at"][stroke] == 180
+    assert table["time_ratio"][stroke] == pytest.approx(1)
+
+
+def test_limits_of_motion_are_found_to_the_last_digits() -> None:
+    result = kinematics(study_of(LINKAGE))
+    limits = result.tables["limits"]
+    # The rocker's triangle is stretched where the distance of A and D is 6.5.
+    exact = np.degrees(np.arccos((3**2 + 4**2 - 6.5**2) / (2 * 3 * 4)))
+    assert limits["q"] == pytest.approx([exact], abs=1e-9)
+    assert list(limits["kind"]) == ["dead centre"]
+    assert set(limits["joint"][0].split()) == {"A", "B", "D"}
+    motion = result.tables["motion"]
+    assert np.array_equal(motion["valid"], motion["q"] <= exact)
+    assert np.isnan(motion["B.x"][~motion["valid"]]).all()
+    assert result.warnings
+    assert result.counts["invalid"] == np.count_nonzero(motion["q"] > exact)
+
+
+def test_stated_limits_end_the_motion_too() -> None:
+    study = study_of(
+        LINKAGE.replace("kinematics:", "  limits: [{angle: [ground, rocker], max: 100, min: 10}]\nkinematics:")
+    )
+    limits = kinematics(study).tables["limits"]
+    assert "limit" in list(limits["kind"])
+    at = limits["q"][list(limits["kind"]).index("limit")]
+    angle = study.mechanism.solve({"q": at})["rocker.angle"]
+    assert min(abs(angle - 100), abs(angle - 10)) < 1e-7
+
+
+def test_jacobian_of_an_arm() -> None:
+    table = kinematics(study_of(ARM)).tables["motion"]
+    t1, t2 = np.radians(table["t1"]), np.radians(table["t2"])
+    assert table["det_J"] == pytest.approx(80 * np.sin(t2 - t1))
+    columns = np.array([[-10 * np.sin(t1), -8 * np.sin(t2)], [10 * np.cos(t1), 8 * np.cos(t2)]])
+    values = np.linalg.svd(np.moveaxis(columns, -1, 0), compute_uv=False)
+    assert table["inverse_condition"] == pytest.approx(values[:, 1] / values[:, 0])
+    assert (table["P.x"][1], table["P.y"][1]) == pytest.approx((3, 12))
+
+
+def test_a_jacobian_that_mixes_units_needs_a_length() -> None:
+    mixed = ("kinematics.outputs=[P.x, forearm.angle]",)
+    result = kinematics(study_of(ARM, *mixed))
+    assert np.isnan(result.tables["motion"]["inverse_condition"]).all()
+    assert any("characteristic_length" in warning for warning in result.warnings)
+    given = kinematics(study_of(ARM, *mixed, "kinematics.characteristic_length=9"))
+    assert np.isfinite(given.tables["motion"]["inverse_condition"]).all()
+    assert not given.warnings
+
+
+def test_a_listed_pose_that_fails_is_named_after_the_others_are_solved() -> None:
+    result = kinematics(study_of(ARM, "kinematics.poses=[{t1: 30, t2: 60}, {P.x: 30, P.y: 12}]"))
+    assert "P.x = 30" in result.failed
+    assert list(result.tables["motion"]["valid"]) == [True, False]
+    with pytest.raises(AssemblyError, match="no pose is valid"):
+        kinematics(study_of(ARM, "kinematics.poses=[{P.x: 30, P.y: 12}]"))
