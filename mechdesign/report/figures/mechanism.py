@@ -170,7 +170,7 @@ def _poses(study: Study) -> tuple[Configuration, list[str]] | None:
 def _same(one: Scene | None, other: Scene | None) -> bool:
     if one is None or other is None:
         return False
-    near = 1e-3 * one.span
+    near = 0.02 * one.span
     return all(abs(one.points[name] - other.points[name]) <= near for name in one.points)
 
 
@@ -190,13 +190,13 @@ def _compose(
     count = len(panels)
 
     def scale(columns: int) -> float:
-        width, height = _room(columns)
+        width, height = _room(columns, count // columns)
         return min((width - 2 * _PAD) / wide, (height - 2 * _PAD) / tall)
 
     columns = count if count == 1 or scale(count) >= 0.55 * scale(1) else 1
     rows = count // columns
     inches = scale(columns)
-    width, _ = _room(columns)
+    width, _ = _room(columns, rows)
     height = max(inches * tall + 2 * _PAD, 1.5)
     titles = [textwrap.fill(title, int(width * _LETTERS)) for title, _, _ in panels]
     above = _ABOVE + _LINE * max(title.count("\n") for title in titles)
@@ -221,6 +221,6 @@ def _compose(
     return figure
 
 
-def _room(columns: int) -> tuple[float, float]:
+def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    return (style.WIDTH - 0.15 - _LEFT * columns) / columns, 4.2 if columns > 1 else 3.0
+    return (style.WIDTH - 0.15 - _LEFT * columns) / columns, 3.0 if rows > 1 else 4.2
