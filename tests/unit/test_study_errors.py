@@ -1,0 +1,218 @@
+"""Wrong studies: each mistake is told where it stands, with what would mend it, and all in one go."""
+
+import pytest
+
+import mechdesign
+from mechdesign.errors import StudyError
+
+STUDY = """\
+mechanism:
+  parameters: {r: 30}
+  links:
+    ground: {O: [0, 0], D: [100, 0]}
+    crank: [O, A, r]
+    rod: {from: A, to: B, length: 90, points: {P: [40, 10]}}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+"""
+
+
+def problems(tmp_path, monkeypatch, text, *overrides):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.yaml").write_text(text)
+    with pytest.raises(StudyError) as caught:
+        mechdesign.load("study.yaml", overrides)
+    return str(caught.value).splitlines()
+
+
+MECHANISM = [
+    ("length: 90", "lenght: 90", "6:27: mechanism.links.rod.lenght: unknown key; did you mean 'length'?"),
+    ("mechanism:", "mechanisms:", "1:1: mechanisms: unknown key; did you mean 'mechanism'?"),
+    ("crank: [O, A, r]", "crank: 5", "5:12: mechanism.links.crank: expected a link"),
+    ("crank: [O, A, r]", "crank: [O, 7, r]", "5:16: mechanism.links.crank.1: expected the name of a point"),
+    ("crank: [O, A, r]", "crank: [O, A, -3]", "5:19: mechanism.links.crank.2: must be positive, not -3"),
+    ("crank: [O, A, r]", "crank: [O, A, 0]", "5:19: mechanism.links.crank.2: must be positive, not 0"),
+    ("crank: [O, A, r]", "crank: [O, A, .nan]", "mechanism.links.crank.2: expected a finite number, not nan"),
+    ("crank: [O, A, r]", "crank: [O, A, -.inf]", "mechanism.links.crank.2: expected a finite number, not -inf"),
+    ("crank: [O, A, r]", "crank: [O, A, 1e999]", "mechanism.links.crank.2: expected a finite number"),
+    ("crank: [O, A, r]", "crank: [O, A, true]", "mechanism.links.crank.2: expected a number, not true"),
+    ("crank: [O, A, r]", "crank: [O, A, 3 deg]", "'3 deg' is an angle, where a length is expected"),
+    ("crank: [O, A, r]", "crank: [O, A, 3 mn]", "unknown unit 'mn'"),
+    ("crank: [O, A, r]", "crank: [O, A, R]", "unknown name 'R' in 'R'; did you mean 'r'?"),
+    ("crank: [O, A, r]", "crank: [O, A, r/0]", "5:19: mechanism.links.crank.2: division by zero in 'r/0'"),
+    ("crank: [O, A, r]", "crank: [O, A, 30 - r]", "must be positive, not 0"),
+    ("crank: [O, A, r]", "crank: [O, A, __import__('os')]", "has no meaning in the expression"),
+    ("crank: [O, A, r]", "crank: [O, O, r]", "a link from 'O' to itself"),
+    ("crank: [O, A, r]", "crank: {from: O, length: r}", "needs both 'from' and 'to'"),
+    ("crank: [O, A, r]", "crank: {from: O, to: A, length: r, telescopic: true}", "has no fixed length"),
+    ("crank: [O, A, r]", "crank: {from: O, to: A, length: r, Q: [1, 2]}", "stands under 'points': {Q: [x, y]}"),
+    (
+        "crank: [O, A, r]",
+        "crank: {frm: O, too: A}",
+        "'frm' is neither a key of a link nor a point [x, y]; did you mean",
+    ),
+    ("crank: [O, A, r]", "crank: [O, AA, r]", "mechanism.drives: the mobility is"),
+    ("crank: [O, A, r]", "crank: [X, Y, r]", "5:5: mechanism.links.crank: no other link shares a point of it (X, Y)"),
+    ("P: [40, 10]", "P: [40]", "6:51: mechanism.links.rod.points.P: expected [x, y], not a list of 1"),
+    ("P: [40, 10]", "A: [40, 10]", "point 'A' is an end of the link"),
+    ("P: [40, 10]", "r: [40, 10]", "6:48: mechanism.links.rod.points.r: 'r' is the name of a parameter already"),
+    ("    ground: {O: [0, 0], D: [100, 0]}\n", "", "there is no 'ground'"),
+    ("angle: crank", "angle: crnk", "8:27: mechanism.drives.theta.angle: there is no moving link 'crnk'; did you mean"),
+    ("angle: crank", "angle: ground", "there is no moving link 'ground'"),
+    ("angle: crank", "angle: crank, length: rod", "a drive is one of"),
+    ("angle: crank", "length: crank", "link 'crank' is not telescopic"),
+    ("theta: {angle: crank}", "rod: {angle: crank}", "a drive may only bear that of what it drives"),
+    ("{theta: {angle: crank}}", "[crank, crank]", "'crank' is listed twice"),
+    ("{theta: {angle: crank}}", "[]", "the mobility is 1 but 0 drives are given: add 1 drive"),
+    ("{theta: {angle: crank}}", "[crank, rod]", "8:11: mechanism.drives: the mobility is 1 but 2 drives are given"),
+    ("length: 90", "length: 10", "9:11: mechanism.sketch: the sketch cannot be assembled"),
+    ("A: [0, 30]", "A: [0, 30], Q: [1, 1]", "9:24: mechanism.sketch.Q: no link has a point 'Q'"),
+    ("A: [0, 30]", "A: 30", "9:15: mechanism.sketch.A: expected [x, y], not the number 30"),
+    ("sketch:", "branch: fllow\n  sketch:", "expected one of side, follow, not 'fllow'; did you mean 'follow'?"),
+    ("sketch:", "targets: {B.x: 3}\n  sketch:", "9:12: mechanism.targets: is not available in this version"),
+    ("sketch:", "measures: {mu: {angle: [rod, rokcer]}}\n  sketch:", "no link 'rokcer'; did you mean 'rocker'?"),
+    ("sketch:", "measures: {mu: B.x - Q.x}\n  sketch:", "there is no coordinate 'Q.x'"),
+    (
+        "sketch:",
+        "measures: {mu: B.x -}\n  sketch:",
+        "9:18: mechanism.measures.mu: the expression 'B.x -' ends too early",
+    ),
+    ("sketch:", "limits: [{distance: [O, B]}]\n  sketch:", "a limit needs 'min', 'max' or both"),
+    ("sketch:", "limits: [{distance: [O, Q], min: 1}]\n  sketch:", "there is no point 'Q'"),
+    ("sketch:", "limits: [{distance: [O, B], min: 3, max: 1}]\n  sketch:", "the maximum 1 is below the minimum 3"),
+    ("sketch:", "limits: [{drive: theta, min: 3}]\n  sketch:", "an angle needs both 'min' and 'max'"),
+    ("sketch:", "limits: [{drive: theta, min: 3 mm, max: 7}]\n  sketch:", "where an angle is expected"),
+    (
+        "sketch:",
+        "joints: {j: {prismatic: [ground, rodd], through: O}}\n  sketch:",
+        "no link 'rodd'; did you mean 'rod'?",
+    ),
+    ("sketch:", "joints: {j: {prismatic: [ground, rod], point: Q}}\n  sketch:", "link 'rod' has no point 'Q'"),
+    ("sketch:", "joints: {j: {prismatic: [ground, rod]}}\n  sketch:", "say which one slides, as 'point'"),
+    ("sketch:", "joints: {j: {slot: rod, angle: 3}}\n  sketch:", "a slot joint has no 'angle'"),
+    ("sketch:", "joints: {j: {through: O}}\n  sketch:", "a joint is one of prismatic"),
+    ("{r: 30}", "{r: 1/0}", "2:19: mechanism.parameters.r: division by zero"),
+    ("{r: 30}", "{r: s + 1, s: 2}", "a parameter may use those above it, and 's' is below"),
+    ("{r: 30}", "{r: r}", "unknown name 'r' in 'r'"),
+    ("{r: 30}", "{r: 30, sin: 2}", "'sin' is a word of the expression language"),
+    ("{r: 30}", "[30]", "2:15: mechanism.parameters: expected a mapping of names, not a list of 1"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), MECHANISM)
+def test_wrong_mechanisms(tmp_path, monkeypatch, old, new, message):
+    assert old in STUDY
+    found = problems(tmp_path, monkeypatch, STUDY.replace(old, new))
+    assert any(message in line for line in found), found
+    assert all(line.startswith("study.yaml") for line in found)
+
+
+QUESTIONS = [
+    ("kinematic: {}", "10:1: kinematic: unknown key; did you mean 'kinematics'?"),
+    ("seed: -1", "10:7: seed: must be at least 0, not -1"),
+    ("seed: 1.5", "expected a whole number, not 1.5"),
+    ("units: {length: furlong}", "10:17: units.length: 'furlong' is not a unit of length"),
+    ("units: {lenght: mm}", "10:9: units.lenght: unknown key; did you mean 'length'?"),
+    ("kinematics: [1]", "10:13: kinematics: expected a mapping, not a list of 1"),
+    ("kinematics: {rates: {theta: 5 mm/s}}", "is a velocity, where an angular velocity is expected"),
+    ("kinematics: {rates: {thet: 5}}", "there is no coordinate 'thet'; did you mean 'theta'?"),
+    ("kinematics: {outputs: [rod]}", "'rod' is a link; its coordinate is rod.angle"),
+    ("kinematics: {outputs: [Q]}", "10:24: kinematics.outputs.0: there is no coordinate 'Q'"),
+    ("kinematics: {sweep: {P: 3}}", "'P' is a point; its coordinates are P.x and P.y"),
+    ("kinematics: {sweep: {theta: {from: 0, to: 9 mm, step: 1}}}", "'9 mm' is a length, where an angle is expected"),
+    ("kinematics: {loads: [{at: Q, force: [0, 1]}]}", "there is no point 'Q'"),
+    ("kinematics: {loads: [{at: P}]}", "a load is {at: point, force: [fx, fy]}"),
+    ("kinematics: {loads: [{at: P, force: [1 mm, 1]}]}", "'1 mm' is a length, where a force is expected"),
+    ("workspace: {}", "10:1: workspace.point: is missing"),
+    ("workspace: {point: Q}", "there is no point 'Q'"),
+    ("workspace: {point: P, integrate: {rule: gaus}}", "did you mean 'gauss'?"),
+    ("workspace: {point: P, scan: {from: 5, to: 1}}", "1 is not beyond 'from', 5"),
+    ("optimize: {maximize: [GII]}", "optimize.variables: is missing"),
+    ("optimize: {variables: {r: {from: 1, to: 2, step: 1}}}", "say what to 'maximize' or 'minimize'"),
+    ("optimize: {variables: {q: {from: 1, to: 2, step: 1}}, maximize: GII}", "no parameter or dimension 'q'"),
+    ("optimize: {variables: {r: {from: 1, to: s, step: 1}}, maximize: GII}", "no parameter or variable 's'"),
+    ("optimize: {variables: {r: {from: 1, to: r, step: 1}}, maximize: GII}", "variable 'r' above it"),
+    ("optimize: {variables: {r: {from: 1, to: 2}}, maximize: GII}", "needs either 'step' or 'number'"),
+    ("optimize: {variables: {r: {from: 1, to: 2, step: 1}}, maximize: GIIX}", "no result 'GIIX'; did you mean 'GII'?"),
+    (
+        "optimize: {variables: {r: {from: 1, to: 2, step: 1}}, maximize: GII, weights: [[1, 2]]}",
+        "2 weights for 1 goals",
+    ),
+    ("optimize: {method: search}", "'search' is not available in this version; available: grid"),
+    ("reliability: {dimensions: {r: -1}}", "10:31: reliability.dimensions.r: must be at least 0, not -1"),
+    ("reliability: {dimensions: {rod.lenght: 1}}", "did you mean 'rod.length'?"),
+    ("reliability: {dimensions: {'*.lenght': 1}}", "no dimension matches '*.lenght'"),
+    ("reliability: {dimensions: {r: {tolerance: [1, 2]}}}", "expected a number, not a list of 2"),
+    ("reliability: {dimensions: {theta: 1 mm}}", "where an angle is expected"),
+    ("reliability: {dimensions: {r: {tolerance: 1, distribution: gauss}}}", "expected one of normal, uniform"),
+    ("reliability: {clearances: {P: {radial: 1}}}", "only link 'rod' has point 'P'"),
+    ("reliability: {clearances: {A: {radial: -1}}}", "must be at least 0"),
+    ("reliability: {clearances: {A: {tolerance: 1}}}", "either 'radial' or 'diametral'"),
+    ("reliability: {clearances: {A: {radial: 1, link: rocker}}}", "no link at point 'A' named 'rocker'"),
+    ("reliability: {limits: {P: 1}}", "'P' is a point: limit P.x and P.y, or {radius: r}"),
+    ("reliability: {limits: {P.x: -1}}", "must be at least 0"),
+    ("reliability: {methods: [form]}", "'form' is not available in this version"),
+    ("reliability: {samples: 0}", "must be at least 2, not 0"),
+    ("reliability: {samples: many}", "unknown name 'many'"),
+    ("reliability: {correlation: [[r, r, 1]]}", "reliability.correlation: is not available in this version"),
+    ("reliability: {allocate: {reliability: 1}}", "reliability.allocate: is not available in this version"),
+    ("stiffness: {}", "stiffness.at: is missing"),
+    ("stiffness: {at: P, link: crank}", "link 'crank' has no point 'P'; it has O, A"),
+    ("stiffness: {at: P, elastic: {rod: beam}}", "there is no section 'beam'"),
+    ("stiffness: {at: P, sections: {b: {E: 1, width: 2}}}", "{E, width, height} or {E, area, inertia}"),
+    ("stiffness: {at: P, sections: {b: {E: -1, width: 2, height: 1}}}", "must be positive"),
+    ("stiffness: {at: P, actuators: {theta: 5 N/m}}", "where a rotational stiffness is expected"),
+    ("stiffness: {at: P, actuators: {rod: 5}}", "there is no drive 'rod'"),
+    ("stiffness: {at: P, link: rod, loads: [[1, 2]]}", "a load is [fx, fy, mz], not 2 numbers"),
+    (
+        "requirements: [{result: kinematic.x, at_least: 3}]",
+        "there is no command 'kinematic'; did you mean 'kinematics'?",
+    ),
+    ("requirements: [{result: kinematics.x}]", "needs 'at_least', 'at_most' or both"),
+]
+
+
+@pytest.mark.parametrize(("section", "message"), QUESTIONS)
+def test_wrong_questions(tmp_path, monkeypatch, section, message):
+    found = problems(tmp_path, monkeypatch, STUDY + section + "\n")
+    assert any(message in line for line in found), found
+    assert all(line.startswith("study.yaml:10:") for line in found)
+
+
+def test_every_mistake_in_one_go_and_in_the_order_of_the_text(tmp_path, monkeypatch):
+    text = STUDY.replace("length: 90", "lenght: 90").replace("[O, A, r]", "[O, A, -1]").replace("{r: 30}", "{r: 1/0}")
+    text = text.replace("angle: crank", "angle: crnk") + "kinematics: {outputs: [rod.angl]}\nworkspace: {pont: P}\n"
+    found = problems(tmp_path, monkeypatch, text)
+    assert [line.split(": ")[:2] for line in found] == [
+        ["study.yaml:2:19", "mechanism.parameters.r"],
+        ["study.yaml:5:19", "mechanism.links.crank.2"],
+        ["study.yaml:6:27", "mechanism.links.rod.lenght"],
+        ["study.yaml:8:27", "mechanism.drives.theta.angle"],
+        ["study.yaml:10:24", "kinematics.outputs.0"],
+        ["study.yaml:11:1", "workspace.point"],
+        ["study.yaml:11:13", "workspace.pont"],
+    ]
+
+
+def test_a_mistake_in_a_parameter_is_told_once(tmp_path, monkeypatch):
+    text = STUDY.replace("{r: 30}", "{q: 1/0, s: 2*q, r: q + s}") + "reliability: {dimensions: {rod.length: q}}\n"
+    assert len(problems(tmp_path, monkeypatch, text)) == 1
+
+
+def test_a_split_expression_is_told_once(tmp_path, monkeypatch):
+    found = problems(tmp_path, monkeypatch, STUDY.replace("length: 90", "length: min(90, r)"))
+    assert len(found) == 1
+    assert "put the expression in quotes" in found[0]
+
+
+@pytest.mark.parametrize("text", ["just words", "[1, 2]", "3"])
+def test_what_is_no_mapping_is_no_study(tmp_path, monkeypatch, text):
+    assert "is not a study: a mapping with 'mechanism' is expected" in problems(tmp_path, monkeypatch, text)[0]
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(StudyError, match=r"missing.yaml: cannot be read: No such file"):
+        mechdesign.load(tmp_path / "missing.yaml")
+    with pytest.raises(StudyError, match="cannot be read: Is a directory"):
+        mechdesign.load(tmp_path)

@@ -1,0 +1,92 @@
+"""Quantities in the study's units, and labels for tables."""
+
+import math
+import subprocess
+import sys
+
+import pytest
+
+from mechdesign.study.units import QuantityError, Units, units_from
+
+MM = units_from("mm", "deg", "s", "N")[0]
+SI = units_from("m", "rad", "s", "N")[0]
+
+
+@pytest.mark.parametrize(
+    ("units", "text", "value"),
+    [
+        (MM, "4 cm", 40.0),
+        (MM, "2 in", 50.8),
+        (MM, "200 GPa", 200_000.0),
+        (MM, "600 rpm", 3600.0),
+        (MM, "-30 rad/s", -30 * 180 / math.pi),
+        (MM, "30 arcmin", 0.5),
+        (MM, "1e5 N*m/rad", 1e8),
+        (MM, "1e5 N*m/deg", 1e8 * 180 / math.pi),
+        (MM, "1 kN", 1000.0),
+        (MM, "5e7 N/m", 5e4),
+        (MM, "2 cm^4", 2e4),
+        (MM, "9.81 m/s^2", 9810.0),
+        (MM, "1 rad/s^2", 180 / math.pi),
+        (SI, "90 deg", math.pi / 2),
+        (SI, "1 rev", 2 * math.pi),
+        (SI, "1 lbf", 4.4482216152605),
+        (units_from("in", "deg", "ms", "lbf")[0], "1 psi", 1.0),
+        (units_from("in", "deg", "ms", "lbf")[0], "1 in/s", 1e-3),
+    ],
+)
+def test_quantities(units, text, value):
+    assert units.convert(text) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "message"),
+    [
+        ("5 foo", "length", "unknown unit 'foo'"),
+        ("5 deg", "length", "is an angle, where a length is expected"),
+        ("5 Hz", "angular_velocity", "unknown unit"),
+        ("5 1/s", "angular_velocity", "where an angular velocity is expected"),
+        ("5 mm/s", "angular_velocity", "is a velocity"),
+    ],
+)
+def test_wrong_units(text, kind, message):
+    with pytest.raises(QuantityError, match=message):
+        MM.convert(text, kind)
+
+
+def test_dimensionless_lengths_take_no_quantity_with_a_length():
+    units, problems = units_from("dimensionless", "rad", "s", "N")
+    assert not problems
+    assert (units.label("length"), units.label("velocity"), units.label("moment")) == ("", "1/s", "N")
+    with pytest.raises(QuantityError, match="dimensionless"):
+        units.convert("40 mm")
+    assert units.convert("180 deg") == pytest.approx(math.pi)
+
+
+@pytest.mark.parametrize(
+    ("kind", "label"),
+    [
+        ("length", "mm"),
+        ("angular_velocity", "deg/s"),
+        ("acceleration", "mm/s^2"),
+        ("moment", "N*mm"),
+        ("stress", "N/mm^2"),
+        ("stiffness", "N/mm"),
+        ("rotational_stiffness", "N*mm/rad"),
+        ("compliance", "mm/N"),
+        ("rotational_compliance", "rad/(N*mm)"),
+        ("coupling_compliance", "rad/N"),
+        ("none", ""),
+    ],
+)
+def test_labels(kind, label):
+    assert Units().label(kind) == label
+
+
+def test_pint_is_imported_only_for_a_quantity(tmp_path):
+    study = tmp_path / "study.yaml"
+    study.write_text("mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 2]}, drives: [arm], sketch: {P: [1, 1]}}\n")
+    code = f"import sys, mechdesign; mechdesign.load({str(study)!r}); print('pint' in sys.modules)"
+    code += f"; mechdesign.load({str(study)!r}, ['mechanism.links.arm.length=2 in']); print('pint' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True"]
