@@ -162,7 +162,7 @@ def build_graph(description: Description) -> Graph:
 
     for name, joint in description.joints.items():
         for body, point in _named_points(joint):
-            if (body, point) not in points:
+            if (body, point) not in points and (rod_of(body), point) not in points:
                 raise MechanismError(f"link '{body}' has no point '{point}'", f"mechanism.joints.{name}")
 
     classes, count = _classes(bodies, ties)

@@ -1,0 +1,242 @@
+"""Screws in the plane: reciprocal wrenches of a serial leg, its constraint-space compliance, its equivalent springs.
+
+Twists are (dx, dy, dphi) of the body at the origin (axis coordinates), wrenches (fx, fy, mz) about it (ray
+coordinates), so that power is their plain product. Arrays have components first and poses last, which keeps every
+operation a pass over contiguous poses. Every elastic element is a joint with a spring: an actuator at its joint, and a
+beam of length L three of them at mid-span, where its compliance is diagonal: a slide along it (EA/L), a slide across
+(12 EI/L^3, with shear in series) and a hinge (EI/L); carried to the tip they are the beam's matrix [S4, eq. 24].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.mechanism.algebra import Value, cross, vector
+
+Array = NDArray[np.float64]
+
+# Below this share of the largest singular value a direction counts as lost. Elbows at full stretch, found through the
+# root of a difference, are straight to 1e-8 only.
+RANK = 1e-7
+# Below this share of a leg's largest compliance its smallest is rounding: rigid.
+RIGID = 1e-12
+
+
+def hinge_twist(place: NDArray[np.complex128]) -> Array:
+    """Twist (3, n) of a revolute joint at places (n,) seen from the origin: [py, -px, 1]  [S4, eq. 6]."""
+    return np.stack([place.imag, -place.real, np.ones(place.shape)])
+
+
+def slide_twist(direction: NDArray[np.complex128]) -> Array:
+    """Twist (3, n) of a prismatic joint along unit vectors (n,): [ax, ay, 0]."""
+    return np.stack([direction.real, direction.imag, np.zeros(direction.shape)])
+
+
+def screw_product(a: Array, b: Array) -> Array:
+    """Cross product over the leading axis (3): the wrench on which two twists do no work, or the other way round."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A serial leg in n poses.
+
+    Parameters
+    ----------
+    passive : sequence of ndarray, shape (3, n)
+        Twists of the free joints.
+    elastic : sequence of ndarray, shape (3, n)
+        Twists of the elastic joints.
+    compliance : sequence of float or ndarray, shape (n,)
+        Of each elastic joint.
+    base, tip : complex ndarray, shape (n,)
+        Places of the first and last joint from the origin.
+    """
+
+    passive: Sequence[Array]
+    elastic: Sequence[Array]
+    compliance: Sequence[Value]
+    base: NDArray[np.complex128]
+    tip: NDArray[np.complex128]
+
+    def take(self, index: NDArray[np.intp]) -> Chain:
+        """Poses by index."""
+        return Chain(
+            [twist[:, index] for twist in self.passive],
+            [twist[:, index] for twist in self.elastic],
+            [c if np.ndim(c) == 0 else c[index] for c in self.compliance],
+            self.base[index],
+            self.tip[index],
+        )
+
+
+def joint_rank(passive: Sequence[Array], length: float) -> NDArray[np.intp] | int:
+    """Rank of the free joints' twists in each pose, rotations scaled by a length."""
+    count = len(passive)
+    if count < 2:
+        return count
+    units = [_scaled(twist, length) for twist in passive]
+    if count == 2:
+        return 1 + np.asarray(np.linalg.norm(screw_product(*units), axis=0) > RANK, dtype=np.intp)
+    matrices = np.moveaxis(np.stack(units), 2, 0)
+    values = np.linalg.svd(matrices, compute_uv=False)
+    return np.asarray((values > RANK * values[:, :1]).sum(axis=1), dtype=np.intp)
+
+
+def reciprocal_wrenches(passive: Sequence[Array], rank: int, length: float, count: int) -> Array:
+    """Wrenches on which free joints of a given rank do no work, a basis (3, 3 - rank, n)  [S4, eqs. 13-15].
+
+    Closed form for up to two independent joints; the null space by singular values where joints depend on each other.
+    """
+    if rank == 0:
+        return np.repeat(np.eye(3)[:, :, None], count, axis=2)
+    if rank == len(passive) == 1:
+        return _one_joint(passive[0])
+    if rank == len(passive) == 2:
+        wrench = screw_product(*passive)
+        size = np.sqrt(wrench[0] ** 2 + wrench[1] ** 2 + (wrench[2] / length) ** 2)
+        return np.asarray((wrench / size)[:, None])
+    matrices = np.moveaxis(np.stack([_scaled(twist, length) for twist in passive]), 2, 0)
+    _, _, rows = np.linalg.svd(matrices)
+    basis = np.moveaxis(rows[:, rank:], 0, -1).swapaxes(0, 1).copy()
+    basis[2] *= length
+    return np.asarray(basis)
+
+
+def _one_joint(twist: Array) -> Array:
+    dx, dy, turn = twist
+    one, zero = np.ones(dx.shape), np.zeros(dx.shape)
+    if turn.all():
+        # All forces through the pin.
+        return np.stack([np.stack([one, zero]), np.stack([zero, one]), np.stack([-dx / turn, -dy / turn])])
+    return np.stack([np.stack([-dy, zero]), np.stack([dx, zero]), np.stack([zero, one])])
+
+
+def constraint_compliance(wrenches: Array, chain: Chain) -> Array:
+    """C_c = W^T C W, shape (m, m, n), as the sum over elastic joints of c (W^T s)(W^T s)^T  [S4, eq. 20]."""
+    _, m, n = wrenches.shape
+    total = np.zeros((m, m, n))
+    for twist, compliance in zip(chain.elastic, chain.compliance, strict=True):
+        work = wrenches[0] * twist[0] + wrenches[1] * twist[1] + wrenches[2] * twist[2]
+        for i in range(m):
+            scaled = work[i] * compliance
+            for j in range(i, m):
+                total[i, j] += scaled * work[j]
+    for i in range(m):
+        for j in range(i):
+            total[i, j] = total[j, i]
+    return total
+
+
+@dataclass(frozen=True, eq=False)
+class Spring:
+    """One equivalent spring of a leg in n poses.
+
+    Parameters
+    ----------
+    stiffness : ndarray, shape (n,)
+        Force per length along its line, or moment per radian; infinite where rigid.
+    place : complex ndarray, shape (n,)
+        A point on its line, from the origin.
+    angle : ndarray, shape (n,)
+        Direction of its line in [0, pi); nan for a rotational spring.
+    """
+
+    stiffness: Array
+    place: NDArray[np.complex128]
+    angle: Array
+
+
+def equivalent_springs(wrenches: Array, chain: Chain, length: float) -> list[Spring]:
+    """Springs that hold the body as a leg does: one on the line of one wrench, two for two; none for three.
+
+    Two wrenches reciprocal to a slide give two parallel springs at +-a along it from the tip, a = sqrt(c11/c22), the
+    one away from the base first [S4, eqs. 40-42]; two reciprocal to a hinge the principal springs through its pin, the
+    stiffer first.
+    """
+    count = wrenches.shape[1]
+    if count == 1:
+        return [_single(wrenches[:, 0], chain, length)]
+    if count != 2:
+        return []
+    twist = screw_product(wrenches[:, 0], wrenches[:, 1])
+    far = np.hypot(twist[0], twist[1]) > np.abs(twist[2]) * length / RANK
+    slides, pins = _parallel_springs(twist, chain), _pin_springs(twist, chain)
+    return [
+        Spring(
+            np.where(far, s.stiffness, p.stiffness), np.where(far, s.place, p.place), np.where(far, s.angle, p.angle)
+        )
+        for s, p in zip(slides, pins, strict=True)
+    ]
+
+
+def _single(wrench: Array, chain: Chain, length: float) -> Spring:
+    compliance = constraint_compliance(wrench[:, None], chain)[0, 0]
+    force = vector(wrench[0], wrench[1])
+    size = np.abs(force)
+    turning = size * length <= RANK * np.abs(wrench[2])
+    norm = np.where(turning, np.abs(wrench[2]), size)
+    about_tip = wrench[2] - cross(chain.tip, force)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        foot = chain.tip - 1j * force * about_tip / size**2
+        stiffness = norm**2 / compliance
+    return Spring(
+        stiffness, np.where(turning, chain.tip, foot), np.where(turning, np.nan, np.mod(np.angle(force), np.pi))
+    )
+
+
+def _parallel_springs(twist: Array, chain: Chain) -> list[Spring]:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = vector(twist[0], twist[1])
+        along = along / np.abs(along)
+        outward = np.real((chain.tip - chain.base) * np.conj(along)) < 0
+        along = np.where(outward, -along, along)
+        across = 1j * along
+        basis = np.zeros((3, 2, len(along)))
+        basis[0, 0], basis[1, 0], basis[2, 0], basis[2, 1] = across.real, across.imag, cross(chain.tip, across), 1.0
+        compliance = constraint_compliance(basis, chain)
+        c11, c22, c12 = compliance[0, 0], compliance[1, 1], compliance[0, 1]
+        arm = np.sqrt(c11 / c22)
+        angle = np.mod(np.angle(across), np.pi)
+        # Rigid in force or in moment: a pair of parallel springs would lie at the tip or infinitely far away.
+        apart = (c11 > 0) & (c22 > 0)
+        springs = []
+        for sign in (1.0, -1.0):
+            total = 2 * (c11 + sign * arm * c12)
+            stiffness = np.where(total > 4 * RIGID * c11, 1 / total, np.inf)
+            force, moment = 1 / c11, 1 / c22
+            springs.append(
+                Spring(
+                    np.where(apart, stiffness, force if sign > 0 else moment),
+                    np.where(apart, chain.tip + sign * arm * along, chain.tip),
+                    np.where(apart, angle, angle if sign > 0 else np.nan),
+                )
+            )
+    return springs
+
+
+def _pin_springs(twist: Array, chain: Chain) -> list[Spring]:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        place = vector(-twist[1] / twist[2], twist[0] / twist[2])
+        basis = _one_joint(np.stack([place.imag, -place.real, np.ones(place.shape)]))
+        compliance = constraint_compliance(basis, chain)
+        mean = (compliance[0, 0] + compliance[1, 1]) / 2
+        half = (compliance[0, 0] - compliance[1, 1]) / 2
+        radius = np.hypot(half, compliance[0, 1])
+        soft = np.arctan2(compliance[0, 1], half) / 2
+        small = mean - radius
+        stiff = np.where(small > RIGID * mean, 1 / small, np.inf)
+        return [
+            Spring(stiff, place, np.mod(soft + np.pi / 2, np.pi)),
+            Spring(1 / (mean + radius), place, np.mod(soft, np.pi)),
+        ]
+
+
+def _scaled(twist: Array, length: float) -> Array:
+    unit = twist.copy()
+    unit[2] *= length
+    return np.asarray(unit / np.linalg.norm(unit, axis=0))
