@@ -17,6 +17,10 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 
+# Poses solved at once: their arrays stay within some megabytes, however long the sweep.
+CHUNK = 65536
+
+
 @dataclass(frozen=True, eq=False)
 class SolvedPoses:
     """Poses that give the same coordinates, solved for the nominal dimensions.
@@ -48,7 +52,7 @@ def in_study_units(study: Study, coordinate: Coordinate, value: Value) -> Value:
 
 
 def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
-    """Solve each group of poses with the plan of its coordinates.
+    """Solve each group of poses with the plan of its coordinates, at most `CHUNK` poses at a time.
 
     Raises
     ------
@@ -58,14 +62,16 @@ def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
     mechanism: Mechanism = study.mechanism
     for group in poses.groups:
         plan = mechanism.plan(group.names)
-        given = [radians(study, c, v) for c, v in zip(plan.structure.given, group.columns(), strict=True)]
-        configuration = plan.solve(given)
-        known = dict(zip(group.names, given, strict=True))
-        drives = tuple(
-            np.broadcast_to(known.get(name, configuration.value(mechanism.coordinate(name))), configuration.shape)
-            for name in mechanism.drives
-        )
-        yield SolvedPoses(group.rows, group.names, configuration, drives)
+        whole = [radians(study, c, v) for c, v in zip(plan.structure.given, group.columns(), strict=True)]
+        for begin in range(0, len(group.rows), CHUNK):
+            given = [values[begin : begin + CHUNK] for values in whole]
+            configuration = plan.solve(given)
+            known = dict(zip(group.names, given, strict=True))
+            drives = tuple(
+                np.broadcast_to(known.get(name, configuration.value(mechanism.coordinate(name))), configuration.shape)
+                for name in mechanism.drives
+            )
+            yield SolvedPoses(group.rows[begin : begin + CHUNK], group.names, configuration, drives)
 
 
 def pose_columns(study: Study, poses: Poses) -> list[Column]:

@@ -1,0 +1,70 @@
+"""Every shipped study runs, meets its requirements, and is what results/ was made from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from mechdesign.errors import MechdesignError
+from mechdesign.study import load, template_path, templates
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = sorted((ROOT / "configs").rglob("*.yaml"))
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def named(path: Path) -> str:
+    return path.stem
+
+
+@pytest.mark.parametrize("config", CONFIGS, ids=named)
+def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, invoke) -> None:
+    done = invoke("run", config, "--out", tmp_path, "--jobs", 2)
+    assert done.exit_code == 0, done.output
+    study = load(config)
+    for command in study.questions:
+        folder = tmp_path / command
+        manifest = json.loads((folder / "manifest.json").read_text())
+        assert not manifest["failed"]
+        files = {path.name for path in folder.iterdir()}
+        assert files == {*manifest["files"], "manifest.json"}
+        assert "mechanism.png" in files
+        for name, digest in manifest["files"].items():
+            content = (folder / name).read_bytes()
+            assert hashlib.sha256(content).hexdigest() == digest
+            assert content.startswith(PNG) or name.endswith(".csv")
+
+
+@pytest.mark.parametrize("config", CONFIGS, ids=named)
+def test_results_are_those_of_the_study_as_it_is(config: Path) -> None:
+    for command in load(config).questions:
+        manifest = json.loads((ROOT / "results" / config.stem / command / "manifest.json").read_text())
+        assert manifest["study"]["sha256"] == hashlib.sha256(config.read_bytes()).hexdigest()
+        assert manifest["overrides"] == []
+
+
+@pytest.mark.parametrize("name", templates())
+def test_templates_are_studies(name: str) -> None:
+    try:
+        assert load(template_path(name)).questions
+    except MechdesignError as error:
+        pytest.fail(str(error))
+
+
+def test_pages_show_pictures_that_exist() -> None:
+    for page in (ROOT / "README.md", ROOT / "results" / "README.md"):
+        pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text())
+        assert pictures
+        for picture in pictures:
+            assert (page.parent / picture).read_bytes().startswith(PNG), picture
+
+
+def test_readme_shows_the_test_command_that_ci_runs_and_every_command() -> None:
+    text = (ROOT / "README.md").read_text()
+    assert "bash .ci/run" in text
+    for command in ("kinematics", "workspace", "optimize", "reliability", "stiffness", "run", "check", "new", "schema"):
+        assert f"mechdesign {command}" in text
