@@ -139,6 +139,8 @@ def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> 
 
 
 def _path(path: Mapping[str, str | tuple[object, ...]], folder: Path) -> Poses:
+    if not path:
+        raise StudyError("an empty path")
     columns: dict[str, Floats] = {}
     for name, given in path.items():
         table = read_table(folder / given) if isinstance(given, str) else np.array(given, dtype=float)
