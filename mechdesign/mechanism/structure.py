@@ -9,15 +9,12 @@ the mechanism's Assur groups; with outputs given, those of the inverse problem.
 
 from __future__ import annotations
 
-import graphlib
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate
@@ -216,16 +213,10 @@ def _decompose(
     solver = {matched[row]: row for row in range(len(rows))}
     for row, columns in enumerate(rows):
         arcs += [(row, solver[c]) for c in columns if solver[c] != row]
-    labels = _components(arcs, len(rows))
-    order: dict[int, set[int]] = {int(label): set() for label in labels}
-    for a, b in arcs:
-        if labels[a] != labels[b]:
-            order[int(labels[a])].add(int(labels[b]))
     groups = []
-    for label in graphlib.TopologicalSorter(order).static_order():
-        members = [row for row in range(len(rows)) if labels[row] == label]
-        groups.append(_group(edges, roots, sorted({row // 2 for row in members}),
-                             [names[matched[row]] for row in members], node_given))  # fmt: skip
+    for members in _components(arcs, len(rows)):
+        unknowns = [names[matched[row]] for row in members]
+        groups.append(_group(edges, roots, sorted({row // 2 for row in members}), unknowns, node_given))
     return groups
 
 
@@ -234,19 +225,45 @@ def _count_message(free: int) -> str:
 
 
 def _match(rows: list[list[int]], columns: int) -> list[int] | None:
-    data = [(r, c) for r, row in enumerate(rows) for c in row]
-    if not data:
-        return []
-    i, j = np.array(data).T
-    matrix = csr_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(len(rows), columns))
-    matched = maximum_bipartite_matching(matrix, perm_type="column")
-    return None if (matched < 0).any() else [int(c) for c in matched]
+    """A column for each row, all different, by augmenting paths; None if there is no perfect matching."""
+    owner = [-1] * columns
+    matched = [-1] * len(rows)
+    for start in range(len(rows)):
+        came: dict[int, int] = {}
+        queue = [start]
+        for row in queue:
+            found = None
+            for column in rows[row]:
+                if column not in came:
+                    came[column] = row
+                    if owner[column] < 0:
+                        found = column
+                        break
+                    queue.append(owner[column])
+            if found is not None:
+                while found >= 0:
+                    row = came[found]
+                    owner[found], matched[row], found = row, found, matched[row]
+                break
+        else:
+            return None
+    return matched
 
 
-def _components(arcs: list[tuple[int, int]], count: int) -> list[int]:
-    i, j = np.array(arcs).T if arcs else (np.zeros(0, int), np.zeros(0, int))
-    matrix = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(count, count))
-    return [int(label) for label in connected_components(matrix, directed=True, connection="strong")[1]]
+def _components(arcs: list[tuple[int, int]], count: int) -> list[list[int]]:
+    """Strongly connected components, each after those that its arcs lead to.
+
+    By transitive closure: whatever a component reaches, it reaches strictly more than that does.
+    """
+    reach = np.eye(count, dtype=np.float32)
+    for a, b in arcs:
+        reach[a, b] = 1
+    for _ in range(max(count, 2).bit_length()):
+        reach = np.minimum(reach @ reach, 1)
+    mutual = (reach > 0) & (reach.T > 0)
+    found = {int(row[0]): row for row in map(np.flatnonzero, mutual)}
+    ordered = sorted(found.values(), key=lambda row: (int((reach[row[0]] > 0).sum()), int(row[0])))
+    return [row.tolist() for row in ordered]
 
 
 def _group(
