@@ -7,16 +7,16 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Literal
 
-from mechdesign.expressions import Expression, ExpressionError
-from mechdesign.mechanism.model import Description, Drive, Limit, Link, Measure, Place, Quantity, Term
+from mechdesign.expressions import Expression
+from mechdesign.mechanism.model import Description, Link, Place, Quantity, Term
 from mechdesign.study import joints as joint_rules
-from mechdesign.study import models
+from mechdesign.study import models, quantities
 from mechdesign.study.document import Path
 from mechdesign.study.names import GROUND, Names
 from mechdesign.study.numbers import Value, suggestion
 from mechdesign.study.parameters import Parameters
 from mechdesign.study.reporter import Reporter
-from mechdesign.study.units import KINDS, Units, describe
+from mechdesign.study.units import Units
 
 ROOT: Path = ("mechanism",)
 
@@ -44,9 +44,9 @@ class Builder:
         self._build_links()
         joints = joint_rules.build(self)
         joint_rules.check_connected(self, joints)
-        drives = self._drives()
-        measures = self._measures()
-        limits = self._limits()
+        drives = quantities.drives(self)
+        measures = quantities.measures(self)
+        limits = quantities.limits(self)
         branch: Literal["side", "follow"] = "follow" if self.section.branch == "follow" else "side"
         return Description(
             self.places, self.links, joints, drives, measures, limits, self.sketch, self.units.angle_factor, branch
@@ -80,6 +80,13 @@ class Builder:
         hint = suggestion(name, candidates) or (f"; there are {', '.join(candidates[:12])}" if candidates else "")
         self.report(path, f"there is no {what} {name!r}{hint}")
         return False
+
+    def check_names(self, names: Iterable[str], known: Iterable[str], what: str, path: Path) -> bool:
+        """Whether all names of a list are known; each that is not is noted."""
+        candidates = list(known)
+        # All of them are looked up, so that every mistake is told.
+        found = [self.check_name(name, candidates, what, (*path, k)) for k, name in enumerate(names)]
+        return all(found)
 
     def _check_distinct(self) -> None:
         section = self.section
@@ -245,112 +252,6 @@ class Builder:
             return None
         turn = rotation(local, [self.sketch[point] for point in known])
         return cmath.phase(turn)
-
-    def _drives(self) -> dict[str, Drive]:
-        slides, legs, moving = self.names.slides, self.names.legs, self.names.moving
-        drives: dict[str, Drive] = {}
-        for name, section in self.section.drives.items():
-            path: Path = ("drives", name)
-            if section is None:
-                if self.check_name(name, [*moving, *slides], "link, leg or slide", path):
-                    kind: Literal["angle", "length", "slide"] = (
-                        "slide" if name in slides else "length" if name in legs else "angle"
-                    )
-                    drives[name] = Drive(name, kind, name)
-            elif section.angle is not None:
-                reference = section.from_ or GROUND
-                right = self.check_name(section.angle, moving, "moving link", (*path, "angle"))
-                if right and self.check_name(reference, self.section.links, "link", (*path, "from")):
-                    if reference == section.angle:
-                        self.report((*path, "from"), "the angle of a link from itself never changes")
-                    drives[name] = Drive(name, "angle", section.angle, reference)
-            elif section.length is not None:
-                if section.length in moving and section.length not in legs:
-                    self.report((*path, "length"), f"link {section.length!r} is not telescopic: its length is fixed")
-                elif self.check_name(section.length, legs, "telescopic leg", (*path, "length")):
-                    drives[name] = Drive(name, "length", section.length)
-            elif section.slide is not None and self.check_name(section.slide, slides, "slide", (*path, "slide")):
-                drives[name] = Drive(name, "slide", section.slide)
-        return drives
-
-    def _measures(self) -> dict[str, Measure]:
-        # A measure may use those above it.
-        known = [name for name in self.names.coordinates if name not in self.section.measures]
-        measures: dict[str, Measure] = {}
-        for name, section in self.section.measures.items():
-            path: Path = ("measures", name)
-            if section.angle is not None:
-                if all(
-                    self.check_name(a, self.section.links, "link", (*path, "angle", k))
-                    for k, a in enumerate(section.angle)
-                ):
-                    measures[name] = Measure(name, "angle", section.angle)
-            elif section.distance is not None:
-                pair = section.distance
-                if all(
-                    self.check_name(p, self.names.owners, "point", (*path, "distance", k)) for k, p in enumerate(pair)
-                ):
-                    measures[name] = Measure(name, "distance", pair)
-            elif section.expression is not None:
-                try:
-                    expression = Expression.parse(section.expression, self.units.angle_factor)
-                except ExpressionError as error:
-                    self.report(path, str(error))
-                    continue
-                if all(self.check_name(item, known, "coordinate", path) for item in sorted(expression.names)):
-                    measures[name] = Measure(name, "expression", None, expression)
-            known.append(name)
-        return measures
-
-    def _limits(self) -> tuple[Limit, ...]:
-        limits = []
-        for index, section in enumerate(self.section.limits):
-            path: Path = ("limits", index)
-            quantity: Quantity = "length"
-            kind: Literal["distance", "drive", "angle", "measure"]
-            items: tuple[str, ...]
-            if section.distance is not None:
-                kind, items = "distance", section.distance
-                right = all(
-                    self.check_name(p, self.names.owners, "point", (*path, "distance", k)) for k, p in enumerate(items)
-                )
-            elif section.angle is not None:
-                kind, items, quantity = "angle", section.angle, "angle"
-                right = all(
-                    self.check_name(a, self.section.links, "link", (*path, "angle", k)) for k, a in enumerate(items)
-                )
-            elif section.drive is not None:
-                kind, items = "drive", (section.drive,)
-                right = self.check_name(section.drive, self.section.drives, "drive", (*path, "drive"))
-                quantity = self.names.drives.get(section.drive, "none")
-            else:
-                kind, items = "measure", (section.measure or "",)
-                right = self.check_name(items[0], self.section.measures, "measure", (*path, "measure"))
-                quantity = self.names.measures.get(items[0], "none")
-            bounds: list[Term | None] = []
-            for end, value in (("min", section.min), ("max", section.max)):
-                self._check_kind(value, quantity, (*path, end))
-                bounds.append(None if value is None else self.place(f"limits.{index}.{end}", value, quantity))
-            self._check_bounds(section, kind, quantity, path)
-            if right:
-                limits.append(Limit(kind, items, bounds[0], bounds[1], f"limits.{index}"))
-        return tuple(limits)
-
-    def _check_kind(self, value: Value | None, quantity: Quantity, path: Path) -> None:
-        if value is not None and value.powers is not None and quantity != "none" and value.powers != KINDS[quantity]:
-            self.report(path, f"is {describe(value.powers)}, where {describe(KINDS[quantity])} is expected")
-
-    def _check_bounds(self, section: models.Limit, kind: str, quantity: Quantity, path: Path) -> None:
-        low, high = section.min, section.max
-        if low is not None and high is not None and high.nominal < low.nominal:
-            mend = "; add a full turn to it" if quantity == "angle" else ""
-            self.report((*path, "max"), f"the maximum {high.nominal:g} is below the minimum {low.nominal:g}{mend}")
-        if quantity == "angle" and (low is None or high is None):
-            self.report(path, "an angle needs both 'min' and 'max': angles are judged modulo a turn")
-        if kind == "distance":
-            for end, value in (("min", low), ("max", high)):
-                if value is not None and value.nominal < 0:
-                    self.report((*path, end), f"a distance is never negative, so not {value.nominal:g}")
 
 
 def _in_frame(drawn: list[complex], origin: complex, towards: complex) -> list[complex]:

@@ -101,6 +101,8 @@ def _hint(parts: Sequence[str]) -> str:
     text = " ".join(parts)
     if "cannot start any token" in text:
         return " (indent with spaces, not tabs; put special characters in quotes)"
+    if "alias" in text:
+        return " (put a word that begins with '*' in quotes, as in \"*.length\")"
     if "mapping values are not allowed" in text:
         return " (a ':' too many on the line, or wrong indentation)"
     return ""

@@ -32,11 +32,12 @@ def build(builder: Builder) -> dict[str, JointModel]:
 
 
 def _pair(builder: Builder, path: Path, pair: tuple[str, str]) -> bool:
-    known = [builder.check_name(link, builder.section.links, "link", (*path, k)) for k, link in enumerate(pair)]
-    if all(known) and pair[0] == pair[1]:
+    if not builder.check_names(pair, builder.section.links, "link", path):
+        return False
+    if pair[0] == pair[1]:
         builder.report(path, f"a joint of link {pair[0]!r} with itself")
         return False
-    return all(known)
+    return True
 
 
 def _on_link(builder: Builder, link: str, point: str, path: Path) -> bool:

@@ -91,6 +91,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
         (b"a: [1, 2\nb: 3", "s.yaml:2:2: is not YAML"),
         (b"a:\n\tb: 1", "s.yaml:2:1: is not YAML"),
         (b"a: b: c", "s.yaml:1:5: is not YAML"),
+        (b"*.length: 1", "put a word that begins with '*' in quotes"),
         (b"a: 1\n---\nb: 2\n", "s.yaml:2:1: a second YAML document"),
         (b"a: !!python/object/apply:os.system [ls]", "s.yaml:1:4: the YAML tag"),
         (b"a: &x [*x]", "s.yaml:1:8: undefined alias"),
@@ -98,7 +99,22 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
         (b"- " * 100_000, "nested deeper than"),
         (BOMB.encode(), "once its aliases are expanded"),
     ],
-    ids=["empty", "comment", "png", "control", "open", "tab", "colons", "two", "tag", "cycle", "flow", "block", "bomb"],
+    ids=[
+        "empty",
+        "comment",
+        "png",
+        "control",
+        "open",
+        "tab",
+        "colons",
+        "star",
+        "two",
+        "tag",
+        "cycle",
+        "flow",
+        "block",
+        "bomb",
+    ],
 )
 def test_what_is_no_study_is_told_quickly(content, message):
     start = time.perf_counter()

@@ -1,5 +1,6 @@
 """Templates are studies, and the JSON Schema accepts what the loader accepts."""
 
+import json
 from pathlib import Path
 
 import jsonschema
@@ -61,3 +62,10 @@ def test_the_schema_refuses_what_the_loader_refuses(text, validator, tmp_path):
     with pytest.raises(StudyError):
         mechdesign.load(path)
     assert list(validator.iter_errors(read(text.encode(), "s").data))
+
+
+def test_the_committed_schema_is_current():
+    committed = Path(__file__).parents[2] / "configs" / "mechdesign.schema.json"
+    assert json.loads(committed.read_text(encoding="utf-8")) == schema(), (
+        "run: mechdesign schema > configs/mechdesign.schema.json"
+    )
