@@ -46,8 +46,11 @@ def _curves(study: Study, result: Result) -> Figure | None:
         panels.setdefault((order, column.unit), []).append(column)
     ranks = ("position", "velocity", "acceleration", "effort", "det_J", "inverse_condition")
     keys = sorted(panels, key=lambda key: ranks.index(key[0]))[:MOST_PANELS]
-    figure = style.new_figure(style.WIDTH, 0.7 + 1.75 * len(keys))
-    axes = figure.subplots(len(keys), 1, sharex=True, squeeze=False)[:, 0]
+    # Margins by hand: a layout engine would draw everything twice.
+    height = 0.7 + 1.75 * len(keys)
+    figure = style.new_figure(style.WIDTH, height, layout=None)
+    margins = {"left": 0.11, "right": 0.83, "bottom": 0.5 / height, "top": 1 - 0.15 / height, "hspace": 0.14}
+    axes = figure.subplots(len(keys), 1, sharex=True, squeeze=False, gridspec_kw=margins)[:, 0]
     for axis, key in zip(axes, keys, strict=True):
         shown = panels[key][:MOST_CURVES]
         for column in shown:
@@ -57,6 +60,7 @@ def _curves(study: Study, result: Result) -> Figure | None:
         if title == "position" and key[1] == study.units.label("angle"):
             title = "angle"
         axis.set_ylabel(style.axis_label(title, key[1]))
+        axis.yaxis.set_label_coords(-0.1, 0.5)
         if len(shown) > 1 or shown[0].name != key[0]:
             left_out = len(panels[key]) - len(shown)
             axis.legend(
@@ -68,7 +72,6 @@ def _curves(study: Study, result: Result) -> Figure | None:
         else style.axis_label(swept, study.units.label(study.mechanism.quantity(swept)))
     )
     axes[-1].set_xlabel(label)
-    figure.align_ylabels(axes)
     return figure
 
 
@@ -80,8 +83,8 @@ def _paths(study: Study) -> Figure:
     given = [values * factor for values, factor in zip(group.columns(), factors, strict=True)]
     configuration = plan.solve(given)
     valid = np.flatnonzero(configuration.valid)
-    figure = style.new_figure(style.WIDTH, 5.4)
-    axes = figure.add_subplot()
+    figure = style.new_figure(style.WIDTH, 5.4, layout=None)
+    axes = figure.add_axes((0.09, 0.1, 0.89, 0.88))
     axes.set_aspect("equal", adjustable="datalim")
     if len(valid):
         # A closed turn ends where it begins: its last ghost would hide the first.

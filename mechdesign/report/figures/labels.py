@@ -60,9 +60,13 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: NDArray[np.floa
         best: tuple[float, complex, NDArray[np.float64]] | None = None
         for rank, anchor in enumerate(label.anchors):
             origin = paper(axes, np.array([anchor]))[0]
-            for offset, strain in _offsets(label, half):
+            places = _offsets(label, half)
+            # Only what is within reach of some place can be covered.
+            reach = np.max([np.abs(offset) for offset, _ in places], axis=0) + half + 1
+            near = obstacles[(np.abs(obstacles - origin) <= reach).all(axis=1)]
+            for offset, strain in places:
                 box = (*(origin + offset - half), *(origin + offset + half))
-                cost = strain + 0.4 * rank + _cost(box, obstacles, taken, window)
+                cost = strain + 0.4 * rank + _cost(box, near, taken, window)
                 if best is None or cost < best[0]:
                     best = cost, anchor, offset
         if best is None or (label.optional and best[0] > 4.0):
