@@ -58,7 +58,7 @@ class FirstOrder:
     def covariance(self) -> Floats:
         """Covariance of the channels, shape (poses, channels, channels) [S2, eq. 9]."""
         moved = np.moveaxis(self.components, 2, 0)
-        return (moved * self.variance) @ np.swapaxes(moved, 1, 2)
+        return np.asarray((moved * self.variance) @ np.swapaxes(moved, 1, 2))
 
     def sensitivity(self) -> Floats:
         """Per source, shape (channels, sources, poses): the derivative, of a pin sqrt(s_x^2 + s_y^2)."""

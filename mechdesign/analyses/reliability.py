@@ -16,9 +16,9 @@ from mechdesign.analyses.probability import Band, Disc
 from mechdesign.analyses.simulation import Setting, Sums, simulate
 from mechdesign.analyses.sources import Source, find_sources
 from mechdesign.errors import StudyError
-from mechdesign.memory import keep_freed_memory
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.memory import keep_freed_memory
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -194,7 +194,7 @@ class NominalPoses:
     @property
     def assembled(self) -> NDArray[np.bool_]:
         """Poses that can be computed, those outside the limits of motion included."""
-        return (self.reason == Reason.OK) | (self.reason == Reason.LIMIT)
+        return np.isin(self.reason, (Reason.OK, Reason.LIMIT))
 
 
 def first_order(study: Study, nominal: NominalPoses, question: Question, sources: tuple[Source, ...]) -> FirstOrder:
