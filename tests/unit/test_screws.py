@@ -1,0 +1,237 @@
+"""Reciprocal wrenches and the stiffness that they give: invariances and awkward cases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechdesign.analyses.compliance import Held, hold
+from mechdesign.analyses.screws import (
+    Chain,
+    constraint_compliance,
+    equivalent_springs,
+    hinge_twist,
+    joint_rank,
+    reciprocal_wrenches,
+    slide_twist,
+)
+
+LENGTH = 1.0
+
+
+def at(*places: complex) -> list[np.ndarray]:
+    return [hinge_twist(np.array([place])) for place in places]
+
+
+def along(*directions: complex) -> list[np.ndarray]:
+    return [slide_twist(np.array([direction / abs(direction)])) for direction in directions]
+
+
+def chain(passive: list[np.ndarray], elastic: list[np.ndarray] = (), compliance: list[float] = ()) -> Chain:
+    return Chain(passive, list(elastic), list(compliance), np.zeros(1, complex), np.zeros(1, complex))
+
+
+def held(*chains: Chain, size: int = 3) -> Held:
+    wrenches = []
+    for leg in chains:
+        rank = int(np.ravel(joint_rank(leg.passive, LENGTH))[0])
+        wrenches.append(reciprocal_wrenches(leg.passive, rank, LENGTH, 1))
+    return hold(wrenches, [constraint_compliance(w, c) for w, c in zip(wrenches, chains, strict=True)], LENGTH, size)
+
+
+def strut(base: complex, tip: complex, stiffness: float = np.inf) -> Chain:
+    """A hinged leg that is elastic (or rigid) along its line only."""
+    spring = ([], []) if np.isinf(stiffness) else (along(tip - base), [1 / stiffness])
+    return chain(at(base, tip), *spring)
+
+
+LEGS = [strut(-1 - 1j, -0.5, 3e3), strut(1 - 1.2j, 0.4 + 0.1j, 5e3), strut(0.2 - 1j, 0.7 + 0.2j, 2e3)]
+
+
+@pytest.mark.parametrize(
+    ("passive", "rank"),
+    [
+        ([], 0),
+        (at(1 + 2j), 1),
+        (along(1 + 1j), 1),
+        (at(1 + 2j, -0.3j), 2),
+        (at(1 + 2j) + along(2 - 1j), 2),
+        (along(1, 1j), 2),
+        (along(1 + 1j, 2 + 2j), 1),  # parallel slides
+        (at(0.3, 0.3), 1),  # two joints in one place
+        (at(0, 1, 3), 2),  # an elbow at full stretch
+        (at(0, 1 + 0.1j, 3), 3),
+        (at(0, 1, 3, 1 + 1j), 3),
+    ],
+)
+def test_wrenches_do_no_work_on_the_free_joints(passive: list[np.ndarray], rank: int) -> None:
+    assert np.all(joint_rank(passive, LENGTH) == rank)
+    wrenches = reciprocal_wrenches(passive, rank, LENGTH, 1)[:, :, 0]
+    assert wrenches.shape == (3, 3 - rank)
+    assert np.linalg.matrix_rank(wrenches) == 3 - rank
+    for twist in passive:
+        assert twist[:, 0] @ wrenches == pytest.approx(np.zeros(3 - rank), abs=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_rank_does_not_depend_on_the_unit_of_length(unit: float) -> None:
+    bent, straight = np.array([0, 1 + 1e-3j, 3]) * unit, np.array([0, 1, 3]) * unit
+    assert joint_rank(at(*bent), unit) == 3
+    assert joint_rank(at(*straight), unit) == 2
+
+
+def test_stiffness_is_symmetric_and_positive() -> None:
+    answer = held(*LEGS)
+    stiffness = answer.stiffness[0]
+    assert (stiffness == stiffness.T).all()
+    assert np.linalg.eigvalsh(stiffness).min() > 0
+    assert stiffness @ answer.compliance[0] == pytest.approx(np.eye(3), abs=1e-12)
+
+
+def test_any_basis_of_the_wrenches_gives_the_same_stiffness() -> None:
+    """W -> W R leaves K of a leg unchanged [S4, eq. 21]."""
+    leg = chain(along(1 + 2j), at(0.3 + 1j, -1 + 0.5j), [1e-5, 3e-6])
+    wrenches = reciprocal_wrenches(leg.passive, 1, LENGTH, 1)
+    mixed = np.einsum("imn,mk->ikn", wrenches, np.array([[2.0, -1.0], [0.5, 3.0]]))
+    one, other = (hold([w], [constraint_compliance(w, leg)], LENGTH).stiffness[0] for w in (wrenches, mixed))
+    assert other == pytest.approx(one, rel=1e-12)
+
+
+def test_constraint_space_compliance_does_not_depend_on_the_frame() -> None:
+    """Moved and turned with the mechanism, K transforms as a tensor of screws [S4, eqs. 26, 30]."""
+    shift, turn = 0.7 - 0.4j, np.exp(0.6j)
+
+    def moved(leg: Chain) -> Chain:
+        def carry(twist: np.ndarray) -> np.ndarray:
+            if twist[2, 0] == 0:
+                return along(complex(twist[0, 0], twist[1, 0]) * turn)[0]
+            return at(complex(-twist[1, 0], twist[0, 0]) * turn + shift)[0]
+
+        return chain([carry(t) for t in leg.passive], [carry(t) for t in leg.elastic], list(leg.compliance))
+
+    here, there = held(*LEGS).stiffness[0], held(*map(moved, LEGS)).stiffness[0]
+    rotate = np.array([[turn.real, -turn.imag, 0], [turn.imag, turn.real, 0], [0, 0, 1]])
+    # Wrench about the new origin of a wrench at the shifted one.
+    carry = np.array([[1, 0, 0], [0, 1, 0], [-shift.imag, shift.real, 1]])
+    assert there == pytest.approx(carry @ rotate @ here @ rotate.T @ carry.T, rel=1e-9)
+
+
+def test_one_rigid_leg_leaves_two_compliant_ways() -> None:
+    rigid = held(*LEGS[:2], strut(0.2 - 1j, 0.7 + 0.2j))
+    stiffer = held(*LEGS[:2], strut(0.2 - 1j, 0.7 + 0.2j, 1e14))
+    assert np.isnan(rigid.stiffness).all()
+    assert np.linalg.matrix_rank(rigid.compliance[0], tol=1e-9 * np.abs(rigid.compliance).max()) == 2
+    assert rigid.compliance[0] == pytest.approx(stiffer.compliance[0], rel=1e-9)
+
+
+def test_all_rigid_legs_hold_without_any_compliance() -> None:
+    answer = held(*(strut(*ends) for ends in ((-1 - 1j, -0.5), (1 - 1.2j, 0.4 + 0.1j), (0.2 - 1j, 0.7 + 0.2j))))
+    assert (answer.compliance == 0).all()
+    assert np.isnan(answer.stiffness).all()
+    assert answer.rank[0] == 3
+
+
+def test_over_constrained_legs_still_sum() -> None:
+    legs = [*LEGS, strut(-0.3 + 2j, 0.1 + 1j, 4e3), strut(2, 1 + 0.3j, 1e3)]
+    answer = held(*legs)
+    single = np.zeros((3, 3))
+    for leg in legs:
+        single += held(leg).stiffness[0]
+    assert answer.rank[0] == 3
+    assert answer.stiffness[0] == pytest.approx(single, rel=1e-9)
+    assert answer.compliance[0] @ single == pytest.approx(np.eye(3), abs=1e-10)
+
+
+def test_redundant_rigid_legs_are_no_contradiction() -> None:
+    """Two rigid struts on one line and two soft ones: the multipliers are not unique, the twist is."""
+    double = [strut(-1, 0.5), strut(-2, 0.5), LEGS[0], LEGS[1]]
+    assert held(*double).compliance[0] == pytest.approx(held(*double[1:]).compliance[0], rel=1e-9)
+
+
+def test_stiffnesses_far_apart_keep_their_digits() -> None:
+    soft, hard = 1e-3, 1e15
+    answer = held(strut(-1j, 0.2, soft), strut(1 - 1j, 1, hard), strut(-1 + 0.5j, 0.5j, hard))
+    far = held(strut(-1j, 0.2, 1.0), strut(1 - 1j, 1), strut(-1 + 0.5j, 0.5j))
+    assert answer.compliance[0] * soft == pytest.approx(far.compliance[0], rel=1e-9, abs=1e-12)
+
+
+def test_concurrent_legs_leave_the_turn_about_their_point_free() -> None:
+    centre = 0.4 + 0.8j
+    answer = held(*(strut(base, (base + centre) / 2, 1e3) for base in (-1, 1 - 0.5j, 2j)))
+    assert answer.rank[0] == 2
+    assert np.isnan(answer.compliance).all()
+    assert np.isfinite(answer.stiffness).all()
+    assert answer.free[0] == pytest.approx([centre.imag, -centre.real, 1.0])
+    assert answer.stiffness[0] @ answer.free[0] == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_parallel_legs_leave_a_translation_free() -> None:
+    answer = held(*(strut(x - 1j, x, 1e3) for x in (-1.0, 0.2, 0.9)))
+    assert answer.rank[0] == 2
+    assert answer.free[0] * np.sign(answer.free[0, 0]) == pytest.approx([1, 0, 0])
+
+
+def test_under_constrained_with_a_rigid_leg_has_neither_matrix() -> None:
+    answer = held(strut(-1j, 0), strut(1 - 1j, 1, 1e3))
+    assert answer.rank[0] == 2
+    assert np.isnan(answer.stiffness).all()
+    assert np.isnan(answer.compliance).all()
+
+
+def test_a_body_without_legs_is_free() -> None:
+    answer = hold([np.zeros((3, 0, 2))], [np.zeros((0, 0, 2))], LENGTH)
+    assert (answer.rank == 0).all()
+    assert (answer.stiffness == 0).all()
+
+
+def test_a_leg_rigid_in_its_links_turns_about_its_motor() -> None:
+    """Driven R, passive P: C_c is singular; one spring is rigid through the motor, the other twice the arm away."""
+    motor = 2e3
+    leg = Chain(along(1), at(-0.5), [1 / motor], np.array([-0.5 + 0j]), np.zeros(1, complex))
+    wrenches = reciprocal_wrenches(leg.passive, 1, LENGTH, 1)
+    outer, inner = equivalent_springs(wrenches, leg, LENGTH)
+    assert outer.place[0] == pytest.approx(0.5)
+    assert outer.stiffness[0] == pytest.approx(motor / 1.0**2)
+    assert inner.place[0] == pytest.approx(-0.5)
+    assert np.isinf(inner.stiffness[0])
+
+
+def test_two_wrenches_through_a_pin_give_its_principal_springs() -> None:
+    pin = 0.3 + 0.2j
+    leg = Chain(at(pin), along(np.exp(0.4j), 1j * np.exp(0.4j)), [1e-4, 1e-3], np.zeros(1, complex), np.array([pin]))
+    wrenches = reciprocal_wrenches(leg.passive, 1, LENGTH, 1)
+    stiff, soft = equivalent_springs(wrenches, leg, LENGTH)
+    assert [stiff.stiffness[0], soft.stiffness[0]] == pytest.approx([1e4, 1e3])
+    assert [stiff.angle[0], soft.angle[0]] == pytest.approx([0.4, 0.4 + np.pi / 2])
+    assert stiff.place[0] == pytest.approx(pin)
+
+
+def test_two_slides_leave_a_rotational_spring() -> None:
+    leg = Chain(along(1, 1j), at(0.4), [1 / 500.0], np.zeros(1, complex), np.array([0.7 + 0j]))
+    (spring,) = equivalent_springs(reciprocal_wrenches(leg.passive, 2, LENGTH, 1), leg, LENGTH)
+    assert spring.stiffness[0] == pytest.approx(500.0)
+    assert np.isnan(spring.angle[0])
+    assert spring.place[0] == pytest.approx(0.7)
+
+
+def test_closed_form_and_singular_values_agree() -> None:
+    """The same three legs, once as they are and once with a fourth that is far too soft to matter."""
+    faint = strut(2 - 1j, 1.5j, 1e-12)
+    assert held(*LEGS, faint).compliance[0] == pytest.approx(held(*LEGS).compliance[0], rel=1e-9)
+
+
+def test_poses_of_a_batch_do_not_mix() -> None:
+    """Regular, concurrent and parallel legs in one batch."""
+    tips = np.array([-0.5 + 0j, -0.5 + 0j])
+    bases = [np.array([-1 - 1j, -1 - 1j]), np.array([1 - 1.2j, 1 - 1.2j]), np.array([0.2 - 1j, -1.3 - 0.4j])]
+    ends = [tips, np.array([0.4 + 0.1j, -0.5]), np.array([0.7 + 0.2j, -0.5])]
+    wrenches, blocks = [], []
+    for base, end in zip(bases, ends, strict=True):
+        direction = (end - base) / abs(end - base)
+        leg = Chain([hinge_twist(base), hinge_twist(end)], [slide_twist(direction)], [1e-3], base, end)
+        wrenches.append(reciprocal_wrenches(leg.passive, 2, LENGTH, 2))
+        blocks.append(constraint_compliance(wrenches[-1], leg))
+    both = hold(wrenches, blocks, LENGTH)
+    assert both.rank.tolist() == [3, 2]
+    alone = hold([w[:, :, :1] for w in wrenches], [b[:, :, :1] for b in blocks], LENGTH)
+    assert both.compliance[0].tolist() == alone.compliance[0].tolist()
