@@ -1,0 +1,127 @@
+"""Wrong input from end to end, with the real analyses: one clear message, the right exit code, nothing half-written."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+FOUR_BAR = """\
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 0]}
+    crank: [O, A, 30]
+    rod: [A, B, 90]
+    rocker: [D, B, 60]
+  drives: [crank]
+  sketch: {A: [0, 30], B: [75, 55]}
+"""
+ARM = """\
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 10], forearm: [E, P, 8]}
+  drives: {t1: {angle: upper}, t2: {angle: forearm}}
+reliability:
+  dimensions: {upper.length: 0.03, forearm.length: 0.03}
+  poses: [{t1: 30, t2: 60}]
+  outputs: [P]
+  limits: {P.x: 0.05, P.y: 0.05}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "message"),
+    [
+        ("rod: [A, B, 90]", "rod: {from: A, to: B, lenght: 90}", "5:27", "did you mean 'length'"),
+        ("rod: [A, B, 90]", "rod: 90", "5:10", "expected a link"),
+        ("rod: [A, B, 90]", "rod: [A, B, 9]", "8:11", "cannot be assembled"),
+        ("drives: [crank]", "drives: [crank, rocker]", "7:11", "mobility is 1 but 2 drives"),
+        ("drives: [crank]", "drives: []", "7:11", "mobility is 1 but 0 drives"),
+        ("A, B, 90", "A, B, 3*q", "5:17", "unknown name 'q'"),
+        ("A, B, 90", "A, B, 90/(3-3)", "5:17", "division by zero"),
+        ("A, B, 90", "A, B, __import__('os').getcwd()", "5:17", "no meaning"),
+        ("A, B, 90", "A, B, .nan", "5:17", "nan"),
+        ("A, B, 90", "A, B, .inf", "5:17", "inf"),
+        ("A, B, 90", "A, B, -90", "5:17", "positive"),
+        ("  drives", "  joints: {g: {slot: rocker, through: Z, point: A}}\n  drives", "7:39", "'Z'"),
+        ("  drives", "  limits: [{distance: [O, Q], max: 3}]\n  drives", "7:27", "'Q'"),
+    ],
+)
+def test_a_wrong_study_is_told_where_it_is_wrong(folder, invoke, old, new, place, message) -> None:
+    assert old in FOUR_BAR
+    (folder / "study.yaml").write_text(FOUR_BAR.replace(old, new))
+    done = invoke("kinematics", "study.yaml")
+    assert done.exit_code == 2, done.output
+    assert f"study.yaml:{place}: mechanism." in done.stderr
+    assert message in done.stderr
+    assert not (folder / "results").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"# nothing\n", b"\x00\x01\xff" * 100, b"a: [" * 5000])
+def test_what_is_no_study_at_all(folder, invoke, content) -> None:
+    (folder / "study.yaml").write_bytes(content)
+    done = invoke("run", "study.yaml")
+    assert done.exit_code == 2
+    assert "study.yaml" in done.stderr
+
+
+def test_a_yaml_bomb_is_refused_before_it_grows(folder, invoke) -> None:
+    names = "abcdefghijklmnop"
+    lines = ["a: &a [1, 1]"] + [f"{b}: &{b} [{', '.join([f'*{a}'] * 10)}]" for a, b in itertools.pairwise(names)]
+    (folder / "study.yaml").write_text("\n".join(lines))
+    done = invoke("check", "study.yaml")
+    assert done.exit_code == 2
+    assert "aliases" in done.stderr
+
+
+def test_a_tolerance_is_not_negative(folder, invoke) -> None:
+    (folder / "study.yaml").write_text(ARM.replace("upper.length: 0.03", "upper.length: -0.03"))
+    done = invoke("reliability", "study.yaml")
+    assert done.exit_code == 2
+    assert "study.yaml:5:30: reliability.dimensions.upper.length" in done.stderr
+
+
+def test_a_listed_pose_outside_the_limits_is_exit_code_three(folder, invoke) -> None:
+    limited = (
+        FOUR_BAR
+        + "  limits: [{angle: [ground, rocker], min: 0, max: 100}]\nkinematics: {poses: [{crank: 30}, {crank: 215}]}\n"
+    )
+    (folder / "study.yaml").write_text(limited)
+    done = invoke("kinematics", "study.yaml", "--no-plots")
+    assert done.exit_code == 3
+    assert "crank = 215 deg: limit" in done.stderr
+    assert (folder / "results/study/kinematics/motion.csv").read_text().splitlines()[-1].endswith(",0")
+
+
+def test_an_output_directory_that_cannot_be_written(folder, invoke) -> None:
+    (folder / "study.yaml").write_text(FOUR_BAR)
+    (folder / "file").write_text("in the way")
+    done = invoke("kinematics", "study.yaml", "--out", "file/results")
+    assert done.exit_code == 4
+    assert "cannot be written" in done.stderr
+
+
+@pytest.mark.skipif(not hasattr(os, "wait4"), reason="peak memory of a child is read with wait4")
+def test_a_billion_samples_run_in_bounded_memory_and_can_be_interrupted(folder) -> None:
+    (folder / "study.yaml").write_text(ARM)
+    child = subprocess.Popen(
+        [sys.executable, "-m", "mechdesign", "reliability", "study.yaml", "--set", "reliability.samples=1000000000"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    time.sleep(8)
+    assert child.poll() is None
+    child.send_signal(signal.SIGINT)
+    _, status, usage = os.wait4(child.pid, 0)
+    assert child.stderr is not None
+    told = child.stderr.read().decode()
+    child.stderr.close()
+    child.returncode = os.waitstatus_to_exitcode(status)
+    assert child.returncode == 130, told
+    assert "Traceback" not in told
+    assert usage.ru_maxrss < 500_000  # KiB
+    assert not list(folder.rglob("*.csv"))
