@@ -72,7 +72,7 @@ class FirstOrder:
         """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies."""
         parts = sensitivity**2 * np.array([source.variance for source in self.sources])[:, None]
         total = parts.sum(axis=1, keepdims=True)
-        return np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0)
+        return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
 
     def worst_case(self, sensitivity: Floats) -> Floats:
         """Sum of |sensitivity| times tolerance, shape (channels, poses)."""

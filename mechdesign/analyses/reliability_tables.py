@@ -204,7 +204,7 @@ def contributions(answer: Answer) -> Table:
         Column(
             "sensitivity",
             np.moveaxis(sensitivity, 2, 0).ravel(),
-            meaning="derivative of the output by the source, angles in radians; a pin's is sqrt(s_x^2 + s_y^2)",
+            meaning="derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)",
         ),
         Column("share", np.moveaxis(share, 2, 0).ravel(), meaning="share of the output's variance, to the first order"),
     ]

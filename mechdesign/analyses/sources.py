@@ -30,7 +30,7 @@ class Source:
     directions : tuple of mapping
         Per independent component (one, or a pin's x and y), derivatives of places and drives (radians, lengths).
     variance : float
-        Of each component.
+        Of each component (a parameter's in its own unit, an angle's in radians).
     reach : float
         Largest magnitude, over all directions: the tolerance, or the largest radial clearance.
     """
@@ -62,12 +62,13 @@ class Sources:
     def first_order(self) -> tuple[Source, ...]:
         """Sources with the pins' variances of the analytic method [S2, eqs. 5, 6]."""
         found = []
-        for name, dimension in {**self.parameters, **self.places}.items():
+        for name, dimension in self.parameters.items():
             slopes = _geometric(self.study.parameters.derivatives(name))
             found.append(Source(name, (slopes,), dimension.standard_deviation**2, _half_width(dimension)))
-        for name, dimension in self.drives.items():
-            slope = self._factor(name)
-            found.append(Source(name, ({name: slope},), dimension.standard_deviation**2, _half_width(dimension)))
+        for name, dimension in {**self.places, **self.drives}.items():
+            factor = self._factor(name)
+            sigma, reach = factor * dimension.standard_deviation, factor * _half_width(dimension)
+            found.append(Source(name, ({name: 1.0},), sigma**2, reach))
         for point, clearance in self.clearances.items():
             spread = PIN_VARIANCE[clearance.pin.analytic] * (_radius_sigma(clearance) ** 2 + clearance.radius**2)
             link = _link(point, clearance)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -93,7 +95,7 @@ def _contours(
 def _draw_limits(
     axes: Axes, limits: tuple[tuple[float, float], tuple[float, float]] | float | None, reach: tuple[float, float]
 ) -> None:
-    look = {"fill": False, "edgecolor": style.VERMILION, "linestyle": "--", "linewidth": 1.6}
+    look: dict[str, Any] = {"fill": False, "edgecolor": style.VERMILION, "linestyle": "--", "linewidth": 1.6}
     if isinstance(limits, float):
         axes.add_patch(Circle((0.0, 0.0), limits, **look))
     elif limits is not None:

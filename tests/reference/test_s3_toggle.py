@@ -1,0 +1,106 @@
+"""S3: S. J. Lee (1993), velocity and acceleration error analysis of planar mechanism due to tolerances; Figs. 4 to 7."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mechdesign
+from mechdesign.results import Result
+
+STUDY = Path(__file__).parents[2] / "configs" / "toggle.yaml"
+ORDERS = ("position", "velocity", "acceleration")
+# Crank angle: nominal and first-order standard deviation of position, velocity and acceleration (cm, s).
+REFERENCE = {
+    0: ((70.3625914216, -0.1977441, 22.3090400), (0.24612856, 0.08994327, 0.60441205)),
+    90: ((70.9917550, 0.7907957, -36.7035840), (0.24239285, 0.17028405, 1.08981792)),
+    180: ((70.1253224, -0.3151511, 54.8069474), (0.24517514, 0.10252653, 1.92518110)),
+}
+
+
+@cache
+def result() -> Result:
+    return mechdesign.reliability(mechdesign.load(STUDY), jobs=2)
+
+
+def column(order: str, method: str, name: str) -> np.ndarray:
+    table = result().tables["moments"]
+    return table[name][(table["order"] == order) & (table["method"] == method)]
+
+
+def test_the_whole_cycle_by_5_degrees() -> None:
+    table = result().tables["moments"]
+    assert np.unique(table["theta2"]) == pytest.approx(np.arange(0, 361, 5))
+    assert result().counts == {"poses": 73, "samples": 73 * 40_000, "invalid": 0}
+
+
+@pytest.mark.parametrize("angle", REFERENCE)
+@pytest.mark.parametrize("k", range(3))
+def test_nominal_and_first_order(angle: int, k: int) -> None:
+    nominal, sigma = REFERENCE[angle]
+    row = angle // 5
+    assert column(ORDERS[k], "analytic", "nominal")[row] == pytest.approx(nominal[k], rel=1e-6)
+    assert column(ORDERS[k], "analytic", "mean")[row] == pytest.approx(nominal[k], rel=1e-6)
+    assert column(ORDERS[k], "analytic", "sigma")[row] == pytest.approx(sigma[k], rel=1e-6)
+
+
+def difference(order: str) -> np.ndarray:
+    """Per cent, of the simulation (Fig. 7)."""
+    return 100 * (column(order, "analytic", "sigma") / column(order, "monte_carlo", "sigma") - 1)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_methods_differ_by_less_than_half_a_per_cent_on_average(order: str) -> None:
+    assert np.abs(difference(order)).mean() < 0.5
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_printed_maximum_of_3_05_per_cent_is_not_reached(order: str) -> None:
+    """The paper's largest difference (velocity) does not reproduce under any consistent reading of it.
+
+    Without noise it is 0.42 %. A standard deviation from 40,000 samples errs by 0.35 %, so that the largest of 73 is
+    near 1 %, and 2 % would be more than four standard errors beyond 0.42 %.
+    """
+    assert np.abs(difference(order)).max() < 2.0
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_simulated_means_are_the_nominal_ones_to_the_second_order(order: str) -> None:
+    sigma = column(order, "monte_carlo", "sigma")
+    shift = column(order, "monte_carlo", "mean") - column(order, "monte_carlo", "nominal")
+    # Fig. 5: indistinguishable. The nonlinear shift is of the order of 5 % of a standard deviation.
+    assert (np.abs(shift) < 0.1 * sigma).all()
+
+
+def test_trend_of_the_means_settles_within_its_error() -> None:
+    """Fig. 4, at 0 deg."""
+    table = result().tables["convergence"]
+    assert (table["theta2"] == 0).all()
+    for order in ORDERS:
+        rows = table["order"] == order
+        samples, mean = table["samples"][rows], table["mean"][rows]
+        final, sigma = (column(order, "monte_carlo", name)[0] for name in ("mean", "sigma"))
+        assert samples[-1] == 40_000
+        assert mean[-1] == pytest.approx(final, rel=1e-12)
+        assert (np.abs(mean - final) <= 4 * sigma / np.sqrt(samples)).all()
+
+
+def test_the_pins_angle_makes_a_difference() -> None:
+    """The paper leaves the pin's angle offset out, and with it up to 21 % of the velocity's deviation."""
+    changes = [f"reliability.clearances.{pin}.effect=offset" for pin in ("A", "B", "O4", "S")]
+    study = mechdesign.load(STUDY, overrides=[*changes, "reliability.methods=[analytic]"])
+    table = mechdesign.reliability(study).tables["moments"]
+    offset = table["sigma"][table["order"] == "velocity"]
+    missing = 1 - column("velocity", "analytic", "sigma") / offset
+    assert missing.max() == pytest.approx(0.21, abs=0.005)
+    assert missing.min() >= 0.0
+
+
+def test_shares_sum_to_one() -> None:
+    table = result().tables["contributions"]
+    sources = len(np.unique(table["source"]))
+    assert sources == 8
+    assert table["share"].reshape(-1, sources).sum(axis=1) == pytest.approx(np.ones(73 * 3))

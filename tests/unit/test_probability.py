@@ -1,0 +1,107 @@
+"""Normal probabilities of limits and intervals of simulated ones, against closed forms and tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ndtr, owens_t
+
+from mechdesign.analyses.probability import (
+    Band,
+    Disc,
+    binomial_interval,
+    correlation,
+    disc_failure,
+    failure_probability,
+    rectangle_failure,
+    simulation_error,
+)
+
+
+def quadrant(h: float, k: float, rho: float) -> float:
+    """P(X < h, Y < k) by Owen's T function (Owen 1956), for h and k other than zero."""
+    rest = np.sqrt(1 - rho * rho)
+    half = 0.5 if h * k < 0 else 0.0
+    return float(0.5 * (ndtr(h) + ndtr(k)) - owens_t(h, (k / h - rho) / rest) - owens_t(k, (h / k - rho) / rest) - half)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.3, -0.7, 0.99, -0.999, 0.9999999])
+@pytest.mark.parametrize(
+    ("low", "high"), [((-2.9, -2.7), (2.8, 2.6)), ((-1.0, -3.0), (0.5, 2.0)), ((0.2, -6.0), (5.0, 7.0))]
+)
+def test_rectangle_agrees_with_owens_t(low: tuple[float, float], high: tuple[float, float], rho: float) -> None:
+    (a, b), (c, d) = low, high
+    inside = quadrant(c, d, rho) - quadrant(a, d, rho) - quadrant(c, b, rho) + quadrant(a, b, rho)
+    assert rectangle_failure(np.array(low), np.array(high), rho) == pytest.approx(1 - inside, abs=1e-14)
+
+
+def test_rectangle_loses_no_digits_far_out() -> None:
+    limit = np.array([9.0, 9.0])
+    # Independent: 2 p + 2 p - (2 p)^2, of which the last is below rounding.
+    assert rectangle_failure(-limit, limit, 0.0) == pytest.approx(4 * ndtr(-9.0), rel=1e-13)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rectangle_of_fully_correlated_errors_is_the_tighter_band(sign: float) -> None:
+    low, high = np.array([-2.0, -1.0]), np.array([1.5, 3.0])
+    band = (-1.0, 1.5) if sign > 0 else (-2.0, 1.0)
+    assert rectangle_failure(low, high, sign) == pytest.approx(ndtr(band[0]) + ndtr(-band[1]), rel=1e-14)
+
+
+@pytest.mark.parametrize("radius", [0.1, 1.0, 3.0, 8.0, 30.0])
+@pytest.mark.parametrize("covariance", [np.eye(2), np.array([[2.0, 0.6], [0.6, 1.0]]), np.diag([1.0, 1e-3])])
+def test_disc_agrees_with_the_integral_over_the_direction(covariance: np.ndarray, radius: float) -> None:
+    inverse = np.linalg.inv(covariance)
+    turn = 2 * np.pi * np.arange(20000) / 20000
+    around = np.stack([np.cos(turn), np.sin(turn)])
+    form = np.einsum("it,ij,jt->t", around, inverse, around)
+    expected = np.mean(np.exp(-0.5 * radius**2 * form) / form) / np.sqrt(np.linalg.det(covariance))
+    assert disc_failure(covariance, radius) == pytest.approx(expected, rel=1e-12)
+
+
+def test_disc_of_an_error_along_one_line() -> None:
+    line = np.array([[0.36, 0.48], [0.48, 0.64]])
+    assert disc_failure(line, 2.0) == pytest.approx(2 * ndtr(-2.0), rel=1e-12)
+
+
+def test_one_sided_limit() -> None:
+    assert failure_probability(np.array([[0.04]]), [Band(0, -np.inf, 0.5)], []) == pytest.approx(ndtr(-2.5), rel=1e-14)
+
+
+def test_three_limits_by_the_lattice() -> None:
+    covariance = np.array([[1.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 4.0]])
+    bands, third = [Band(0, -2.0, 2.0), Band(1, -2.0, 2.5)], Band(2, -6.0, 6.0)
+    pair, single = failure_probability(covariance, bands, []), failure_probability(covariance, [third], [])
+    together = failure_probability(covariance, [*bands, third], [])
+    assert together == pytest.approx(pair + single - pair * single, rel=1e-4)
+    disc = failure_probability(covariance, [], [Disc(0, 1, 2.0)])
+    mixed = failure_probability(covariance, [third], [Disc(0, 1, 2.0)])
+    assert mixed == pytest.approx(disc + single - disc * single, rel=1e-4)
+
+
+def test_an_error_that_does_not_vary_keeps_its_limit() -> None:
+    covariance = np.diag([1.0, 0.0])
+    bands = [Band(0, -2.0, 2.0), Band(1, -0.1, 0.1)]
+    assert failure_probability(covariance, bands, []) == pytest.approx(2 * ndtr(-2.0), rel=1e-14)
+    assert np.isnan(correlation(covariance))
+
+
+def test_clopper_pearson_against_its_tables() -> None:
+    # Clopper and Pearson (1934): 3 of 100 and none of 10 at 95 %.
+    assert binomial_interval(3, 100, 0.95) == pytest.approx((0.0062300, 0.0851761), abs=5e-8)
+    assert binomial_interval(0, 10, 0.95) == pytest.approx((0.0, 1 - 0.025**0.1), rel=1e-12)
+    assert binomial_interval(10, 10, 0.95) == pytest.approx((0.025**0.1, 1.0), rel=1e-12)
+
+
+def test_clopper_pearson_covers_at_its_rate() -> None:
+    samples, chance = 400, 0.02
+    seen = np.random.default_rng(3).binomial(samples, chance, 4000)
+    intervals = {k: binomial_interval(int(k), samples) for k in np.unique(seen)}
+    covered = np.mean([intervals[k][0] <= chance <= intervals[k][1] for k in seen])
+    assert covered >= 0.997 - 4 * np.sqrt(0.997 * 0.003 / 4000)
+
+
+def test_simulation_error_is_that_of_the_paper() -> None:
+    # S2, Sec. 5: at most 0.0075 at R = 0.5 and 0.0045 at R = 0.9 with 40,000 samples.
+    assert round(simulation_error(0.5, 40_000), 4) == 0.0075
+    assert round(simulation_error(0.1, 40_000), 4) == 0.0045
