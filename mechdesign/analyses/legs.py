@@ -56,7 +56,7 @@ class Leg:
     Parameters
     ----------
     name : str
-        Its links, from the base, joined by ``+``.
+        Its links, from the base, joined by ``+``; that of its joint where it has none.
     links : tuple of str
         Links in the chain.
     drives : tuple of str
@@ -197,8 +197,10 @@ class _LegBuilder:
         links = tuple(dict.fromkeys(filter(None, map(self.bodies.link_of, names[1:]))))
         if names[-1] != ASKED:
             links = tuple(link for link in links if link != self.bodies.link)
+        slide = contacts[0].slide
+        joint = contacts[0].point if slide is None else self.mechanism.graph.slides[slide]
         return Leg(
-            "+".join(links) or contacts[0].point, links, tuple(filter(None, drives)), contacts[0].point,
+            "+".join(links) or joint, links, tuple(filter(None, drives)), contacts[0].point,
             contacts[-1].point, tuple(elements),
         )  # fmt: skip
 

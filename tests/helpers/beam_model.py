@@ -1,10 +1,12 @@
 """A planar frame by finite elements: Euler-Bernoulli beams, and joints as Lagrange constraints.
 
-Written to check the stiffness analysis; it shares nothing with it but geometry. Every node has (ux, uy, phi); bodies meet
-only where a joint says so, so two bodies hinged at a point have a node each there.
+Written to check the stiffness analysis; it shares nothing with it but geometry. Every node has (ux, uy, phi); bodies
+meet only where a joint says so, so two bodies hinged at a point have a node each there.
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 
@@ -77,7 +79,7 @@ class Frame:
         """An elastic beam of stiffness EA and EI from node to node."""
         inner = [self.node(p) for p in np.linspace(self.places[a], self.places[b], ELEMENTS + 1)[1:-1].tolist()]
         nodes = [a, *inner, b]
-        for i, j in zip(nodes[:-1], nodes[1:], strict=True):
+        for i, j in pairwise(nodes):
             freedoms = np.array([3 * i, 3 * i + 1, 3 * i + 2, 3 * j, 3 * j + 1, 3 * j + 2])
             self.springs.append((freedoms, _element(self.places[j] - self.places[i], axial, bending)))
 

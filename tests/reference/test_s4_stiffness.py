@@ -55,7 +55,7 @@ def test_compliance_at_the_reference_pose(kind: str) -> None:
 @pytest.mark.parametrize("kind", TYPES)
 def test_equivalent_springs_at_the_reference_pose(kind: str) -> None:
     table = mechdesign.stiffness(load(kind)).tables["springs"]
-    first = [row for row in table.rows()][: sum(map(len, SPRINGS[kind].values()))]
+    first = list(table.rows())[: sum(map(len, SPRINGS[kind].values()))]
     for leg, expected in SPRINGS[kind].items():
         assert [row["stiffness"] for row in first if row["leg"] == leg] == pytest.approx(expected, rel=1e-9)
 

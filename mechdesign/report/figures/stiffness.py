@@ -1,0 +1,251 @@
+"""Pictures of a stiffness: equivalent springs on the mechanism [S4, Fig. 6], directions, curves or a map over poses."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.stiffness import ask, evaluate
+from mechdesign.mechanism import Configuration
+from mechdesign.report.figures import style
+from mechdesign.report.figures.annotations import name_labels, obstacles
+from mechdesign.report.figures.labels import place_labels
+from mechdesign.report.figures.mechanism import draw_mechanism, link_colors
+from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.report.figures.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
+from mechdesign.results import Result
+from mechdesign.study import Study
+
+MOST_DIRECTIONS = 4
+_COIL = 0.17  # length of a coil over the size of the mechanism
+MOST_LOADS = 4
+_MOVED = 0.12  # largest drawn deflection over the size of the mechanism
+_HEIGHT = 6.2  # inches at most
+
+
+def figures(study: Study, result: Result) -> dict[str, Figure]:
+    """``springs`` (first pose), ``directions`` (a few poses), and over many poses ``stiffness``, curves or a map."""
+    found: dict[str, Figure] = {}
+    springs = _springs(study)
+    if springs is not None:
+        found["springs"] = springs
+    if study.stiffness is not None and study.stiffness.loads:
+        deflections = _deflections(study, result)
+        if deflections is not None:
+            found["deflections"] = deflections
+    directions = _directions(study, result)
+    if directions is not None:
+        found["directions"] = directions
+    poses = study.poses("stiffness")
+    if not poses.listed and poses.count > 2:
+        if len(poses.grid) == 1:
+            found["stiffness"] = _curves(study, result)
+        elif len(poses.grid) == 2:
+            found["stiffness"] = _map(study, result)
+    return found
+
+
+def first_pose(study: Study) -> tuple[Configuration, int] | None:
+    """The first pose that can be assembled, and its row."""
+    for group in study.poses("stiffness").groups:
+        plan = study.mechanism.plan(group.names)
+        factors = [study.units.angle_factor if c.quantity == "angle" else 1.0 for c in plan.structure.given]
+        configuration = plan.solve([v * f for v, f in zip(group.columns(), factors, strict=True)])
+        valid = np.flatnonzero(configuration.valid)
+        if len(valid):
+            return configuration.take(valid[:1]), int(group.rows[valid[0]])
+    return None
+
+
+def _springs(study: Study) -> Figure | None:
+    found = first_pose(study)
+    if found is None:
+        return None
+    configuration, row = found
+    scene = pose(study.mechanism, configuration)
+    coils = _coils(study, configuration, scene) if scene is not None else []
+    if scene is None or not coils:
+        return None
+    places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
+    figure, axes = _canvas(places, study.units.length)
+    axes.set_title(f"equivalent springs at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
+    draw_mechanism(axes, study.mechanism, configuration, labels=False, drives=False)
+    draw_coils(axes, coils)
+    points = [label for label in name_labels(scene, link_colors(study.mechanism), (), style.INK) if not label.italic]
+    blocked = np.concatenate([obstacles(axes, scene, (), {}), coil_obstacles(axes, coils)])
+    place_labels(axes, coil_labels(coils) + points, blocked, order=8)
+    return figure
+
+
+def _coils(study: Study, configuration: Configuration, scene: Scene) -> list[Coil]:
+    asked = ask(study)
+    _, springs = evaluate(asked, configuration)
+    length = _COIL * scene.span
+    coils = []
+    for spring in springs:
+        leg, angle = asked.legs[int(spring.leg[0])], float(spring.angle[0])
+        if np.isnan(angle):
+            continue
+        place, along = complex(spring.place[0]), complex(np.exp(1j * angle))
+        base, tip = (complex(configuration.point(point)[0]) for point in (leg.base, leg.tip))
+        inward = ((base - place) * along.conjugate()).real
+        grounded = abs(inward) > length and abs(base - place - inward * along) < 1e-6 * scene.span
+        if grounded:
+            anchor = base
+        else:
+            # Its line passes the leg's base: away from the body.
+            body = complex(configuration.point(asked.section.at)[0])
+            anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
+        text = quantity(float(spring.stiffness[0]), study.units.label("stiffness"))
+        coils.append(Coil(text, place, anchor, tip, length, grounded))
+    return coils
+
+
+def _deflections(study: Study, result: Result) -> Figure | None:
+    """The asked link, much enlarged, where each load moves it."""
+    found = first_pose(study)
+    section, table = study.stiffness, result.tables["deflections"]
+    if found is None or section is None:
+        return None
+    configuration, row = found
+    scene = pose(study.mechanism, configuration)
+    loads = section.loads[:MOST_LOADS]
+    rows = row * len(section.loads) + np.arange(len(loads))
+    if scene is None or not np.isfinite(table["dx"][rows]).all():
+        return None
+    at = scene.points[section.at]
+    body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
+    moves = []
+    for k in rows:
+        turn = float(table["dphi"][k]) if "dphi" in table else 0.0
+        shift = complex(table["dx"][k], table["dy"][k])
+        moves.append(np.array([shift + 1j * turn * (place - at) for place in body]))
+    scales = [round_down(_MOVED * scene.span / max(abs(move).max(), 1e-300)) for move in moves]
+    places = np.concatenate([[*scene.points.values()], *(body + s * m for s, m in zip(scales, moves, strict=True))])
+    figure, axes = _canvas(places, study.units.length)
+    draw_mechanism(axes, study.mechanism, configuration, faint=True)
+    for color, load, scale, move in zip(style.PALETTE, loads, scales, moves, strict=False):
+        moved = np.array(body) + scale * move
+        outline = np.append(moved[1:], moved[1:2])
+        axes.plot(outline.real, outline.imag, color=color, linewidth=2, zorder=5)
+        axes.plot([at.real, moved[0].real], [at.imag, moved[0].imag], color=color, linewidth=1, zorder=5)
+        axes.plot(
+            [moved[0].real], [moved[0].imag], "o", color=color, zorder=6, label=_load_in_words(study, load, scale)
+        )
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=True, framealpha=0.85, edgecolor="none")
+    axes.set_title(f"deflections, enlarged, at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
+    return figure
+
+
+def round_down(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
+
+
+def _load_in_words(study: Study, load: tuple[float, ...], scale: float) -> str:
+    units = [study.units.label(kind) for kind in ("force", "force", "moment")]
+    parts = [
+        f"{name} = {value:g} {unit}"
+        for name, value, unit in zip(("fx", "fy", "mz"), load, units, strict=False)
+        if value
+    ]
+    return f"{', '.join(parts) or 'no load'} (x {scale:g})"
+
+
+def _canvas(places: np.ndarray, unit: str) -> tuple[Figure, Axes]:
+    """Axes of one scale that hold the places, as large as the page allows."""
+    low = complex(places.real.min(), places.imag.min())
+    high = complex(places.real.max(), places.imag.max())
+    wide, tall = max((high - low).real, 1e-9), max((high - low).imag, 1e-9)
+    pad, left, below, above = 0.55, 0.68, 0.5, 0.35
+    inches = min((style.WIDTH - left - 0.15 - 2 * pad) / wide, (_HEIGHT - below - above - 2 * pad) / tall)
+    width, height = style.WIDTH - left - 0.15, max(inches * tall + 2 * pad, 1.5)
+    outer = height + below + above
+    figure = style.new_figure(style.WIDTH, outer, layout=None)
+    axes = figure.add_axes((left / style.WIDTH, below / outer, width / style.WIDTH, height / outer))
+    middle = (low + high) / 2
+    axes.set_xlim(middle.real - width / 2 / inches, middle.real + width / 2 / inches)
+    axes.set_ylim(middle.imag - height / 2 / inches, middle.imag + height / 2 / inches)
+    axes.set_aspect("equal")
+    axes.set_xlabel(style.axis_label("x", unit))
+    axes.set_ylabel(style.axis_label("y", unit))
+    return figure, axes
+
+
+def _directions(study: Study, result: Result) -> Figure | None:
+    """Stiffness to a force, over the direction of the force, with its principal values marked."""
+    table, soft = result.tables["stiffness"], result.tables["compliance"]
+    known = np.flatnonzero(np.isfinite(soft["C11"]) & np.isfinite(table["k_max"]))
+    if not len(known):
+        return None
+    rows = known[np.unique(np.linspace(0, len(known) - 1, MOST_DIRECTIONS).astype(int))]
+    unit, poses, factor = study.units.label("stiffness"), study.poses("stiffness"), study.units.angle_factor
+    figure = style.new_figure(style.WIDTH, 4.2)
+    axes = figure.add_subplot()
+    for k, row in enumerate(rows):
+        color, angle = style.PALETTE[k], float(table["k_angle"][row])
+        # A sharp peak lies between the points of an even grid: the principal directions are among them.
+        turns = np.sort(
+            np.append(np.linspace(0, np.pi, 721), np.mod([angle * factor, angle * factor + np.pi / 2], np.pi))
+        )
+        xx, xy, yy = (float(soft[name][row]) for name in ("C11", "C12", "C22"))
+        moved = xx * np.cos(turns) ** 2 + 2 * xy * np.cos(turns) * np.sin(turns) + yy * np.sin(turns) ** 2
+        axes.plot(turns / factor, 1 / moved, color=color, label=pose_in_words(study, poses, int(row)))
+        softest = np.mod(angle + np.pi / 2 / factor, np.pi / factor)
+        axes.plot([angle, softest], [table["k_max"][row], table["k_min"][row]], "o", color=color, markersize=5)
+    if table["k_max"][rows].max() > 4 * table["k_min"][rows].min():
+        axes.set_yscale("log")
+    axes.set_xlim(0, np.pi / factor)
+    axes.set_xticks(np.linspace(0, np.pi, 7) / factor)
+    axes.set_xlabel(style.axis_label("direction of the force", study.units.label("angle")))
+    axes.set_ylabel(style.axis_label("stiffness (dots: k_min, k_max)", unit))
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    return figure
+
+
+def _curves(study: Study, result: Result) -> Figure:
+    table, poses = result.tables["stiffness"], study.poses("stiffness")
+    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
+    along = poses.values[moving[0]] if len(moving) == 1 else np.arange(poses.count)
+    turning = "k_phi" in table
+    figure = style.new_figure(style.WIDTH, 5.2 if turning else 3.4)
+    axes = figure.subplots(1 + turning, 1, sharex=True, squeeze=False)[:, 0]
+    for name, look in (("k_x", "-"), ("k_y", "-"), ("k_min", "--"), ("k_max", ":")):
+        values = np.where(np.isfinite(table[name]), table[name], np.nan)
+        axes[0].plot(along, values, look, label=name, color=style.INK if look != "-" else None)
+    axes[0].set_ylabel(style.axis_label("stiffness to a force", study.units.label("stiffness")))
+    if turning:
+        axes[1].plot(along, table["k_phi"], color=style.GREEN, label="k_phi")
+        axes[1].set_ylabel(style.axis_label("to a moment", study.units.label("rotational_stiffness")))
+    for axis in axes:
+        axis.set_yscale("log")
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    single = len(moving) == 1
+    unit = study.units.label(study.mechanism.quantity(moving[0])) if single else ""
+    axes[-1].set_xlabel(style.axis_label(moving[0] if single else "pose along the path", unit))
+    figure.align_ylabels(axes)
+    return figure
+
+
+def _map(study: Study, result: Result) -> Figure:
+    """k_min over a grid of two coordinates."""
+    table, poses = result.tables["stiffness"], study.poses("stiffness")
+    names = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
+    x, y = (poses.values[name].reshape(poses.grid) for name in names)
+    values = np.where(table["k_min"] > 0, table["k_min"], np.nan).reshape(poses.grid)
+    figure = style.new_figure(style.WIDTH, 5.2)
+    axes = figure.add_subplot()
+    known = values[np.isfinite(values)]
+    norm = LogNorm(known.min(), known.max()) if len(known) and known.max() > known.min() else None
+    mesh = axes.pcolormesh(x, y, values, norm=norm, cmap=style.COLORMAP, shading="nearest")
+    figure.colorbar(mesh, label=style.axis_label("k_min", study.units.label("stiffness")))
+    quantities = [study.mechanism.quantity(name) for name in names]
+    axes.set_xlabel(style.axis_label(names[0], study.units.label(quantities[0])))
+    axes.set_ylabel(style.axis_label(names[1], study.units.label(quantities[1])))
+    if quantities == ["length", "length"]:
+        axes.set_aspect("equal")
+    return figure

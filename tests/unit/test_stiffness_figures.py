@@ -1,0 +1,77 @@
+"""Pictures of a stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.stiffness import ARM, FIVE_BAR
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.report.figures import style
+from mechdesign.report.figures.springs import Coil, quantity
+from mechdesign.report.figures.stiffness import figures, round_down
+
+
+def pictures(text: str, *overrides: str) -> set[str]:
+    study = study_of(text, *overrides)
+    with style.context():
+        found = figures(study, mechdesign.stiffness(study))
+        for figure in found.values():
+            assert style.to_png(figure).startswith(b"\x89PNG")
+    return set(found)
+
+
+def sweep(text: str) -> str:
+    return f"stiffness.sweep={text}"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "names"),
+    [
+        ([], {"springs", "directions"}),
+        (["stiffness.loads=[[10, -5]]"], {"springs", "directions", "deflections"}),
+        (["stiffness.poses=null", sweep("{P.x: 0, P.y: {from: 0.3, to: 0.7, number: 9}}")],
+         {"springs", "directions", "stiffness"}),
+        (["stiffness.poses=null", sweep("{P.x: {from: 0, to: 0.1, step: 0.05}, P.y: {from: 0.3, to: 0.5, step: 0.1}}")],
+         {"springs", "directions", "stiffness"}),
+        # All rigid: no direction gives, and there is no curve to draw.
+        (["stiffness.actuators={}"], {"springs"}),
+    ],
+)  # fmt: skip
+def test_pictures_of_a_pin(overrides: list[str], names: set[str]) -> None:
+    assert pictures(FIVE_BAR, *overrides) == names
+
+
+def test_a_leg_without_springs_has_no_picture_of_them() -> None:
+    assert pictures(ARM, "stiffness.loads=[[0, -100, 0]]") == {"directions", "deflections"}
+
+
+def test_poses_that_fail_are_left_out() -> None:
+    assert "springs" in pictures(FIVE_BAR, "stiffness.poses=[{P.x: 9, P.y: 9}, {P.x: 0.05, P.y: 0.45}]")
+
+
+def test_coil_runs_from_its_point_to_its_anchor() -> None:
+    coil = Coil("", 1 + 1j, 4 + 5j, 1 + 1j, 2.0, False)
+    assert coil.path[[0, -1]] == pytest.approx([1 + 1j, 4 + 5j])
+    across = ((coil.path - coil.place) * np.conj(3 + 4j) / 5).imag
+    assert abs(across).max() == pytest.approx(0.24, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (37409110.8, "3.74·10⁷ N/m"),
+        (25958.86, "25959 N/m"),
+        (474.93, "475 N/m"),
+        (2e-4, "2.00·10⁻⁴ N/m"),
+        (np.inf, "rigid"),
+    ],
+)
+def test_stiffness_in_three_digits(value: float, text: str) -> None:
+    assert quantity(value, "N/m") == text
+
+
+@pytest.mark.parametrize(("value", "expected"), [(2.0, 2.0), (1.99, 1.0), (730.0, 500.0), (0.01, 0.01), (0.049, 0.02)])
+def test_scales_are_round(value: float, expected: float) -> None:
+    assert round_down(value) == pytest.approx(expected)
