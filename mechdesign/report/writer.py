@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,11 +89,15 @@ def pictures(study: Study, result: Result) -> dict[str, bytes]:
     """PNG files of a result: those of its command, then the mechanism."""
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
+    from mechdesign.report.figures.rendering import Drawing, render
 
     with style.context():
         figures: dict[str, Figure] = import_module(f"mechdesign.report.figures.{result.command}").figures(study, result)
-        figures["mechanism"] = mechanism_figure(study)
-        return {f"{name}.png": style.to_png(figure) for name, figure in figures.items()}
+        drawings: dict[str, Drawing] = {
+            f"{name}.png": partial(style.to_png, figure) for name, figure in figures.items()
+        }
+        drawings["mechanism.png"] = lambda: style.to_png(mechanism_figure(study))
+        return render(drawings)
 
 
 def _replace(path: Path, data: bytes) -> None:
