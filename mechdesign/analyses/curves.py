@@ -1,0 +1,63 @@
+"""The region of one design as patches: boundary curves and a grid between them, for tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.panels import Panels
+from mechdesign.analyses.rays import Designs, Floats, Ints, trace
+
+SLACK = 1e-9
+# Nodes of a map along each ray, from boundary to boundary.
+GRID = 33
+# An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
+INSET = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """The part of the region between one inner and one outer curve, over one panel.
+
+    Parameters
+    ----------
+    theta, inner, outer : ndarray, shape (rays,)
+        Angles and the radii of both curves.
+    enters, leaves : int
+        Margins that are zero on them; -1 where the patch begins at the centre of the scan.
+    """
+
+    theta: Floats
+    inner: Floats
+    outer: Floats
+    enters: int
+    leaves: int
+
+    def grid(self, about: complex) -> NDArray[np.complex128]:
+        """Nodes, shape (rays, GRID), denser towards both curves."""
+        fraction = 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID)))
+        fraction = np.clip(fraction, INSET, 1 - INSET)
+        radius = self.inner[:, None] + fraction * (self.outer - self.inner)[:, None]
+        return about + radius * np.exp(1j * self.theta)[:, None]
+
+
+def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterator[Patch]:
+    """Patches of a single design, with about `rays` rays over all panels (both ends of each included)."""
+    total = float(np.sum(panels.high - panels.low))
+    for low, high in zip(panels.low, panels.high, strict=True):
+        number = max(3, round(rays * (high - low) / total) + 1)
+        # Denser towards the ends, where cusps are thin and corners sharp.
+        theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
+        zero = np.zeros(number, dtype=np.intp)
+        traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
+        counts = traced.counts
+        usual = counts[number // 2]
+        first = np.searchsorted(traced.ray, np.nonzero(counts == usual)[0])
+        for slot in range(int(usual)):
+            at: Ints = first + slot
+            middle = at[len(at) // 2]
+            yield Patch(theta[counts == usual], traced.inner[at], traced.outer[at],
+                        int(traced.enters[middle]), int(traced.leaves[middle]))  # fmt: skip
