@@ -48,8 +48,9 @@ def inverse_condition(jacobian: Array) -> Array:
     if jacobian.shape[-1] == 2:
         squares = np.einsum("...ij,...ij->...", jacobian, jacobian)
         with np.errstate(divide="ignore", invalid="ignore"):
-            half = squares / (2 * np.abs(determinant(jacobian)))
-            return 1 / (half + np.sqrt(np.maximum(half * half - 1, 0.0)))
+            twice = squares / np.abs(determinant(jacobian))
+            # (s - 2)(s + 2) rather than s^2 - 4 keeps the digits near isotropy.
+            return 2 / (twice + np.sqrt(np.maximum(twice - 2, 0.0) * (twice + 2)))
     finite = np.isfinite(jacobian).all(axis=(-1, -2))
     safe = np.where(finite[..., None, None], jacobian, 0.0)
     values = np.linalg.svd(safe, compute_uv=False)
