@@ -26,6 +26,15 @@ def dot(a: Value, b: Value) -> Value:
     return a.real * b.real + a.imag * b.imag
 
 
+def plus(total: Value, sign: int, term: Value) -> Value:
+    """``total + sign * term`` without a pass over an array where one of them is nothing."""
+    if isinstance(term, float | complex) and term == 0:
+        return total
+    if isinstance(total, float | complex) and total == 0:
+        return term if sign > 0 else -1.0 * term
+    return total + term if sign > 0 else total - term
+
+
 def vector(x: Value, y: Value) -> Value:
     """Complex number x + i y without the temporaries of ``x + 1j * y``."""
     shape = np.broadcast_shapes(np.shape(x), np.shape(y))

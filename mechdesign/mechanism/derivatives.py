@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross
+from mechdesign.mechanism.algebra import Value, cross, plus
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.solve import State, columns
@@ -59,6 +59,7 @@ class Linearization:
             [], list(configuration.slides),
         )  # fmt: skip
         self._columns: dict[int, list[list[Value]]] = {}
+        self._scales: dict[int, Value] = {}
         self._edges: dict[int, Value] = {}
 
     def edge(self, k: int) -> Value:
@@ -76,6 +77,18 @@ class Linearization:
         if index not in self._columns:
             self._columns[index] = [columns(self.state, group, loop.edges) for loop in group.loops]
         return self._columns[index]
+
+    def _solve_group(self, index: int, group: Group, right: list[Value]) -> list[Value]:
+        lines = self.loop_columns(index, group)
+        if len(lines) > 1:
+            return _solve_small(lines, right)
+        a, b = lines[0]
+        if index not in self._scales:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                self._scales[index] = -1 / cross(a, b)
+        scale = self._scales[index]
+        with np.errstate(invalid="ignore"):
+            return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
 
     def solve(
         self,
@@ -114,32 +127,32 @@ class Linearization:
             edge = structure.edges[k]
             total = rest[k]
             if not (isinstance(angles[edge.frame], float) and angles[edge.frame] == 0.0):
-                total = total + self.edge(k) * (1j * angles[edge.frame])
+                total = plus(total, 1, self.edge(k) * (1j * angles[edge.frame]))
             if edge.slide is not None and not (isinstance(slides[edge.slide], float) and slides[edge.slide] == 0.0):
-                total = total + slides[edge.slide] * self.direction(k)
+                total = plus(total, 1, slides[edge.slide] * self.direction(k))
             return total
 
         for index, group in enumerate(structure.groups):
             if group.form != "place":
                 right = []
                 for loop in group.loops:
-                    total = 0.0 if loop.start == loop.end else nodes[loop.start] - nodes[loop.end]
+                    total = 0.0 if loop.start == loop.end else plus(nodes[loop.start], -1, nodes[loop.end])
                     for k, sign in loop.edges:
-                        total = total + sign * step(k)
+                        total = plus(total, sign, step(k))
                     right.append(total)
-                unknowns = _solve_small(self.loop_columns(index, group), right)
+                unknowns = self._solve_group(index, group, right)
                 for position, root in enumerate(group.angles):
                     for frame, tie in enumerate(structure.ties):
                         if tie.root == root:
-                            angles[frame] = angles[frame] + unknowns[position]
+                            angles[frame] = plus(angles[frame], 1, unknowns[position])
                 for position, slide in enumerate(group.slides):
                     slides[slide] = unknowns[len(group.angles) + position]
             for k, sign in group.tree:
                 edge = structure.edges[k]
                 if sign > 0:
-                    nodes[edge.head] = nodes[edge.tail] + step(k)
+                    nodes[edge.head] = plus(nodes[edge.tail], 1, step(k))
                 else:
-                    nodes[edge.tail] = nodes[edge.head] - step(k)
+                    nodes[edge.tail] = plus(nodes[edge.head], -1, step(k))
         return Rates(nodes, angles, slides, offsets)
 
     def drives(self) -> Rates:
@@ -240,11 +253,6 @@ class Linearization:
 
 def _solve_small(loop_columns: list[list[Value]], right: list[Value]) -> list[Value]:
     """Solve sum_j c_j y_j = -right per loop (complex equations, real unknowns)."""
-    if len(loop_columns) == 1:
-        a, b = loop_columns[0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            scale = -1 / cross(a, b)
-            return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
     rows = [part for line in loop_columns for part in ([c.real for c in line], [c.imag for c in line])]
     sides = [part for value in right for part in (np.real(value), np.imag(value))]
     shape = np.broadcast_shapes(*(np.shape(c) for row in rows for c in row))

@@ -15,6 +15,8 @@ that they stay smooth there). Outside, the unknowns are nan.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, cross, dot, norm2, vector
@@ -26,9 +28,12 @@ ROUNDING = 4e-15
 Solution = tuple[Value, Value, tuple[Value, ...]]
 
 
-def _root(product: Value, tolerance: Value) -> Value:
-    """Square root, zero down to -tolerance and nan below it."""
-    return np.sqrt(np.where((product < 0) & (product >= -tolerance), 0.0, product))
+def _root(product: Value, *sizes: Value) -> Value:
+    """Square root, zero down to -ROUNDING times the product of `sizes` and nan below it."""
+    below = product < 0
+    if np.any(below):
+        product = np.where(below & (product >= -ROUNDING * math.prod(sizes)), 0.0, product)
+    return np.sqrt(product)
 
 
 def two_angles(k: Value, z1: Value, z2: Value, mode: int) -> Solution:
@@ -36,7 +41,7 @@ def two_angles(k: Value, z1: Value, z2: Value, mode: int) -> Solution:
     n1, n2, reach = norm2(z1), norm2(z2), norm2(k)
     product = 2 * np.sqrt(n1 * n2)
     outer, inner = (n1 + n2 + product) - reach, reach - (n1 + n2 - product)
-    height = _root(outer * inner, ROUNDING * (n1 + n2) * reach)
+    height = _root(outer * inner, n1 + n2, reach)
     along = (0.5 / reach) * vector(reach + (n1 - n2), mode * height)
     first = k * along
     u1 = first * (np.conj(z1) * (-1 / n1))
@@ -49,7 +54,7 @@ def angle_and_fixed_slide(k: Value, z: Value, d: Value, mode: int) -> Solution:
     n = norm2(z)
     offset = cross(d, k)
     closure = n - offset * offset
-    s = mode * _root(closure, ROUNDING * n) - dot(d, k)
+    s = mode * _root(closure, n) - dot(d, k)
     u = (k + s * d) * (np.conj(z) * (-1 / n))
     return u, s, (closure,)
 
@@ -59,7 +64,7 @@ def angle_and_turning_slide(k: Value, z: Value, d: Value, mode: int) -> Solution
     offset = cross(d, z)
     reach = norm2(k)
     closure = reach - offset * offset
-    s = mode * _root(closure, ROUNDING * reach) - dot(d, z)
+    s = mode * _root(closure, reach) - dot(d, z)
     u = k * np.conj(z + s * d) * (-1 / reach)
     return u, s, (closure,)
 

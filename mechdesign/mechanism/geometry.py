@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, norm2, rotation, vector
+from mechdesign.mechanism.algebra import Value, cross, norm2, plus, rotation, vector
 from mechdesign.mechanism.graph import Edge, Graph, Turn
 from mechdesign.mechanism.model import Place, Term
 
@@ -119,7 +119,7 @@ class Geometry:
                 local = self.local(body, point, values)
                 if not isinstance(offsets[body], float):
                     local = local * offsets[body]
-                total = total + local if sign > 0 else total - local
+                total = plus(total, sign, local)
             w.append(total)
             if edge.slide is None:
                 d.append(0.0)

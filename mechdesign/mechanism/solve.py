@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism import dyads
-from mechdesign.mechanism.algebra import Value, rotation, vector
+from mechdesign.mechanism.algebra import Value, plus, rotation, vector
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.structure import Group, Loop, Structure
@@ -119,12 +119,12 @@ def _closed_form(state: State, group: Group, mode: int) -> None:
         arm = state.w[index] if unknown_slide else state.arm(index)
         if root in z:
             arm = arm if isinstance(state.ties[edge.frame], float) else arm * state.ties[edge.frame]
-            z[root] = z[root] + sign * arm
+            z[root] = plus(z[root], sign, arm)
             if unknown_slide:
                 direction = state.vectors.d[index]
                 d[edge.slide or 0] = sign * direction * state.ties[edge.frame]
         else:
-            k = k + sign * state.turned(arm, edge.frame)
+            k = plus(k, sign, state.turned(arm, edge.frame))
             if unknown_slide:
                 d[edge.slide or 0] = sign * state.turned(state.vectors.d[index], edge.frame)
     if group.form == "two angles":
@@ -147,7 +147,7 @@ def loop_sum(state: State, loop: Loop) -> Value:
     """Closure error of a loop."""
     total: Value = 0.0 if loop.start == loop.end else state.nodes[loop.start] - state.nodes[loop.end]
     for k, sign in loop.edges:
-        total = total + sign * state.edge(k)
+        total = plus(total, sign, state.edge(k))
     return total
 
 
@@ -159,9 +159,10 @@ def columns(state: State, group: Group, path: Sequence[tuple[int, int]]) -> list
         edge = state.structure.edges[k]
         root = state.structure.ties[edge.frame].root
         if root in by_root:
-            by_root[root] = by_root[root] + sign * state.edge(k)
+            by_root[root] = plus(by_root[root], sign, state.edge(k))
         if edge.slide is not None and edge.slide in by_slide:
-            by_slide[edge.slide] = by_slide[edge.slide] + sign * state.turned(state.vectors.d[k], edge.frame)
+            direction = state.turned(state.vectors.d[k], edge.frame)
+            by_slide[edge.slide] = plus(by_slide[edge.slide], sign, direction)
     return [1j * value for value in by_root.values()] + list(by_slide.values())
 
 
