@@ -7,11 +7,12 @@ reliability is one minus it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, ndtr, ndtri
+
+from mechdesign.analyses.error_limits import Band, Disc, correlation
 
 Floats = NDArray[np.float64]
 
@@ -23,24 +24,6 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _FAR = 39.0
 _LATTICE = 8191
 _SHIFTS = 8
-
-
-@dataclass(frozen=True)
-class Band:
-    """Error number `output` within [low, high]; either may be infinite."""
-
-    output: int
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Disc:
-    """Errors number `x` and `y` within a circle about zero."""
-
-    x: int
-    y: int
-    radius: float
 
 
 def failure_probability(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc]) -> float:
@@ -67,12 +50,6 @@ def failure_probability(covariance: Floats, bands: Sequence[Band], discs: Sequen
         (disc,) = discs
         return disc_failure(covariance[np.ix_([disc.x, disc.y], [disc.x, disc.y])], disc.radius)
     return _lattice(covariance, bands, discs)
-
-
-def correlation(covariance: Floats) -> float:
-    """Correlation of two errors, shape (2, 2); nan where one does not vary [S2, eq. 11, which prints its inverse]."""
-    product = float(np.sqrt(covariance[0, 0] * covariance[1, 1]))
-    return float(covariance[0, 1]) / product if product > 0 else float("nan")
 
 
 def _outside(low: float, high: float, sigma: float) -> float:

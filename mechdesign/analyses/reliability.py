@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses import reliability_tables as tables
 from mechdesign.analyses.assembly import forward_plan
+from mechdesign.analyses.error_limits import Band, Disc
 from mechdesign.analyses.first_order import Channel, FirstOrder, Rates, linear_errors, nominal_values
 from mechdesign.analyses.kinematics import continuous, default_outputs
 from mechdesign.analyses.poses import expand_outputs, judge_failures, radians, solve_poses
-from mechdesign.analyses.probability import Band, Disc
 from mechdesign.analyses.simulation import Setting, Sums, simulate
 from mechdesign.analyses.sources import Source, find_sources
 from mechdesign.errors import StudyError

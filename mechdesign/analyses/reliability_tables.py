@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.error_limits import correlation
 from mechdesign.analyses.first_order import ORDERS, FirstOrder
 from mechdesign.analyses.poses import pose_columns
-from mechdesign.analyses.probability import binomial_interval, correlation, failure_probability, simulation_error
 from mechdesign.analyses.simulation import CELLS, REACH, Sums
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -129,6 +129,9 @@ def _deviation(sums: Sums) -> Floats:
 
 def success(answer: Answer) -> Table:
     """Reliability of every pose by every method."""
+    # SciPy takes a quarter of a second to import, and only a study with limits needs it.
+    from mechdesign.analyses.probability import binomial_interval, failure_probability, simulation_error
+
     question, count, methods = answer.question, answer.poses.count, len(answer.methods)
     names = ("failure", "failure_low", "failure_high", "error", "rho")
     values = {name: np.full((count, methods), np.nan) for name in names}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
 
-CHUNK = 16_384
+CHUNK = 20_000
 
 Floats = NDArray[np.float64]
 

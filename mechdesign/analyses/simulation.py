@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.error_limits import Band, Disc
 from mechdesign.analyses.first_order import Channel, Rates, nominal_values
-from mechdesign.analyses.probability import Band, Disc
 from mechdesign.analyses.sampling import CHUNK, generator
 from mechdesign.analyses.sources import Sources
 from mechdesign.mechanism import Configuration
@@ -23,10 +23,10 @@ Floats = NDArray[np.float64]
 # The density's grid, in standard deviations [S2, Fig. 4], and the chunks it is counted over: a million samples.
 CELLS = 25
 REACH = 3.0
-_DENSITY_CHUNKS = 64
+_DENSITY_CHUNKS = 50
 # The trend of the means is followed in steps of this many samples through the first chunks, then at
 # powers of two.
-_TREND_STEP = 1024
+_TREND_STEP = 1000
 _TREND_CHUNKS = 16
 
 

@@ -1,4 +1,4 @@
-"""S3: S. J. Lee (1993), velocity and acceleration error analysis of planar mechanism due to tolerances; Figs. 4 to 7."""
+"""S3: S. J. Lee (1993), velocity and acceleration error analysis of planar mechanism due to tolerances, Figs. 4-7."""
 
 from __future__ import annotations
 

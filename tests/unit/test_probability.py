@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, owens_t
 
+from mechdesign.analyses.error_limits import Band, Disc, correlation
 from mechdesign.analyses.probability import (
-    Band,
-    Disc,
     binomial_interval,
-    correlation,
     disc_failure,
     failure_probability,
     rectangle_failure,

@@ -247,7 +247,7 @@ def test_a_listed_pose_that_fails_is_named_and_the_others_are_computed(tmp_path:
     assert "B.x = 500 mm" in result.failed
     assert np.isfinite(result.tables["moments"]["sigma"]).tolist() == [True, True, False, False]
     assert np.isnan(result.tables["reliability"]["reliability"]).tolist() == [False, False, True, True]
-    with pytest.raises(AssemblyError, match="B.x = 500 mm"):
+    with pytest.raises(AssemblyError, match=r"B\.x = 500 mm"):
         ask(tmp_path, SLIDER_CRANK.replace("{theta: 60}", "{B.x: 500}"), "dimensions: {a: 0.3}")
 
 

@@ -1,0 +1,34 @@
+"""Limits of errors, and the correlation of two errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Band:
+    """Error number `output` within [low, high]; either may be infinite."""
+
+    output: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Disc:
+    """Errors number `x` and `y` within a circle about zero."""
+
+    x: int
+    y: int
+    radius: float
+
+
+def correlation(covariance: Floats) -> float:
+    """Correlation of two errors, shape (2, 2); nan where one does not vary [S2, eq. 11, which prints its inverse]."""
+    product = float(np.sqrt(covariance[0, 0] * covariance[1, 1]))
+    return float(covariance[0, 1]) / product if product > 0 else float("nan")
