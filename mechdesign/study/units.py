@@ -196,8 +196,23 @@ def measure(text: str) -> tuple[float, Powers, float]:
     match = QUANTITY.fullmatch(text)
     if match is None:
         raise QuantityError(f"{text!r} is not a number with a unit")
-    powers, factor = _unit(match["unit"])
+    powers, factor = _common(match["unit"]) or _unit(match["unit"])
     return float(match["number"]), powers, factor
+
+
+def _common(unit: str) -> tuple[Powers, float] | None:
+    """A common unit or a quotient of two, such as ``rad/s``, without the registry, which takes a while to build."""
+    names = [name.strip() for name in unit.split("/")]
+    powers, factor = [0, 0, 0, 0], 1.0
+    if len(names) > 2:
+        return None
+    for name, sign in zip(names, (1, -1), strict=False):
+        kind = next((k for k, known in enumerate(_COMMON.values()) if name in known), None)
+        if kind is None:
+            return None
+        powers[kind] += sign
+        factor *= list(_COMMON.values())[kind][name] ** sign
+    return (powers[0], powers[1], powers[2], powers[3]), factor
 
 
 @cache

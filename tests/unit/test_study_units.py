@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from mechdesign.study import units as unit_rules
 from mechdesign.study.units import QuantityError, Units, units_from
 
 MM = units_from("mm", "deg", "s", "N")[0]
@@ -83,10 +84,19 @@ def test_labels(kind, label):
     assert Units().label(kind) == label
 
 
-def test_pint_is_imported_only_for_a_quantity(tmp_path):
+def test_pint_is_imported_only_for_an_uncommon_unit(tmp_path):
     study = tmp_path / "study.yaml"
     study.write_text("mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 2]}, drives: [arm], sketch: {P: [1, 1]}}\n")
     code = f"import sys, mechdesign; mechdesign.load({str(study)!r}); print('pint' in sys.modules)"
-    code += f"; mechdesign.load({str(study)!r}, ['mechanism.links.arm.length=2 in']); print('pint' in sys.modules)"
+    code += f"; mechdesign.load({str(study)!r}, ['mechanism.links.arm.length=2 ft']); print('pint' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "True"]
+
+
+@pytest.mark.parametrize("text", ["3 mm", "2 rad/s", "2 deg / s", "5 cm/min", "4 N", "4 kN/m", "1 in/s"])
+def test_common_units_are_those_of_the_registry(text: str) -> None:
+    number, powers, factor = unit_rules.measure(text)
+    unit = text.split(" ", 1)[1]
+    assert (number, powers) == (float(text.split()[0]), unit_rules._unit(unit)[0])
+    assert factor == pytest.approx(unit_rules._unit(unit)[1], rel=1e-14)
+    assert unit_rules._common(unit) is not None
