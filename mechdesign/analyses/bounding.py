@@ -9,6 +9,7 @@ from mechdesign.analyses.rays import Designs, Floats, Ints, trace
 
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9
+ROUNDING = 1e-12
 STEPS = 8
 # Directions in which the region is widest: right, left, up, down.
 _TURNS = np.array([1, -1, -1j, 1j])
@@ -28,10 +29,14 @@ def bounding_box(designs: Designs, panels: Panels, boundary: tuple[Ints, Floats,
     theta = np.concatenate([boundary[1], ends[corner]])
     radius = np.concatenate([boundary[2], traced.inner, traced.outer])
     place = designs.about + radius * np.exp(1j * theta)
+    at_end = np.arange(len(place)) >= len(boundary[0])
     farthest = np.zeros((4, count))
     for side, turn in enumerate(_TURNS):
         best, low, middle, high = _best((place * turn).real, design, theta, count)
         smooth = (low < middle) & (middle < high)
+        # As far at the end of a panel, but for rounding: a corner.
+        corners = at_end & ((place * turn).real >= (best - ROUNDING * np.abs(best))[design])
+        smooth[design[corners]] = False
         if smooth.any():
             climbed = _climb(designs, panels.reach, np.nonzero(smooth)[0], low, middle, high, turn, samples)
             best[smooth] = np.maximum(best[smooth], climbed)

@@ -66,18 +66,21 @@ class Field:
             np.zeros((), dtype=np.int8), places,
         )  # fmt: skip
 
-    def margins(self, z: NDArray[np.complex128], places: Places) -> NDArray[np.float64]:
-        """All margins at points `z`, shape (margins, *z.shape), in the order of `labels`; nan where unknown."""
+    def margins(self, z: NDArray[np.complex128], places: Places, *, assembly: bool = True) -> NDArray[np.float64]:
+        """All margins at points `z`, shape (margins, *z.shape), in the order of `labels`; nan where unknown.
+
+        Those of the assembly come last and may be left out.
+        """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             configuration = self.configuration(z, places)
             found = [*configuration.closures]
             found += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
             found += [margin for _, margin in self.mechanism.margins(configuration)]
-            if self.same_assembly:
-                signs = self._signs
-                found += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
             if self.plan.iterative:
                 found.append(np.where(configuration.valid, 1.0, -1.0))
+            if self.same_assembly and assembly:
+                signs = self._signs
+                found += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
         stacked = np.empty((len(found), *z.shape))
         for row, margin in zip(stacked, found, strict=True):
             row[...] = margin
@@ -92,9 +95,11 @@ class Field:
         found = [("singularity", name) for name in self._closure_names()]
         found += [("singularity", f"{mechanism.graph.slides[s]} length") for s in mechanism.graph.telescopic]
         found += [("limit", label) for label, _ in mechanism.margins(configuration)]
+        if self.plan.iterative:
+            found.append(("singularity", "continuation"))
         if self.same_assembly:
             found += [("singularity", f"assembly {k}") for k in range(len(self._signs))]
-        return (*found, ("singularity", "continuation")) if self.plan.iterative else tuple(found)
+        return tuple(found)
 
     def _closure_names(self) -> list[str]:
         """What ends the reach of each closed-form group, in the order of `Configuration.closures`."""

@@ -15,7 +15,7 @@ from mechdesign.analyses.rays import Designs, Floats, Intervals, Ints, trace
 from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.errors import AssemblyError
 
-PROBES = 8
+PROBES = 4
 DOUBLINGS = 16
 # Angles of panel ends are wanted to this accuracy (radians).
 ACCURACY = 1e-13

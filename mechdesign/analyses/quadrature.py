@@ -29,34 +29,36 @@ class Rule:
     nodes: Floats
     weights: Floats
     spectrum: Floats
+    window: int
     power: float
+    safety: float
 
     @staticmethod
-    def of(count: int) -> Rule:
-        """Rule of `count` nodes."""
+    def of(count: int, window: int, safety: float) -> Rule:
+        """Rule of `count` nodes that judges the decay of coefficients by groups of `window`, with a factor of safety."""
         nodes, weights = np.polynomial.legendre.leggauss(count)
         degrees = np.arange(count)
         basis = np.polynomial.legendre.legvander(nodes, count - 1).T
-        power = np.log(2) / np.log((count - 1.5) / (count - 3.5))
-        return Rule(nodes, weights, (degrees[:, None] + 0.5) * weights * basis, power)
+        middle = count - 0.5 * (window + 1)
+        power = np.log(2) / np.log(middle / (middle - window))
+        return Rule(nodes, weights, (degrees[:, None] + 0.5) * weights * basis, window, power, safety)
 
     def apply(self, values: Floats) -> tuple[Floats, Floats]:
         """Integral and its estimated error for values at the nodes (first axis).
 
         The error is about the first Legendre coefficient that the rule takes for a constant, of degree 2n. It is
-        extrapolated from the slowest decay between pairs of the last eight of degree below n, as a power of the degree:
-        the decay of what is not analytic (isotropic points), and safe for what is.
+        extrapolated from the slowest decay between the last groups of degree below n, as a power of the degree: the
+        decay of what is not analytic (isotropic points), and safe for what is.
         """
-        size = np.abs(self.spectrum[-8:] @ values)
-        pairs = np.maximum(size[0::2], size[1::2])
+        size = np.abs(self.spectrum[-(len(self.nodes) // self.window) * self.window :] @ values)
+        groups = size.reshape(-1, self.window, values.shape[1]).max(axis=1)[-4:]
         with np.errstate(divide="ignore", invalid="ignore"):
-            decay = np.minimum((pairs[1:] / pairs[:-1]).max(axis=0), 1.0)
+            decay = np.minimum((groups[1:] / groups[:-1]).max(axis=0), 1.0)
         decay = np.where(np.isfinite(decay), decay, 1.0)
-        return self.weights @ values, SAFETY * pairs[-1] * decay**self.power
+        return self.weights @ values, self.safety * groups[-1] * decay**self.power
 
 
-SAFETY = 4.0
-ANGLES, RADII = Rule.of(12), Rule.of(9)
+ANGLES, RADII = Rule.of(22, 4, 6.0), Rule.of(9, 2, 2.0)
 
 
 def _end_values(rule: Rule) -> Floats:
@@ -76,7 +78,7 @@ MOST_HALVINGS = 12
 # Nearer to the boundary than this fraction of the radius, rounding spoils an index that is infinite there.
 NEAREST = 3e-14
 # Shares of the tolerance for errors along rays, and for the area (which is the divisor of every mean).
-ALONG, AREA = 0.2, 0.1
+ALONG, AREA = 0.4, 0.1
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,9 @@ BLOCK = 1024
 ROUNDING = 1e-14
 # Roots nearer than this (relative to the reach) are the same boundary; of several margins the first is named.
 SAME = 1e-9
+# Five samples that a parabola meets to this fraction of their size are of a quadratic function.
+QUADRATIC = 1e-13
+FIVE = np.linspace(0.0, 1.0, 5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,7 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
     design, theta, reach : ndarray, shape (rays,)
         Design, direction (radians) and length of each ray.
     samples : int
-        Equal steps of the scan along a ray.
+        Samples of each interval, for margins that are not quadratic along rays.
     slack : float
         Intervals that rounding closed, up to this fraction of the reach, are kept (for rays through a cusp).
     """
@@ -113,124 +116,111 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
     )  # fmt: skip
 
 
-def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
-    field, direction = designs.field, np.exp(1j * theta)
-    places = designs.of(design)
-    fractions = np.linspace(0.0, 1.0, samples + 1)
-    # At the centre itself a margin may be exactly zero, which says nothing about the ray.
-    fractions[0] = SAME
-    radii = fractions[:, None] * reach
-    values = field.margins(designs.about + radii * direction, places)
+def _trace_block(
+    designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float
+) -> Intervals:
+    """First the margins that are quadratic along rays, whose roots are known; then the others, within what is left."""
+    places, direction = designs.of(design), np.exp(1j * theta)
+    values = designs.field.margins(designs.about + FIVE[:, None] * reach * direction, places, assembly=False)
+    quadratic, (a, b, c) = _parabolas(values)
+    rows = np.flatnonzero(quadratic)
+    margin, ray, turn, x, start = _quadratic_roots(a[rows], b[rows], c[rows])
+    found = _intervals(rows[margin], ray, turn, x * reach[ray], start, reach, slack)
+    whole = len(rows) == len(values) and not designs.field.same_assembly
+    return found if whole else _others(designs, places, direction, found, quadratic, samples, slack * reach)
+
+
+def _parabolas(values: Floats) -> tuple[NDArray[np.bool_], tuple[Floats, Floats, Floats]]:
+    """Coefficients of a + b x + c x^2 through margins at x = 0, 1/2, 1, and which margins are such on every ray.
+
+    Differences of squared distances are quadratic along a ray; the samples at 1/4 and 3/4 tell.
+    """
+    at_0, at_1, at_2, at_3, at_4 = (values[:, k] for k in range(5))
+    a, b, c = at_0, 4 * at_2 - 3 * at_0 - at_4, 2 * (at_0 + at_4) - 4 * at_2
+    with np.errstate(invalid="ignore"):
+        allowed = QUADRATIC * np.abs(values).max(axis=1)
+        fits = np.abs(a + 0.25 * (b + 0.25 * c) - at_1) <= allowed
+        fits &= np.abs(a + 0.75 * (b + 0.75 * c) - at_3) <= allowed
+    return fits.all(axis=1), (a, b, c)
+
+
+def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints, Floats, Ints]:
+    """Margin, ray, direction and place of all roots in (0, 1), and how many margins are negative just after 0."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
+        roots = np.stack([half / c, a / half])
+        margin_of = (roots > SAME) & (roots < 1)
+    which, margin, ray = np.nonzero(margin_of)
+    x = roots[which, margin, ray]
+    rising = (b[margin, ray] + 2 * c[margin, ray] * x) > 0
+    return margin, ray, np.where(rising, 1, -1), x, (a + SAME * (b + SAME * c) <= 0).sum(axis=0)
+
+
+def _others(
+    designs: Designs,
+    places: Places,
+    direction: NDArray[np.complex128],
+    found: Intervals,
+    quadratic: NDArray[np.bool_],
+    samples: int,
+    thin: Floats,
+) -> Intervals:
+    """Cut intervals where one of the margins that are not quadratic is negative or unknown."""
+    owner, inner, width = found.ray, found.inner, found.outer - found.inner
+    local = {name: value[owner] for name, value in places.items()}
+    fraction = 0.5 * (1 - np.cos(np.pi * (np.arange(samples) + 0.5) / samples))
+    radii = inner + fraction[:, None] * width
+    values = designs.field.margins(designs.about + radii * direction[owner], local)
+    values = values[np.flatnonzero(np.append(~quadratic, np.ones(len(values) - len(quadratic), dtype=bool)))]
+    rows = np.flatnonzero(np.append(~quadratic, np.ones(len(designs.field.labels) - len(quadratic), dtype=bool)))
     positive = values > 0
+    cut = ~positive.all(axis=(0, 1)) & (width > thin[owner])
+    if not cut.any():
+        return found
+    lanes = np.flatnonzero(cut)
+    values, positive, radii = values[:, :, lanes], positive[:, :, lanes], radii[:, lanes]
+    margin, cell, lane = np.nonzero(positive[:, 1:] != positive[:, :-1])
+    third = np.where(cell > 0, cell - 1, np.minimum(cell + 2, samples - 1))
 
-    def evaluate(margin: Ints, ray: Ints, radius: Floats) -> Floats:
-        z = designs.about + radius * direction[ray]
-        all_margins = field.margins(z, {name: value[ray] for name, value in places.items()})
-        return all_margins[margin, np.arange(len(ray))]
-
-    def roots(m: Ints, ray: Ints, *bracket: Floats) -> Floats:
-        return bracketed_roots(lambda which, x: evaluate(m[which], ray[which], x), *bracket, ROUNDING * reach[ray])
-
-    # Ordinary changes of sign between neighbouring samples.
-    known = np.isfinite(values)
-    margin, cell, ray = np.nonzero((positive[:, 1:] != positive[:, :-1]) & known[:, 1:] & known[:, :-1])
-    third = np.where(cell > 0, cell - 1, np.minimum(cell + 2, samples))
+    def evaluate(which: Ints, radius: Floats) -> Floats:
+        at = lanes[lane[which]]
+        z = designs.about + radius * direction[owner[at]]
+        found_there = designs.field.margins(z, {name: value[at] for name, value in local.items()})
+        return found_there[rows[margin[which]], np.arange(len(which))]
 
     def sample(k: Ints) -> tuple[Floats, Floats]:
-        return radii[k, ray], values[margin, k, ray]
+        return radii[k, lane], values[margin, k, lane]
 
-    found = [(margin, ray, np.where(positive[margin, cell + 1, ray], 1, -1),
-              roots(margin, ray, *sample(cell), *sample(cell + 1), *sample(third)))]  # fmt: skip
-    found += _dips(values, radii, evaluate, roots)
-    if known.all():
-        negative = (~positive[:, 0]).sum(axis=0)
-    else:
-        more, negative = _open_ends(values, radii, found, evaluate, roots)
-        found += more
-    margin, ray, turn, radius = (np.concatenate([part[k] for part in found]) for k in range(4))
-    return _intervals(margin, ray, turn, radius, negative, reach, slack)
+    tolerance = ROUNDING * found.outer[lanes[lane]]
+    radius = bracketed_roots(evaluate, *sample(cell), *sample(cell + 1), *sample(third), tolerance)
+    turn = np.where(positive[margin, cell + 1, lane], 1, -1)
+    part = _intervals(
+        rows[margin], lane, turn, radius, (~positive[:, 0]).sum(axis=0), found.outer[lanes], 0.0
+    )
+    return _replace(found, lanes, part)
 
 
-def _dips(values, radii, evaluate, roots):  # type: ignore[no-untyped-def]
-    """Pairs of roots of one margin between two samples of equal sign, where its parabola crosses zero."""
-    low, mid, high = values[:, :-2], values[:, 1:-1], values[:, 2:]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        bend, tilt = low + high - 2 * mid, 0.5 * (high - low)
-        vertex = -tilt / bend
-        depth = (mid + 0.5 * tilt * vertex) * mid
-        same = (low * mid > 0) & (high * mid > 0)
-        near = np.abs(vertex) <= 0.5
-        near[:, 0] |= np.abs(vertex[:, 0] + 0.5) <= 0.5
-        near[:, -1] |= np.abs(vertex[:, -1] - 0.5) <= 0.5
-        margin, cell, ray = np.nonzero(same & near & (depth < 0))
-    if not margin.size:
-        return []
-    step = radii[1, ray]
-    cell = cell + 1
-    radius = radii[cell, ray] + vertex[margin, cell - 1, ray] * step
-    value = evaluate(margin, ray, radius)
-    real = (value > 0) != (values[margin, cell, ray] > 0)
-    margin, cell, ray, radius, value = margin[real], cell[real], ray[real], radius[real], value[real]
-    left = np.where(radius < radii[cell, ray], cell - 1, cell)
-    found = []
-    for end, other in ((left, left + 1), (left + 1, left)):
-        a, fa = radii[end, ray], values[margin, end, ray]
-        c, fc = radii[other, ray], values[margin, other, ray]
-        order = end < other
-        lo, flo, hi, fhi = (np.where(order, p, q) for p, q in ((a, radius), (fa, value), (radius, a), (value, fa)))
-        found.append((margin, ray, np.where(fhi > 0, 1, -1), roots(margin, ray, lo, flo, hi, fhi, c, fc)))
-    return found
-
-
-def _open_ends(values, radii, found, evaluate, roots):  # type: ignore[no-untyped-def]
-    """Roots of margins that are known at only one end of a cell, because another margin ends the assembly there.
-
-    The margin is followed up to that other root; beyond it the pose cannot be assembled, and its sign does not matter.
-    """
-    positive, known = values > 0, np.isfinite(values)
-    margin, cell, ray = np.nonzero((positive[:, 1:] & ~known[:, :-1]) | (positive[:, :-1] & ~known[:, 1:]))
-    first_exit = np.full((values.shape[1] - 1, values.shape[2]), np.inf)
-    last_entry = np.full(first_exit.shape, -np.inf)
-    for _, other_ray, turn, radius in found:
-        where = np.clip((radius / radii[1, other_ray]).astype(int), 0, len(first_exit) - 1)
-        down = turn < 0
-        np.minimum.at(first_exit, (where[down], other_ray[down]), radius[down])
-        np.maximum.at(last_entry, (where[~down], other_ray[~down]), radius[~down])
-    rising = positive[margin, cell + 1, ray]
-    known_end = np.where(rising, cell + 1, cell)
-    stop = np.where(rising, last_entry[cell, ray], first_exit[cell, ray])
-    a, fa = radii[known_end, ray], values[margin, known_end, ray]
-    blind = ~np.isfinite(stop)
-    # Just inside the other root: the square roots there need a distance well above rounding.
-    with np.errstate(invalid="ignore"):
-        b = np.where(blind, radii[np.where(rising, cell, cell + 1), ray], stop + (a - stop) * 1e-7)
-    fb = evaluate(margin, ray, b)
-    crossing = ~(fb > 0)
-    margin, cell, ray, rising, a, fa, b, fb = (v[crossing] for v in (margin, cell, ray, rising, a, fa, b, fb))
-    none = np.full(len(a), np.nan)
-    lo, flo, hi, fhi = (np.where(rising, p, q) for p, q in ((b, a), (fb, fa), (a, b), (fa, fb)))
-    crossed = np.zeros(positive[:, 1:].shape, dtype=bool)
-    crossed[margin, cell, ray] = True
-    found = [(margin, ray, np.where(rising, 1, -1), roots(margin, ray, lo, flo, hi, fhi, none, none))]
-    gaps, negative = _gaps(positive, known, crossed, radii)
-    return [*found, gaps], negative
-
-
-def _gaps(positive, known, crossed, radii):  # type: ignore[no-untyped-def]
-    """Changes of sign across stretches where a margin is unknown, and the margins that are negative at the centre."""
-    last = np.maximum.accumulate(np.where(known, np.arange(known.shape[1])[:, None], -1), axis=1)
-    margin, cell, ray = np.nonzero(known[:, 1:] & ~known[:, :-1])
-    end = cell + 1
-    after = positive[margin, end, ray] & ~crossed[margin, cell, ray]
-    begin = last[margin, cell, ray]
-    before = positive[margin, begin, ray] & ~crossed[margin, np.minimum(begin, crossed.shape[1] - 1), ray]
-    start = ~positive[:, 0] & known[:, 0]
-    initial = begin < 0
-    start[margin[initial], ray[initial]] = ~after[initial]
-    change = ~initial & (before != after)
-    margin, ray, begin, end, after = (v[change] for v in (margin, ray, begin, end, after))
-    middle = 0.5 * (radii[begin, ray] + radii[end, ray])
-    return (margin, ray, np.where(after, 1, -1), middle), start.sum(axis=0)
+def _replace(found: Intervals, lanes: Ints, part: Intervals) -> Intervals:
+    """Intervals with those at `lanes` replaced by the parts of them that `part` has left."""
+    source = lanes[part.ray]
+    at_start, at_end = part.enters < 0, part.leaves < 0
+    keep = np.ones(len(found.ray), dtype=bool)
+    keep[lanes] = False
+    owner = np.concatenate([found.ray[keep], found.ray[source]])
+    inner = np.concatenate([found.inner[keep], np.where(at_start, found.inner[source], part.inner)])
+    outer = np.concatenate([found.outer[keep], np.where(at_end, found.outer[source], part.outer)])
+    enters = np.concatenate([found.enters[keep], np.where(at_start, found.enters[source], part.enters)])
+    leaves = np.concatenate([found.leaves[keep], np.where(at_end, found.leaves[source], part.leaves)])
+    order = np.lexsort((inner, owner))
+    beyond = np.zeros(len(found.beyond), dtype=bool)
+    beyond[owner[leaves < 0]] = True
+    ray, radius, margin, turn = (np.concatenate([a, b]) for a, b in zip(
+        found.crossings, (found.ray[lanes[part.crossings[0]]], *part.crossings[1:]), strict=True))  # fmt: skip
+    sort = np.lexsort((radius, ray))
+    return Intervals(
+        owner[order], inner[order], outer[order], enters[order], leaves[order], beyond,
+        (ray[sort], radius[sort], margin[sort], turn[sort]),
+    )  # fmt: skip
 
 
 def _intervals(
