@@ -84,6 +84,7 @@ def _stack(panels: int) -> tuple[Figure, list[Axes]]:
         axis.set_title("", y=1.02)
         axis.locator_params(axis="y", nbins=5)
         axis.yaxis.set_label_coords(-0.55 / (style.WIDTH - 1.1), 0.5, transform=axis.transAxes)
+    axes[-1].locator_params(axis="x", nbins=6)
     axes[-1].xaxis.set_label_coords(0.5, -0.2, transform=axes[-1].transAxes)
     return figure, axes
 

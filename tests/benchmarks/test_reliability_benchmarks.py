@@ -1,0 +1,81 @@
+"""Samples a second of plain Monte Carlo, beside hand-tuned C where a compiler and its source are at hand."""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mechdesign
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+ARM_SAMPLES = 2_000_000
+
+
+@pytest.fixture(scope="session")
+def floor(tmp_path_factory: pytest.TempPathFactory) -> float:
+    """Samples a second of kernel A of the arm in C, on two threads; the directory is MECHDESIGN_FLOORS."""
+    folder = os.environ.get("MECHDESIGN_FLOORS")
+    compiler = shutil.which("gcc")
+    if folder is None or compiler is None:
+        pytest.skip("needs gcc, and the directory of arm_monte_carlo.c in MECHDESIGN_FLOORS")
+    program = tmp_path_factory.mktemp("floors") / "arm_monte_carlo"
+    source = Path(folder) / "arm_monte_carlo.c"
+    flags = ["-O3", "-march=native", "-ffast-math", "-fopenmp", "-mprefer-vector-width=512"]
+    subprocess.run([compiler, *flags, str(source), "-o", str(program), "-lm"], check=True)
+    said = subprocess.run([str(program), "10000000", "2", "5"], capture_output=True, text=True, check=True).stdout
+    found = re.search(r"^A .*?([\d.]+) Msamples/s", said, re.MULTILINE)
+    assert found is not None
+    return 1e6 * float(found[1])
+
+
+def arm(samples: int) -> Any:
+    changes = [
+        f"reliability.samples={samples}",
+        "reliability.poses=[{theta1: 30, theta2: 60}]",
+        "reliability.methods=[monte_carlo]",
+    ]
+    return mechdesign.load(CONFIGS / "two_link_arm.yaml", overrides=changes)
+
+
+def test_arm_against_c(benchmark: Any, floor: float) -> None:
+    study = arm(ARM_SAMPLES)
+    benchmark.pedantic(lambda: mechdesign.reliability(study, jobs=2), rounds=5, warmup_rounds=1)
+    rate = ARM_SAMPLES / benchmark.stats["min"]
+    benchmark.extra_info.update(samples_per_second=rate, of_the_floor=rate / floor)
+    assert rate >= floor / 10
+
+
+def test_arm(benchmark: Any) -> None:
+    study = arm(ARM_SAMPLES)
+    benchmark.pedantic(lambda: mechdesign.reliability(study, jobs=2), rounds=5, warmup_rounds=1)
+    benchmark.extra_info.update(samples_per_second=ARM_SAMPLES / benchmark.stats["min"])
+
+
+def test_whole_cycle_of_three_orders(benchmark: Any) -> None:
+    study = mechdesign.load(CONFIGS / "toggle.yaml")
+    benchmark.pedantic(lambda: mechdesign.reliability(study, jobs=2), rounds=3, warmup_rounds=1)
+    benchmark.extra_info.update(samples_per_second=73 * 40_000 / benchmark.stats["min"])
+
+
+def test_whole_command_with_pictures(benchmark: Any, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mechdesign", "reliability", str(CONFIGS / "toggle.yaml"), "--quiet", "--out"]
+    benchmark.pedantic(
+        lambda: subprocess.run([*command, str(tmp_path)], check=True, stdout=subprocess.DEVNULL), rounds=3
+    )
+    assert benchmark.stats["min"] < 4.0
+
+
+def test_memory_of_ten_million_samples(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mechdesign", "reliability", str(CONFIGS / "two_link_arm.yaml"), "--quiet"]
+    changes = ["--set", "reliability.samples=10000000", "--set", "reliability.poses=[{theta1: 30, theta2: 60}]"]
+    subprocess.run([*command, "--no-plots", *changes, "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
+    # Kilobytes on Linux; the largest child so far.
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 500 * 1024
