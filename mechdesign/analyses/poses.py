@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 CHUNK = 65536
@@ -124,7 +123,7 @@ def expand_outputs(study: Study, names: tuple[str, ...]) -> list[Coordinate]:
 
     Raises
     ------
-    StudyError
+    MechanismError
         For a name that is neither.
     """
     mechanism = study.mechanism
@@ -132,7 +131,4 @@ def expand_outputs(study: Study, names: tuple[str, ...]) -> list[Coordinate]:
     for name in names:
         parts = [f"{name}.x", f"{name}.y"] if name in mechanism.points else [name]
         found += [mechanism.coordinate(part) for part in parts]
-    doubles = {c.name for c in found if sum(d.name == c.name for d in found) > 1}
-    if doubles:
-        raise StudyError(f"outputs: {', '.join(sorted(doubles))} listed twice")
     return found

@@ -182,4 +182,5 @@ def _hide(value: Value, lost: NDArray[np.bool_]) -> Value:
         value = np.broadcast_to(value, lost.shape)
     elif value.ndim == 0:
         return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
-    return np.where(lost, np.nan, value)
+    # Both parts of a position: (nan + 0i) would leave its y at zero.
+    return np.where(lost, complex(np.nan, np.nan) if np.iscomplexobj(value) else np.nan, value)

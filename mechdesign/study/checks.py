@@ -143,9 +143,15 @@ class _Checker:
     def motion(self, command: str, section: KinematicsSection | ReliabilitySection) -> None:
         self._given(section.rates, (command, "rates"), _RATE_KINDS)
         self._given(section.accelerations, (command, "accelerations"), _ACCELERATION_KINDS)
+        seen: set[str] = set()
         for index, name in enumerate(section.outputs or ()):
+            path: Path = (command, "outputs", index)
+            parts = [f"{name}.x", f"{name}.y"] if name in self.names.owners else [name]
             if name not in self.names.owners:
-                self.coordinate(name, (command, "outputs", index))
+                self.coordinate(name, path)
+            if seen.intersection(parts):
+                self.reporter.report(path, f"{name!r} is listed twice")
+            seen.update(parts)
 
     def loads(self, section: KinematicsSection) -> None:
         for index, load in enumerate(section.loads):

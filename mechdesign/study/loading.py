@@ -22,10 +22,10 @@ from mechdesign.study import checks, overrides, poses
 from mechdesign.study.build import Builder
 from mechdesign.study.document import Document, plain, read
 from mechdesign.study.models import MechanismSection, UnitsSection
-from mechdesign.study.numbers import LOST, Context, check_parameter_name, read_number, shown, suggestion
+from mechdesign.study.numbers import LOST, Context, check_parameter_name, read_number, shown
 from mechdesign.study.parameters import Parameters
 from mechdesign.study.pose_models import PoseSection
-from mechdesign.study.reporter import Reporter
+from mechdesign.study.reporter import Reporter, unknown_key
 from mechdesign.study.sections import (
     COMMANDS,
     KinematicsSection,
@@ -153,10 +153,12 @@ def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), 
     assert section is not None
     builder = Builder(section, context.units, context.parameters, reporter)
     description = builder.build()
+    # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
+    mechanism = None if reporter.concerns("mechanism", "units") else _compiled(description, reporter)
     parameters = builder.parameters(context.parameters, formulas)
     parts = checks.check(parts, builder.names, parameters, reporter)
     reporter.done()
-    mechanism = _compiled(description, reporter)
+    assert mechanism is not None
     checks.check_poses(parts, mechanism, reporter, path.parent)
     reporter.done()
     name = parts.get("name") or path.stem
@@ -231,7 +233,7 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
     fields = StudyFile.model_fields
     for key in data:
         if key not in fields:
-            reporter.report((key,), f"unknown key{suggestion(key, fields)}", at_key=True)
+            reporter.report((key,), unknown_key(key, fields), at_key=True)
     for key, field in fields.items():
         raw = data.get(key)
         if raw is None:
@@ -257,10 +259,9 @@ def _adapter(key: str) -> TypeAdapter[Any]:
     return TypeAdapter(StudyFile.model_fields[key].rebuild_annotation())
 
 
-def _compiled(description: Description, reporter: Reporter) -> Mechanism:
+def _compiled(description: Description, reporter: Reporter) -> Mechanism | None:
     try:
         return Mechanism(description)
     except MechanismError as error:
         reporter.report(error.key.split("."), str(error))
-        reporter.done()
-        raise
+        return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
@@ -14,6 +14,13 @@ from mechdesign.study.numbers import LOST, nearest, shown, suggestion
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
+# Keys that come with a later release, wherever they stand.
+LATER = ("matrix",)
+
+
+def unknown_key(name: str, known: Iterable[str]) -> str:
+    """Say that a key is not known, and which one may be meant."""
+    return "is not available in this version" if name in LATER else f"unknown key{suggestion(name, known)}"
 
 
 class Reporter:
@@ -47,6 +54,10 @@ class Reporter:
         if self.problems:
             ordered = sorted(self.problems, key=lambda problem: (problem.line == 0, problem.line, problem.column))
             raise StudyError(ordered)
+
+    def concerns(self, *sections: str) -> bool:
+        """Whether a problem lies in one of these top-level sections, or in the text as a whole."""
+        return any(problem.key.partition(".")[0] in ("", *sections) for problem in self.problems)
 
     def raw(self, path: Sequence[str | int]) -> Any:
         """The data as written at a path, None where there is none."""
@@ -94,7 +105,7 @@ class Reporter:
             kind = item["type"]
             if kind == "extra_forbidden":
                 known = schema_keys(root, location[:-1])
-                self.report(location, f"unknown key{suggestion(str(location[-1]), known)}", at_key=True)
+                self.report(location, unknown_key(str(location[-1]), known), at_key=True)
             elif kind == "missing":
                 self.report(location, "is missing", at_key=True)
             else:

@@ -161,6 +161,8 @@ class Condition(Model):
     def _bounded(self) -> Condition:
         if self.at_least is None and self.at_most is None:
             raise failure("a condition needs 'at_least', 'at_most' or both")
+        if self.at_least is not None and self.at_most is not None and self.at_most < self.at_least:
+            raise failure(f"nothing is at least {self.at_least:g} and at most {self.at_most:g}")
         return self
 
 
@@ -216,6 +218,8 @@ class Dimension(Model):
     @model_validator(mode="before")
     @classmethod
     def _bare(cls, raw: Any) -> Any:
+        if isinstance(raw, dict) and isinstance(raw.get("tolerance"), list):
+            raise failure("a tolerance with two bounds is not available in this version; give the half-width")
         return {"tolerance": raw} if isinstance(raw, int | float | str) and not isinstance(raw, bool) else raw
 
     @model_validator(mode="after")
@@ -304,6 +308,8 @@ class ErrorLimit(Model):
             raise failure("a limit needs a number, 'min', 'max' or 'radius'")
         if self.radius is not None and (self.min is not None or self.max is not None):
             raise failure("'radius' excludes 'min' and 'max'")
+        if self.min is not None and self.max is not None and self.max < self.min:
+            raise failure(f"the maximum {self.max:g} is below the minimum {self.min:g}")
         return self
 
     @classmethod

@@ -143,7 +143,8 @@ QUESTIONS = [
     ("reliability: {dimensions: {r: -1}}", "10:31: reliability.dimensions.r: must be at least 0, not -1"),
     ("reliability: {dimensions: {rod.lenght: 1}}", "did you mean 'rod.length'?"),
     ("reliability: {dimensions: {'*.lenght': 1}}", "no dimension matches '*.lenght'"),
-    ("reliability: {dimensions: {r: {tolerance: [1, 2]}}}", "expected a number, not a list of 2"),
+    ("reliability: {dimensions: {r: {tolerance: [1, 2]}}}", "with two bounds is not available in this version"),
+    ("reliability: {limits: {P.x: {min: 0.1, max: -0.1}}}", "the maximum -0.1 is below the minimum 0.1"),
     ("reliability: {dimensions: {theta: 1 mm}}", "where an angle is expected"),
     ("reliability: {dimensions: {r: {tolerance: 1, distribution: gauss}}}", "expected one of normal, uniform"),
     ("reliability: {clearances: {P: {radial: 1}}}", "only link 'rod' has point 'P'"),
@@ -157,6 +158,9 @@ QUESTIONS = [
     ("reliability: {samples: many}", "unknown name 'many'"),
     ("reliability: {correlation: [[r, r, 1]]}", "reliability.correlation: is not available in this version"),
     ("reliability: {allocate: {reliability: 1}}", "reliability.allocate: is not available in this version"),
+    ("kinematics: {outputs: [P, P.x]}", "kinematics.outputs.1: 'P.x' is listed twice"),
+    ("matrix: {r: [1, 2]}", "matrix: is not available in this version"),
+    ("stiffness: {at: P, sections: {b: {matrix: [[1]]}}}", "stiffness.sections.b.matrix: is not available"),
     ("stiffness: {}", "stiffness.at: is missing"),
     ("stiffness: {at: P, link: crank}", "link 'crank' has no point 'P'; it has O, A"),
     ("stiffness: {at: P, elastic: {rod: beam}}", "there is no section 'beam'"),
@@ -170,6 +174,7 @@ QUESTIONS = [
         "there is no command 'kinematic'; did you mean 'kinematics'?",
     ),
     ("requirements: [{result: kinematics.x}]", "needs 'at_least', 'at_most' or both"),
+    ("requirements: [{result: kinematics.P.x, at_least: 3, at_most: 2}]", "nothing is at least 3 and at most 2"),
 ]
 
 
@@ -193,6 +198,13 @@ def test_every_mistake_in_one_go_and_in_the_order_of_the_text(tmp_path, monkeypa
         ["study.yaml:11:1", "workspace.point"],
         ["study.yaml:11:13", "workspace.pont"],
     ]
+
+
+def test_the_mobility_is_told_beside_names_that_miss_the_drive(tmp_path, monkeypatch):
+    text = STUDY.replace("drives: {theta: {angle: crank}}", "drives: {}") + "kinematics: {rates: {theta: 1}}\n"
+    found = problems(tmp_path, monkeypatch, text)
+    assert any("the mobility is 1 but 0 drives are given" in line for line in found), found
+    assert any("there is no coordinate 'theta'" in line for line in found)
 
 
 def test_a_mistake_in_a_parameter_is_told_once(tmp_path, monkeypatch):
