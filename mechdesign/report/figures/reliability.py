@@ -40,9 +40,12 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
         chart = _reliability(study, result.tables["reliability"], poses, swept)
         found |= {} if chart is None else {"reliability": chart}
     if "density" in result.tables:
-        samples = result.counts["samples"] // poses.count
-        first = int(np.flatnonzero(moments["valid"])[0]) // (len(moments) // poses.count)
-        found |= density_figures(study, result.tables["density"], samples, pose_in_words(study, poses, first))
+        table = result.tables["density"]
+        drawn = [table[name][0] for name in poses.names]
+        rows = [np.array_equal(row, drawn, equal_nan=True) for row in zip(*poses.values.values(), strict=True)]
+        pose = pose_in_words(study, poses, rows.index(True))
+        assert study.reliability is not None
+        found |= density_figures(study, table, study.reliability.samples, pose)
     if "convergence" in result.tables:
         found["convergence"] = _convergence(result)
     if "contributions" in result.tables:
@@ -77,13 +80,14 @@ def _rows(table: Table, key: Key, **chosen: str) -> NDArray[np.bool_]:
 
 def _stack(panels: int) -> tuple[Figure, list[Axes]]:
     """Panels over a common axis, with room for a title above and a legend below."""
-    figure = _framed(1.35 + 1.8 * panels, left=0.95, right=0.15, top=0.55, bottom=0.85, apart=(0.22, 0.0))
+    figure = _framed(1.35 + 1.8 * panels, left=1.05, right=0.15, top=0.55, bottom=0.85, apart=(0.22, 0.0))
     axes = list(figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0])
     for axis in axes:
         # Given places: to find them from the tick labels would take as long as the rest of the picture.
         axis.set_title("", y=1.02)
         axis.locator_params(axis="y", nbins=5)
-        axis.yaxis.set_label_coords(-0.55 / (style.WIDTH - 1.1), 0.5, transform=axis.transAxes)
+        axis.yaxis.set_label_coords(-0.98 / (style.WIDTH - 1.2), 0.5, transform=axis.transAxes)
+        axis.yaxis.label.set_verticalalignment("top")
     axes[-1].locator_params(axis="x", nbins=6)
     axes[-1].xaxis.set_label_coords(0.5, -0.2, transform=axes[-1].transAxes)
     return figure, axes
