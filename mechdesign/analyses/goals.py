@@ -9,7 +9,7 @@ from importlib import import_module
 import numpy as np
 
 from mechdesign.analyses.rays import Floats
-from mechdesign.analyses.region import BRISK, INDICES, Answer, Question, answer, questions
+from mechdesign.analyses.region import BRISK, GRID_TOLERANCE, INDICES, Answer, Question, answer, questions
 from mechdesign.errors import MechdesignError, Problem, StudyError
 from mechdesign.results import Result
 from mechdesign.study import Study, load
@@ -102,7 +102,7 @@ class Evaluator:
         self.goals = list(goals)
         self.question: Question | None = None
         if any(goal.index for goal in goals):
-            asked = questions(study)
+            asked = questions(study, GRID_TOLERANCE)
             if len(asked) > 1:
                 message = "an optimisation compares one workspace a design: hold one value of each coordinate"
                 raise StudyError((Problem(message, "workspace.at", str(study.path or "")),))

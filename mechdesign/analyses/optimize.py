@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.designs import best, grid, in_words, most_common, normalised
 from mechdesign.analyses.goals import Evaluated, Evaluator, Goal, bounds_of, goal
 from mechdesign.analyses.rays import Floats
-from mechdesign.analyses.region import INDICES
+from mechdesign.analyses.region import GRID_TOLERANCE, INDICES, questions
 from mechdesign.analyses.workspace import index_meanings
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.parallel import map_chunks
@@ -213,12 +213,13 @@ def _warnings(study: Study, designs: _Designs) -> Iterator[str]:
         first = designs.reasons.index(reason)
         row = {name: float(column[first]) for name, column in designs.variables.items()}
         yield f"{count} of {len(designs.reasons)} designs are infeasible: {reason} (first at {in_words(row)})"
-    if study.workspace is None:
+    if study.workspace is None or study.workspace.integrate.rule != "gauss":
         return
+    tolerance = questions(study, GRID_TOLERANCE)[0].tolerance
     for name, error in designs.errors.items():
         value = next(designs.values[each] for each in designs.goals if each.name == name)
-        loose = designs.feasible & (error > 2 * study.workspace.integrate.tolerance * np.abs(value))
-        if study.workspace.integrate.rule == "gauss" and loose.any():
+        loose = designs.feasible & (error > 2 * tolerance * np.abs(value))
+        if loose.any():
             yield f"{name} of {int(loose.sum())} designs is not known to the tolerance asked for; see {name}_error"
 
 

@@ -24,6 +24,8 @@ SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
 RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6
+# Relative tolerance of the integrals where the study says none: of one region, and of each design of many.
+TOLERANCE, GRID_TOLERANCE = 1e-5, 1e-4
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
 
 
@@ -63,8 +65,8 @@ class Answer:
     panels: Panels
 
 
-def questions(study: Study) -> list[Question]:
-    """One question a value of ``at``.
+def questions(study: Study, tolerance: float = TOLERANCE) -> list[Question]:
+    """One question a value of ``at``; `tolerance` is that of the integrals where the study says none.
 
     Raises
     ------
@@ -111,7 +113,8 @@ def questions(study: Study) -> list[Question]:
         Question(
             replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True))),
             dict(zip(section.at, values, strict=True)), about, (start, stop), (start + margin, stop - margin),
-            section.scan.rays, integrate_by.rule, integrate_by.tolerance, integrate_by.nodes,
+            section.scan.rays, integrate_by.rule,
+            integrate_by.tolerance if "tolerance" in integrate_by.model_fields_set else tolerance, integrate_by.nodes,
         )
         for values in itertools.product(*section.at.values())
     ]  # fmt: skip
