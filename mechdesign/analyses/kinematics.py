@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.extremes import extremes
 from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, mixes
-from mechdesign.analyses.motion_limits import extremes, limits_of_motion
+from mechdesign.analyses.motion_limits import limits_of_motion
 from mechdesign.analyses.poses import (
     SolvedPoses,
     expand_outputs,
@@ -172,7 +173,8 @@ def kinematics(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     columns = _columns(motion, outputs)
     columns.append(Column("valid", reason == 0, meaning="1 where the pose is assembled and within its limits"))
     tables = {"motion": Table("motion", tuple(columns), "positions, velocities and accelerations per pose")}
-    named = [c for c in columns if c.name in {o.name for o in outputs}]
+    by_name = {column.name: column for column in columns}
+    named = [by_name[output.name] for output in outputs]
     moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
     swept = moving[0] if not poses.listed and len(moving) == 1 else None
     tables["extremes"] = extremes(study, named, poses, swept, reason)
@@ -201,7 +203,9 @@ def _conditioning(study: Study, motion: _Motion, reason: NDArray[np.int8]) -> li
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
     near = good & ~(values >= SINGULAR)
     if near.any():
-        return [f"{np.count_nonzero(near)} poses are at or near a singularity (inverse condition below {SINGULAR:g})"]
+        count = np.count_nonzero(near)
+        poses = "1 pose is" if count == 1 else f"{count} poses are"
+        return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"]
     return []
 
 
@@ -209,15 +213,14 @@ def _columns(motion: _Motion, outputs: list[Coordinate]) -> list[Column]:
     study, mechanism, arrays = motion.study, motion.study.mechanism, motion.arrays
     units = study.units
     columns: list[Column] = []
-    asked = {output.name for output in outputs}
     for name in mechanism.drives:
-        if name not in asked:
-            columns.append(Column(name, arrays[f"drive {name}"], units.label(mechanism.quantity(name)), "drive"))
+        columns.append(Column(name, arrays[f"drive {name}"], units.label(mechanism.quantity(name)), "drive"))
     rates = {"length": ("velocity", "acceleration"), "angle": ("angular_velocity", "angular_acceleration")}
     for output in outputs:
-        columns.append(
-            Column(output.name, arrays[output.name], units.label(output.quantity), f"value of {output.name}")
-        )
+        if output.name not in mechanism.drives:
+            columns.append(
+                Column(output.name, arrays[output.name], units.label(output.quantity), f"value of {output.name}")
+            )
         for order, kind in zip(("velocity", "acceleration"), rates.get(output.quantity, ("none", "none")), strict=True):
             name = f"{output.name}_{order}"
             if name in arrays:

@@ -1,4 +1,4 @@
-"""Extremes of a motion, and the values of the drive at which a mechanism stops moving."""
+"""Limits of a motion: the values of the drive at which a mechanism stops moving."""
 
 from __future__ import annotations
 
@@ -10,53 +10,10 @@ from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.plan import Plan
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
-from mechdesign.study.poses import PoseGroup, Poses
+from mechdesign.study.poses import PoseGroup
 
 # Halvings of a step of the sweep: enough to reach the last bit of any drive's value.
 HALVINGS = 60
-
-
-def extremes(study: Study, columns: list[Column], poses: Poses, swept: str | None, reason: NDArray[np.int8]) -> Table:
-    """Smallest and largest value of each output over the valid poses, and the ratio of the times between them.
-
-    `time_ratio` is the longer over the shorter part of a full turn of the swept angle between the two extremes, for a
-    drive of constant speed; nan elsewhere. `min_at` is the swept coordinate, or the row where there is none.
-    """
-    at = poses.values[swept] if swept is not None else np.arange(poses.count, dtype=float)
-    unit = study.units.label(study.mechanism.quantity(swept)) if swept is not None else ""
-    turn = 2 * np.pi / study.units.angle_factor
-    full_turn = (
-        swept is not None
-        and study.mechanism.quantity(swept) == "angle"
-        and np.ptp(at) >= turn * (1 - 1e-9)
-        and not reason.any()
-    )
-    rows = []
-    for column in columns:
-        values = np.where(reason == Reason.OK, column.values, np.nan)
-        if np.isfinite(values).any():
-            low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
-            span = values[high] - values[low]
-            part = (at[high] - at[low]) % turn if full_turn and span > 0 else np.nan
-            ratio = max(part, turn - part) / min(part, turn - part) if part and 0 < part < turn else np.nan
-            rows.append((values[low], at[low], values[high], at[high], span, ratio))
-        else:
-            rows.append((np.nan,) * 6)
-    found = np.array(rows).reshape(-1, 6)
-    where = f"{swept or 'row'} at the"
-    return Table(
-        "extremes",
-        (
-            Column("output", np.array([c.name for c in columns]), "", "output, in its own unit"),
-            Column("min", found[:, 0], "", "smallest value over the poses"),
-            Column("min_at", found[:, 1], unit, f"{where} smallest value"),
-            Column("max", found[:, 2], "", "largest value over the poses"),
-            Column("max_at", found[:, 3], unit, f"{where} largest value"),
-            Column("range", found[:, 4], "", "max - min"),
-            Column("time_ratio", found[:, 5], "", "longer over shorter time between the extremes, constant speed"),
-        ),
-        "extremes of the outputs over the poses",
-    )
 
 
 def limits_of_motion(study: Study, group: PoseGroup, swept: str, reason: NDArray[np.int8]) -> Table:

@@ -71,6 +71,34 @@ def test_extremes_are_the_stroke() -> None:
     assert table["time_ratio"][stroke] == pytest.approx(1)
 
 
+def test_extremes_between_the_poses_of_a_sweep() -> None:
+    # Offset slider-crank, r = 40, l = 120, e = -20: stretched and folded positions by Pythagoras.
+    study = study_of(
+        """
+mechanism:
+  links: {ground: {O: [0, 0], G: [0, -20]}, crank: [O, A, 40], rod: [A, B, 120], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: G, point: B}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 40], B: [110, -20]}
+kinematics: {sweep: {theta: {from: 0, to: 360, step: 7.2}}, outputs: [B, theta]}
+"""
+    )
+    result = kinematics(study)
+    assert result.tables["motion"].names == ("theta", "B.x", "B.y", "valid")
+    table = result.tables["extremes"]
+    far, near = np.sqrt(160**2 - 20**2), np.sqrt(80**2 - 20**2)
+    stretched, folded = 360 - np.degrees(np.arcsin(20 / 160)), 180 - np.degrees(np.arcsin(20 / 80))
+    row = {name: table[name][0] for name in table.names}
+    assert (row["max"], row["min"]) == pytest.approx((far, near), rel=1e-12)
+    assert (row["max_at"], row["min_at"]) == pytest.approx((stretched, folded), rel=1e-12)
+    part = stretched - folded
+    assert row["time_ratio"] == pytest.approx(part / (360 - part), rel=1e-11)
+    # The slide does not move across the guide: rounding is no range.
+    assert (table["range"][1], table["min_at"][1]) == (0, 0)
+    assert np.isnan(table["time_ratio"][1])
+    assert (table["min"][2], table["max"][2]) == (0, 360)
+
+
 def test_limits_of_motion_are_found_to_the_last_digits() -> None:
     result = kinematics(study_of(LINKAGE))
     limits = result.tables["limits"]
