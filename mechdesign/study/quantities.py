@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.model import Drive, Limit, Measure, Quantity, Term
 from mechdesign.study import models
@@ -62,6 +64,8 @@ def measures(builder: Builder) -> dict[str, Measure]:
         elif section.expression is not None:
             try:
                 expression = Expression.parse(section.expression, builder.units.angle_factor)
+                # Constants alone fail here (1/0), whatever the coordinates come to.
+                expression.evaluate(dict.fromkeys(expression.names, np.full(1, np.nan)))
             except ExpressionError as error:
                 builder.report(path, str(error))
                 continue

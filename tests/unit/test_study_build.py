@@ -189,3 +189,9 @@ def test_the_seed_of_the_call_wins_even_when_it_is_zero(tmp_path):
     path = tmp_path / "s.yaml"
     path.write_text(FOUR_BAR + "seed: 7\n")
     assert mechdesign.load(path, seed=0).seed == 0
+
+
+def test_a_measure_that_no_pose_can_have_is_a_mistake(load):
+    measures = FOUR_BAR.replace("  sketch", "  measures: {m: B.x*(1/0)}\n  sketch")
+    with pytest.raises(mechdesign.StudyError, match=r"5:17: mechanism.measures.m: division by zero in"):
+        load(measures)
