@@ -88,6 +88,13 @@ class Geometry:
         return frozenset(names)
 
     @cached_property
+    def pin_offsets(self) -> frozenset[str]:
+        """Names of the places of all pin offsets."""
+        return frozenset(
+            name for body, point in self.graph.points for name in offset_names(body.removesuffix(":rod"), point)
+        )
+
+    @cached_property
     def dependencies(self) -> tuple[frozenset[str], ...]:
         """Names of the places that each edge depends on, pin offsets included."""
         return tuple(self._places_of(edge) for edge in self.graph.edges)

@@ -63,6 +63,10 @@ class Graph:
         Local coordinates of a point of a body.
     slides : tuple of str
         Names of the joints and telescopic legs whose displacement is a coordinate.
+    telescopic : frozenset of int
+        Those of the legs.
+    ties : tuple of (str, str, tuple of Turn)
+        Pairs of bodies that turn together, and the turns from the first's x axis to the second's.
     """
 
     nodes: tuple[str, ...]
@@ -72,6 +76,7 @@ class Graph:
     points: Mapping[tuple[str, str], tuple[Term, Term]]
     slides: tuple[str, ...]
     telescopic: frozenset[int]
+    ties: tuple[tuple[str, str, tuple[Turn, ...]], ...]
 
     def node(self, name: str) -> int:
         """Index of a point."""
@@ -185,7 +190,9 @@ def build_graph(description: Description) -> Graph:
         frame, offset = classes[line.link]
         edges.append(Edge(index[through], index[point], frame, (), len(slides), (*offset, *_turns_of(line))))
         slides.append(name)
-    return Graph(tuple(nodes), tuple(edges), count, classes, points, tuple(slides), frozenset(range(len(legs))))
+    return Graph(
+        tuple(nodes), tuple(edges), count, classes, points, tuple(slides), frozenset(range(len(legs))), tuple(ties)
+    )
 
 
 def _named_points(joint: Prismatic | Slot | Fixed) -> list[tuple[str, str]]:

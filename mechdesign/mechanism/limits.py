@@ -22,6 +22,12 @@ class Bound:
     maximum: Term | None
     label: str
 
+    def scale(self, size: float) -> float:
+        """What rounding in this limit's margins is measured by, for a mechanism of a given size."""
+        if self.coordinate.kind == "distance":
+            return size**2
+        return 2 * np.pi if self.coordinate.quantity == "angle" else size
+
     def margins(self, configuration: Configuration, places: Mapping[str, Value]) -> list[tuple[str, Value]]:
         """Margins of this limit, each named; distances as differences of squares, which are smooth at the limit.
 

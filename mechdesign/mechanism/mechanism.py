@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import coordinates as names
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, rotation
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
@@ -24,6 +24,9 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import Sketch, assembly_modes, drawn_value, locate, roots_as_drawn
 from mechdesign.mechanism.solve import State
 from mechdesign.mechanism.structure import Undetermined, compile_structure
+
+# Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).
+TIE_ROUNDING = 1e-9
 
 
 class Mechanism:
@@ -41,6 +44,7 @@ class Mechanism:
         self.geometry = Geometry(self.graph, description.places)
         self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
         self._plans: dict[tuple[str, ...], Plan] = {}
+        self._check_ties()
         self._check_mobility()
         self.sketch: Sketch = locate(description, self.graph, self.geometry)
         self.drives: tuple[str, ...] = tuple(description.drives)
@@ -88,6 +92,17 @@ class Mechanism:
     def describe(self) -> str:
         """Links, joints, mobility and the order of solution, in words."""
         return report(self.description, self.graph, self.mobility, self.forward)
+
+    def _check_ties(self) -> None:
+        offsets = self.geometry.nominal.offsets
+        for a, b, turns in self.graph.ties:
+            gap = float(np.angle(offsets[a] * rotation(self.geometry.angle(turns, {})) / offsets[b]))
+            if abs(gap) > TIE_ROUNDING:
+                raise MechanismError(
+                    f"the angles of the slides and clamps contradict each other: those between '{a}' and '{b}' are "
+                    f"{abs(gap) / self.description.angle_unit:.6g} apart on the two ways round",
+                    "mechanism.joints",
+                )
 
     def _check_mobility(self) -> None:
         count = len(self.description.drives)
@@ -228,7 +243,7 @@ class Mechanism:
         dims = {}
         for name, value in (places or {}).items():
             place = self.description.places.get(name)
-            if place is None and not name.endswith((".dx", ".dy")):
+            if place is None and name not in self.geometry.pin_offsets:
                 raise MechanismError(f"'{name}' is not a dimension of this mechanism", name)
             angle = place is not None and place.quantity == "angle"
             dims[name] = np.asarray(value, dtype=float) * (unit if angle else 1.0)

@@ -142,4 +142,3 @@ class Description:
     limits: tuple[Limit, ...] = ()
     sketch: Mapping[str, complex] = field(default_factory=dict)
     angle_unit: float = 1.0
-    branch: Literal["side", "follow"] = "side"

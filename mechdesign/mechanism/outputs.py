@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -148,10 +149,10 @@ def _gradient(coordinate: Coordinate, values: dict[str, Value]) -> list[Value]:
 
 def _directional(coordinate: Coordinate, values: dict[str, Value], direction: list[Value]) -> list[Value]:
     """Derivative of an expression's gradient along a direction, by a central difference of the exact gradient."""
-    largest = max((np.max(np.abs(v)) for v in direction), default=0.0)
-    if largest == 0:
-        return [0.0] * len(direction)
-    step = STEP * max(1.0, *(float(np.max(np.abs(v))) for v in values.values())) / largest
+    largest = reduce(np.maximum, [np.abs(v) for v in direction], 0.0)
+    scale = reduce(np.maximum, [np.abs(v) for v in values.values()], 1.0)
+    # A pose that does not move takes any step: both sides are the same.
+    step = STEP * scale / np.where(largest > 0, largest, 1.0)
     sides = [
         _gradient(
             coordinate, {p.name: values[p.name] + h * v for p, v in zip(coordinate.parts, direction, strict=True)}

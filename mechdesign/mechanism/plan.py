@@ -141,6 +141,8 @@ class Plan:
                     open_ = open_ | ~np.isfinite(state.slides[slide])
             for slide in graph.telescopic:
                 open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
+            for k, _ in self.structure.spans:
+                open_ = open_ | ~(np.asarray(state.w[k]) >= 0)
             for value in self.structure.given:
                 open_ = open_ | ~np.isfinite(self._given_value(state, value))
         reason = np.zeros(shape, dtype=np.int8)
@@ -162,9 +164,12 @@ class Plan:
         )
         if limits and self.mechanism.bounds:
             with np.errstate(invalid="ignore"):
-                for _, margin in self.mechanism.margins(configuration):
-                    outside = np.broadcast_to(margin, shape) < -LIMIT_ROUNDING * self.mechanism.size**2
-                    reason[outside & (reason == Reason.OK)] = Reason.LIMIT
+                values = {**self.mechanism.nominal, **dims}
+                for bound in self.mechanism.bounds:
+                    slack = LIMIT_ROUNDING * bound.scale(self.mechanism.size)
+                    for _, margin in bound.margins(configuration, values):
+                        outside = np.broadcast_to(margin, shape) < -slack
+                        reason[outside & (reason == Reason.OK)] = Reason.LIMIT
         return configuration
 
     def _given_value(self, state: State, coordinate: Coordinate) -> Value:

@@ -59,7 +59,21 @@ def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch
                 elif head is not None and tail is None:
                     nodes[edge.tail] = head - complex(w) * turn
                     changed = True
+        changed = changed or _lay_along_slide(graph, geometry, nodes, rotations)
     return Sketch(nodes, rotations)
+
+
+def _lay_along_slide(
+    graph: Graph, geometry: Geometry, nodes: Sequence[complex | None], rotations: list[complex | None]
+) -> bool:
+    """Lay a class that nothing else shows along one of its slides, taken as positive; False where there is none."""
+    for edge, d in zip(graph.edges, geometry.nominal.d, strict=True):
+        tail, head = nodes[edge.tail], nodes[edge.head]
+        if edge.slide is not None and rotations[edge.frame] is None and tail is not None and head not in (None, tail):
+            assert head is not None
+            rotations[edge.frame] = (head - tail) / abs(head - tail) * complex(d).conjugate()
+            return True
+    return False
 
 
 def _fit(graph: Graph, geometry: Geometry, nodes: Sequence[complex | None], frame: int) -> complex:
@@ -131,10 +145,8 @@ def _mode(graph: Graph, geometry: Geometry, structure: Structure, group: Group, 
     k, sign = slide
     turn = sketch.rotations[structure.edges[k].frame]
     along = _span(graph, sketch, [slide], structure)
-    if turn is None:
-        # The link that carries the slide is not drawn: its direction is that of the slide itself.
-        turn = along / abs(along) if abs(along) else 1.0 + 0j
-    direction = complex(geometry.nominal.d[k]) * turn
+    # Unknown only where the whole link is drawn at one place, which decides nothing whatever the direction.
+    direction = complex(geometry.nominal.d[k]) * (1.0 if turn is None else turn)
     if group.form == "angle and fixed slide":
         radius = _span(graph, sketch, parts[group.angles[0]], structure)
         side = -dot(radius, sign * direction)

@@ -19,6 +19,8 @@ Guess = Mapping[int, tuple[Sequence[Value], Sequence[Value]]]
 NEWTON_STEPS = 10
 # After a correction this small a further one would be below rounding (Newton's method converges quadratically).
 CONVERGED = 1e-8
+# Dividing by a vector that has shrunk to nothing gives inf, where Python's own zero would raise.
+ZERO = np.float64(0.0)
 
 
 @dataclass
@@ -109,8 +111,8 @@ def _set_rotation(state: State, root: int, turn: Value) -> None:
 def _closed_form(state: State, group: Group, mode: int) -> None:
     structure = state.structure
     loop = group.loops[0]
-    k: Value = 0.0 if loop.start == loop.end else state.nodes[loop.start] - state.nodes[loop.end]
-    z: dict[int, Value] = dict.fromkeys(group.angles, 0.0)
+    k: Value = ZERO if loop.start == loop.end else state.nodes[loop.start] - state.nodes[loop.end]
+    z: dict[int, Value] = dict.fromkeys(group.angles, ZERO)
     d: dict[int, Value] = {}
     for index, sign in loop.edges:
         edge = structure.edges[index]

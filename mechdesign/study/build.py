@@ -5,7 +5,6 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Mapping
-from typing import Literal
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.model import Description, Link, Place, Quantity, Term
@@ -43,13 +42,12 @@ class Builder:
         self._check_sketch()
         self._build_links()
         joints = joint_rules.build(self)
-        joint_rules.check_connected(self, joints)
+        joint_rules.check_connected(self)
         drives = quantities.drives(self)
         measures = quantities.measures(self)
         limits = quantities.limits(self)
-        branch: Literal["side", "follow"] = "follow" if self.section.branch == "follow" else "side"
         return Description(
-            self.places, self.links, joints, drives, measures, limits, self.sketch, self.units.angle_factor, branch
+            self.places, self.links, joints, drives, measures, limits, self.sketch, self.units.angle_factor
         )
 
     def parameters(self, nominal: Mapping[str, float], formulas: Mapping[str, Expression]) -> Parameters:

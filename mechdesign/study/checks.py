@@ -143,6 +143,11 @@ class _Checker:
     def motion(self, command: str, section: KinematicsSection | ReliabilitySection) -> None:
         self._given(section.rates, (command, "rates"), _RATE_KINDS)
         self._given(section.accelerations, (command, "accelerations"), _ACCELERATION_KINDS)
+        for key, values in (("rates", section.rates), ("accelerations", section.accelerations)):
+            for name in values:
+                if name in self.names.coordinates and name not in self.names.drives:
+                    message = f"{name!r} is not a drive: {key} are those of {', '.join(self.names.drives)}"
+                    self.reporter.report((command, key, name), message, at_key=True)
         seen: set[str] = set()
         for index, name in enumerate(section.outputs or ()):
             path: Path = (command, "outputs", index)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from mechdesign.mechanism.model import Fixed, Line, Prismatic, Slot
 from mechdesign.mechanism.model import Joint as JointModel
 from mechdesign.study import models
 from mechdesign.study.document import Path
+from mechdesign.study.names import GROUND
 from mechdesign.study.numbers import suggestion
 
 if TYPE_CHECKING:
@@ -55,8 +55,15 @@ def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line
     if not all(_on_link(builder, link, point, (*path, "through", k)) for k, point in enumerate(through)):
         return None
     if len(through) == 2:
-        if through[0] == through[1]:
-            builder.report((*path, "through"), f"a line through {through[0]!r} twice has no direction")
+        points = builder.links[link].points
+        far = [point for point in through if point not in points]
+        if far:
+            message = f"{far[0]!r} moves along leg {link!r}: a line needs two points of one body; give 'direction'"
+            builder.report((*path, "through"), message)
+            return None
+        first, second = ([builder.nominal(term) for term in points[point]] for point in through)
+        if first == second:
+            builder.report((*path, "through"), f"{' and '.join(map(repr, through))} are one place: no direction")
             return None
         return Line(link, through[0], 0.0, through[1])
     direction = builder.place(f"{name}.direction", section.direction or 0.0, "angle")
@@ -123,21 +130,27 @@ def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, 
     return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle"))
 
 
-def check_connected(builder: Builder, joints: Mapping[str, JointModel]) -> None:
-    """Note links that hang on nothing: no point shared with another link, and no joint."""
-    jointed: set[str] = set()
-    for section in builder.section.joints.values():
-        jointed.update(section.prismatic or (), section.fixed or (), (section.slot,) if section.slot else ())
-        if section.slot and section.point:
-            jointed.update(builder.names.owners.get(section.point, ()))
-    for name in builder.section.links:
-        points = builder.names.points_of(name)
-        if (
-            name in jointed
-            or any(len(builder.names.owners[point]) > 1 for point in points)
-            or len(builder.section.links) == 1
-        ):
+def check_connected(builder: Builder) -> None:
+    """Note links that neither shared points nor joints lead to from the ground."""
+    section, owners = builder.section, builder.names.owners
+    ties = [set(links) for links in owners.values()]
+    for joint in section.joints.values():
+        ties.append({*(joint.prismatic or ()), *(joint.fixed or ())})
+        if joint.slot and joint.point:
+            ties.append({joint.slot, *owners.get(joint.point, ())})
+    reached, before = {GROUND}, 0
+    while len(reached) > before:
+        before = len(reached)
+        reached.update(*(tie for tie in ties if tie & reached))
+    for name in section.links:
+        if name in reached or GROUND not in section.links:
             continue
-        others = [point for point, links in builder.names.owners.items() if links != [name]]
-        hint = next((text for text in (suggestion(point, others) for point in points) if text), "")
-        builder.report(("links", name), f"no other link shares a point of it ({', '.join(points)}){hint}", at_key=True)
+        points = builder.names.points_of(name)
+        mates = sorted({link for tie in ties if name in tie for link in tie} - {name})
+        if mates:
+            message = f"nothing joins it to the ground: only to {', '.join(mates)}"
+        else:
+            others = [point for point, links in owners.items() if links != [name]]
+            hint = next((text for text in (suggestion(point, others) for point in points) if text), "")
+            message = f"no other link shares a point of it ({', '.join(points)}){hint}"
+        builder.report(("links", name), message, at_key=True)
