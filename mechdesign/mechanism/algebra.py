@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 # A scalar or an array that broadcasts against the batch; scalars stay scalars, which keeps constants cheap.
 Value = Any
 
+# Decorator: what is not a number at a singularity or in a pose that fails is told by its value, not by warnings.
+quiet = np.errstate(divide="ignore", invalid="ignore", over="ignore")
+
 
 def norm2(z: Value) -> Value:
     """Squared length of a vector."""

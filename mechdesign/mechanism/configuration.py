@@ -9,7 +9,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.mechanism.algebra import Value, angle_of, norm2
+from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
@@ -77,6 +77,7 @@ class Configuration:
         turn = self.rotations[frame]
         return turn if isinstance(offset, float) else turn * offset
 
+    @quiet
     def value(self, coordinate: Coordinate) -> Value:
         """Value of a coordinate (angles in radians, in (-pi, pi])."""
         if coordinate.kind == "x":

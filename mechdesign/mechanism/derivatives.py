@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, plus
+from mechdesign.mechanism.algebra import Value, cross, plus, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.solve import State, columns
@@ -84,12 +84,11 @@ class Linearization:
             return _solve_small(lines, right)
         a, b = lines[0]
         if index not in self._scales:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                self._scales[index] = -1 / cross(a, b)
+            self._scales[index] = -1 / cross(a, b)
         scale = self._scales[index]
-        with np.errstate(invalid="ignore"):
-            return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
+        return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
 
+    @quiet
     def solve(
         self,
         given: Sequence[Value],
@@ -166,6 +165,7 @@ class Linearization:
         """Velocities for given drive rates (radians and lengths per time)."""
         return self.solve(rates, [0.0] * len(self.structure.edges))
 
+    @quiet
     def acceleration(self, velocity: Rates, accelerations: Sequence[Value]) -> Rates:
         """Accelerations for given drive accelerations."""
         rest: list[Value] = []
@@ -179,6 +179,7 @@ class Linearization:
             rest.append(total)
         return self.solve(accelerations, rest)
 
+    @quiet
     def sensitivity(self, places: Sequence[str]) -> Rates:
         """Derivatives with respect to dimensions, the drives held; a leading axis runs over `places`.
 
@@ -192,6 +193,7 @@ class Linearization:
         ]
         return self.solve(given, rest, offsets)
 
+    @quiet
     def rate_sensitivity(
         self, places: Sequence[str], position: Rates, velocity: Rates, acceleration: Rates | None
     ) -> tuple[Rates, Rates | None]:

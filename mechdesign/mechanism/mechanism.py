@@ -213,7 +213,7 @@ class Mechanism:
                 edges = {k for loop in group.loops for k, _ in loop.edges}
                 nodes = {n for k in edges for n in (self.graph.edges[k].tail, self.graph.edges[k].head)}
                 joints = sorted(self.graph.nodes[n] for n in nodes if ":" not in self.graph.nodes[n])
-                links = ", ".join(body.removesuffix(":rod") for body in bodies)
+                links = ", ".join(dict.fromkeys(body.removesuffix(":rod") for body in bodies))
                 return f"links {links} do not meet (joints {', '.join(joints)})"
         return "its legs have no positive length"
 

@@ -8,7 +8,7 @@ from functools import reduce
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import Value, dot, norm2
+from mechdesign.mechanism.algebra import Value, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Rates
@@ -17,6 +17,7 @@ from mechdesign.mechanism.derivatives import Rates
 STEP = 1e-6
 
 
+@quiet
 def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) -> Value:
     """First derivative of a coordinate along `rates` (in time, by a drive or by a dimension); angles in radians."""
     kind = coordinate.kind
@@ -40,6 +41,7 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
                for g, part in zip(gradient, coordinate.parts, strict=True))  # fmt: skip
 
 
+@quiet
 def second(configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates) -> Value:
     """Second time derivative of a coordinate."""
     if coordinate.kind == "distance":
@@ -68,6 +70,7 @@ class Motion:
     acceleration_z: Rates
 
 
+@quiet
 def velocity_sensitivity(configuration: Configuration, coordinate: Coordinate, motion: Motion) -> Value:
     """Derivative of a coordinate's velocity with respect to dimensions (leading axis)."""
     if coordinate.kind == "distance":
@@ -86,6 +89,7 @@ def velocity_sensitivity(configuration: Configuration, coordinate: Coordinate, m
     return first(configuration, coordinate, _plain(motion.velocity_z))
 
 
+@quiet
 def acceleration_sensitivity(configuration: Configuration, coordinate: Coordinate, motion: Motion) -> Value:
     """Derivative of a coordinate's acceleration with respect to dimensions (leading axis).
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.continuation import Start, follow, unknowns_of
 from mechdesign.mechanism.coordinates import Coordinate
@@ -32,10 +32,10 @@ class Plan:
         self.modes = tuple(modes)
         self.iterative = any(group.form == "newton" for group in structure.groups)
 
+    @quiet
     def run(self, given: Sequence[Value], vectors: Vectors, guess: Guess | None) -> State:
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            state = start_state(self.mechanism.graph, self.structure, vectors, given)
-            return run(state, self.modes, guess, given)
+        state = start_state(self.mechanism.graph, self.structure, vectors, given)
+        return run(state, self.modes, guess, given)
 
     def _start(self, at: Configuration | None) -> Start:
         at = self.mechanism.sketch_configuration if at is None else at
