@@ -41,7 +41,7 @@ class Patch:
         fraction = 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID)))
         fraction = np.clip(fraction, INSET, 1 - INSET)
         radius = self.inner[:, None] + fraction * (self.outer - self.inner)[:, None]
-        return about + radius * np.exp(1j * self.theta)[:, None]
+        return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
 
 
 def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterator[Patch]:

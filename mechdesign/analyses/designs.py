@@ -31,7 +31,8 @@ def grid(study: Study) -> dict[str, Floats]:
         parameters = {key: value for key, value in columns.items() if key in study.parameters.nominal}
         env = {**study.parameters.values(parameters), **columns}
         low, high = (
-            np.broadcast_to(np.asarray(bound.evaluate(env), dtype=float), rows) for bound in (variable.from_, variable.to)
+            np.broadcast_to(np.asarray(bound.evaluate(env), dtype=float), rows)
+            for bound in (variable.from_, variable.to)
         )
         with np.errstate(invalid="ignore"):
             if variable.step is not None:

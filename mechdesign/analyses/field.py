@@ -55,7 +55,7 @@ class Field:
         Unlike `Plan.solve` this leaves finite what does not depend on a leg that cannot reach, so that margins keep
         their sign and smoothness there.
         """
-        given = [z.real, z.imag, *self.held]
+        given: list[Value] = [z.real, z.imag, *self.held]
         if self.plan.iterative:
             return self.plan.solve(given, places, limits=False)
         vectors = self.mechanism.geometry.vectors(places)

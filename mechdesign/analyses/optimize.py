@@ -146,16 +146,14 @@ def _variables(study: Study, designs: _Designs, rows: NDArray[np.intp]) -> Itera
         yield Column(name, column[rows], _unit(study, name), "design variable")
 
 
-def _values(
-    designs: _Designs, rows: NDArray[np.intp], meanings: Mapping[str, tuple[str, str]]
-) -> Iterator[Column]:
+def _values(designs: _Designs, rows: NDArray[np.intp], meanings: Mapping[str, tuple[str, str]]) -> Iterator[Column]:
     for each in designs.goals:
         unit, meaning = meanings.get(each.column, ("", f"worst row of {each.name}")) if each.index else (
             "", f"worst row of {each.name}")  # fmt: skip
         yield Column(each.name, designs.values[each][rows], unit, meaning)
 
 
-def _optimum(  # noqa: PLR0913
+def _optimum(
     study: Study,
     designs: _Designs,
     weights: Floats,
@@ -177,9 +175,7 @@ def _optimum(  # noqa: PLR0913
             yield Column(name, np.asarray(value), "", "parameter that follows from the variables")
 
 
-def _all(
-    study: Study, designs: _Designs, cpi: Floats, meanings: Mapping[str, tuple[str, str]]
-) -> Iterator[Column]:
+def _all(study: Study, designs: _Designs, cpi: Floats, meanings: Mapping[str, tuple[str, str]]) -> Iterator[Column]:
     every = np.arange(len(designs.reasons))
     yield from _variables(study, designs, every)
     yield from _values(designs, every, meanings)

@@ -19,6 +19,8 @@ PROBES = 4
 DOUBLINGS = 16
 # Angles of panel ends are wanted to this accuracy (radians).
 ACCURACY = 1e-13
+# Panel ends nearer to each other than this are one (radians): what lies between them is lost in rounding.
+TOGETHER = 1e-7
 
 
 @dataclass(frozen=True)
@@ -66,17 +68,24 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     design, cell = np.nonzero(codes[:, 1:] != codes[:, :-1])
     breaks = _breaks(designs, intervals, angles, design, cell, reach, effort)
     inside = intervals.counts.reshape(count, -1) > 0
+    fixed = np.tile([*scan, *cuts], count)
     owner = np.concatenate([np.repeat(np.arange(count), 2 + len(cuts)), design])
-    place = np.concatenate([np.tile([*scan, *cuts], count), breaks])
+    place, firm = np.concatenate([fixed, breaks]), np.arange(len(fixed) + len(breaks)) < len(fixed)
     order = np.lexsort((place, owner))
-    owner, place = owner[order], place[order]
-    keep = (owner[1:] == owner[:-1]) & (np.diff(place) > 1e-12)
+    owner, place, firm = owner[order], place[order], firm[order]
+    # Breaks that rounding sets beside each other, or beside the end of the scan, are one.
+    near = (owner[1:] == owner[:-1]) & (np.diff(place) < TOGETHER)
+    drop = np.zeros(len(place), dtype=bool)
+    drop[1:] |= near & ~firm[1:]
+    drop[:-1] |= near & firm[1:] & ~firm[:-1]
+    owner, place = owner[~drop], place[~drop]
+    keep = owner[1:] == owner[:-1]
     owner, low, high = owner[:-1][keep], place[:-1][keep], place[1:][keep]
     # A panel is empty where every ray that was traced inside it met nothing.
     first, last = np.searchsorted(angles, low, side="right"), np.searchsorted(angles, high, side="left")
     met = np.concatenate([np.zeros((count, 1), dtype=int), np.cumsum(inside, axis=1)], axis=1)
     full = (last <= first) | (met[owner, np.maximum(last, first)] > met[owner, first])
-    return Panels(owner[full], low[full], high[full], reach, inside.any(axis=1))
+    return Panels(owner[full], low[full], high[full], reach, np.asarray(inside.any(axis=1)))
 
 
 def _first_guess(designs: Designs) -> Floats:
@@ -133,7 +142,8 @@ def _breaks(
     def lead(traced: Intervals, ray: Ints, which: Ints) -> Floats:
         """How far one rival is ahead of the other; the sign alone where they cannot be compared."""
         side = np.where(_signatures(traced, margins)[ray] == codes[which], 1.0, -1.0)
-        one, other, turn_one, turn_other, near = (p[which] for p in pairs)
+        one, other, turn_one, turn_other = (pair[which] for pair in pairs[:4])
+        near = pairs[4][which]
         ahead = _nearest(traced, ray, one, turn_one, near) - _nearest(traced, ray, other, turn_other, near)
         ahead = np.abs(ahead) * side
         return np.where(np.isfinite(ahead), ahead, side * reach[design[which]])

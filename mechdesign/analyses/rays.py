@@ -9,6 +9,7 @@ their roots.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from mechdesign.analyses.roots import bracketed_roots
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 # Rays traced at once: with 16 samples a ray and complex numbers the temporaries stay in the second-level cache.
-BLOCK = 1024
+BLOCK = 4096
 ROUNDING = 1e-14
 # Roots nearer than this (relative to the reach) are the same boundary; of several margins the first is named.
 SAME = 1e-9
@@ -104,10 +105,10 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
         return parts[0]
     starts = np.arange(len(parts)) * BLOCK
 
-    def join(name: str) -> NDArray[np.generic]:
+    def join(name: str) -> Any:
         return np.concatenate([getattr(part, name) for part in parts])
 
-    crossings = tuple(np.concatenate([part.crossings[k] for part in parts]) for k in range(4))
+    crossings: Any = tuple(np.concatenate([part.crossings[k] for part in parts]) for k in range(4))
     lengths = [len(part.crossings[0]) for part in parts]
     return Intervals(
         join("ray") + np.repeat(starts, [len(part.ray) for part in parts]), join("inner"), join("outer"),
@@ -116,9 +117,7 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
     )  # fmt: skip
 
 
-def _trace_block(
-    designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float
-) -> Intervals:
+def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
     """First the margins that are quadratic along rays, whose roots are known; then the others, within what is left."""
     places, direction = designs.of(design), np.exp(1j * theta)
     values = designs.field.margins(designs.about + FIVE[:, None] * reach * direction, places, assembly=False)
@@ -194,9 +193,7 @@ def _others(
     tolerance = ROUNDING * found.outer[lanes[lane]]
     radius = bracketed_roots(evaluate, *sample(cell), *sample(cell + 1), *sample(third), tolerance)
     turn = np.where(positive[margin, cell + 1, lane], 1, -1)
-    part = _intervals(
-        rows[margin], lane, turn, radius, (~positive[:, 0]).sum(axis=0), found.outer[lanes], 0.0
-    )
+    part = _intervals(rows[margin], lane, turn, radius, (~positive[:, 0]).sum(axis=0), found.outer[lanes], 0.0)
     return _replace(found, lanes, part)
 
 

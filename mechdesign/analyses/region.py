@@ -81,7 +81,8 @@ def questions(study: Study, tolerance: float = TOLERANCE) -> list[Question]:
     if mechanism.mobility < 2:
         raise _problem(
             study, "workspace.point",
-            f"the mobility is {mechanism.mobility}: point {section.point} moves on a curve, not in a region; use kinematics",
+            f"the mobility is {mechanism.mobility}: point {section.point} moves on a curve, not in a region; "
+            "use kinematics",
         )  # fmt: skip
     if len(section.at) != mechanism.mobility - 2:
         raise _problem(

@@ -172,10 +172,10 @@ def _boundary(study: Study, question: Question, found: Sequence[Patch]) -> list[
     radius = np.concatenate([curve[1] for curve in curves])
     lengths = [len(curve[0]) for curve in curves]
     labels = [field.labels[curve[2]] for curve in curves]
-    z = question.about + radius * np.exp(1j * theta)
+    z = np.asarray(question.about + radius * np.exp(1j * theta))
     inside = np.concatenate([np.full(n, 1.0 if curve[3] == "inner" else -1.0)
                              for n, curve in zip(lengths, curves, strict=True)])  # fmt: skip
-    within = question.about + radius * (1 + 1e-12 * inside) * np.exp(1j * theta)
+    within = np.asarray(question.about + radius * (1 + 1e-12 * inside) * np.exp(1j * theta))
     drives = _drives(question, z, within, np.flatnonzero(np.diff(inside)) + 1)
     length, angle = study.units.label("length"), study.units.label("angle")
     columns = [
@@ -193,7 +193,7 @@ def _boundary(study: Study, question: Question, found: Sequence[Patch]) -> list[
         *columns,
         Column("at", np.repeat([name for _, name in labels], lengths), "", "which limit or singularity"),
         Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
-        Column("side", np.repeat([curve[3] for curve in curves], lengths), "", "inner or outer end of the ray's interval"),
+        Column("side", np.repeat([curve[3] for curve in curves], lengths), "", "which end of the ray's interval"),
         Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth piece of the boundary"),
     ]  # fmt: skip
 

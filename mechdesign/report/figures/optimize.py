@@ -53,7 +53,9 @@ def _curves(study: Study, designs: Table, optimum: Table, names: list[str], goal
         best = [_best_of(designs, feasible & (designs[name] == value)) for value in values]
         axes.plot(values, designs["CPI"][best], color=style.INK, linewidth=2.2, label="CPI")
         for goal, color in zip(goals, style.PALETTE, strict=False):
-            axes.plot(values, _normalised(study, designs, goal, feasible)[best], color=color, label=f"{goal}, normalised")
+            axes.plot(
+                values, _normalised(study, designs, goal, feasible)[best], color=color, label=f"{goal}, normalised"
+            )
         winner = _best_row(optimum)
         axes.plot(optimum[name][winner], optimum["CPI"][winner], "o", color=style.VERMILION, markersize=7,
                   label=f"best: {name} = {optimum[name][winner]:g}")  # fmt: skip
@@ -85,7 +87,7 @@ def _surface(study: Study, designs: Table, optimum: Table, names: list[str]) -> 
     filled = _fill(axes, designs, names, "CPI")
     bar = figure.colorbar(filled, ax=axes, pad=0.02)
     bar.set_label("composite performance index CPI")
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     shown: dict[tuple[float, float], list[str]] = {}
     weights = [name for name in optimum.names if name.startswith("w_")]
     for row in range(len(optimum)):
@@ -112,7 +114,7 @@ def _maps(study: Study, designs: Table, names: list[str], goals: list[str]) -> F
         axes = figure.add_subplot(rows, columns, number + 1)
         filled = _fill(axes, designs, names, goal)
         bar = figure.colorbar(filled, ax=axes, location="bottom", pad=0.02)
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.outline.set_visible(False)
         bar.ax.locator_params(nbins=4)
         axes.set_title(_label(designs, goal), loc="left")
         axes.set_xlabel(_label(designs, names[0]))

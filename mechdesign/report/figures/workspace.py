@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from mechdesign.study import Study
 
 Floats = NDArray[np.float64]
-# Contours of an index that grows without bound stop at this percentile of its nodes.
-CLIP = 90.0
-POSES = 3
+# Contours of an index that grows without bound stop at this percentile of the nodes away from the boundary.
+CLIP = 80.0
+# Poses of the mechanism along each curve of the boundary.
+POSES = {"inner": 1, "outer": 2}
 SIDES = {"inner": (style.BLUE, "-"), "outer": (style.VERMILION, "-")}
 KINDS = {"limit": "-", "singularity": (0, (4, 1.5))}
 
@@ -61,7 +62,7 @@ def _grids(local: Table, column: str) -> Iterator[tuple[Floats, Floats, Floats]]
     for patch in np.unique(local["patch"]):
         rows = local["patch"] == patch
         shape = (int(local["ray"][rows].max()) + 1, int(local["node"][rows].max()) + 1)
-        yield tuple(local[name][rows].reshape(shape) for name in ("x", "y", column))  # type: ignore[misc]
+        yield tuple(local[name][rows].reshape(shape) for name in ("x", "y", column))
 
 
 def _curves(boundary: Table) -> Iterator[NDArray[np.intp]]:
@@ -85,23 +86,26 @@ def _height(table: Table, width: float, *, extra: float = 0.9) -> float:
 
 def _map(study: Study, local: Table, boundary: Table, column: str, name: str) -> Figure:
     values = local[column]
-    finite = values[np.isfinite(values)]
     clipped = column != "inverse_condition"
-    top = float(np.percentile(finite, CLIP)) if clipped else float(finite.max())
+    last = local["node"].max()
+    inside = (local["node"] > last // 4) & (local["node"] < last - last // 4) & np.isfinite(values)
+    top = float(np.percentile(values[inside], CLIP)) if clipped else float(np.nanmax(values))
     levels = MaxNLocator(nbins=12, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, top)
     figure = style.new_figure(style.WIDTH, _height(local, 5.6))
     axes = figure.add_subplot()
     norm = BoundaryNorm(levels, 256, extend="max" if clipped else "neither")
     for x, y, z in _grids(local, column):
         shown = np.where(np.isfinite(z), z, levels[-1] * 2 if clipped else 0.0)
-        axes.contourf(x, y, shown, levels=levels, cmap=style.COLORMAP, norm=norm, extend="max" if clipped else "neither")
+        axes.contourf(
+            x, y, shown, levels=levels, cmap=style.COLORMAP, norm=norm, extend="max" if clipped else "neither"
+        )
         axes.contour(x, y, np.minimum(shown, 2 * levels[-1]), levels=levels[1:], colors="white", linewidths=0.5,
                      alpha=0.7)  # fmt: skip
     _outline(axes, boundary, color=lambda side: style.INK)
     unit = next(c.unit for c in local.columns if c.name == column)
     bar = figure.colorbar(ScalarMappable(norm, style.COLORMAP), ax=axes, shrink=0.85, pad=0.02, ticks=levels)
     bar.set_label(style.axis_label(name, unit))
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     _frame(axes, study, f"{name} of the Jacobian at point {study.workspace.point if study.workspace else ''}")
     return figure
 
@@ -162,7 +166,8 @@ def _places(boundary: Table) -> NDArray[np.complex128]:
     for rows in _curves(boundary):
         z = boundary["x"][rows] + 1j * boundary["y"][rows]
         along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(z)))])
-        for share in (np.arange(POSES) + 0.5) / POSES:
+        number = POSES[str(boundary["side"][rows[0]])]
+        for share in (np.arange(number) + 0.5) / number:
             k = int(np.searchsorted(along, share * along[-1]))
             found.append(z[k] + 1e-3 * (middle - z[k]) * (1 if boundary["side"][rows[0]] == "outer" else -1))
     return np.array(found)
@@ -180,8 +185,8 @@ def _drives(study: Study, boundary: Table) -> Figure:
             if not rows.size:
                 continue
             rows = rows[np.argsort(boundary["theta"][rows], kind="stable")]
-            axes.plot(boundary["theta"][rows], boundary[name][rows], color=color, linestyle=dashes[number % len(dashes)],
-                      label=f"{name}, {side} boundary")  # fmt: skip
+            label, dash = f"{name}, {side} boundary", dashes[number % len(dashes)]
+            axes.plot(boundary["theta"][rows], boundary[name][rows], color=color, linestyle=dash, label=label)
     axes.set_xlim(float(boundary["theta"].min()), float(boundary["theta"].max()))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 3, 4.5, 6, 9, 10]))
     axes.set_title("Drives along the boundary of the workspace", loc="left")
