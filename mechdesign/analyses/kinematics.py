@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.extremes import extremes
 from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, mixes
-from mechdesign.analyses.motion_limits import limits_of_motion
+from mechdesign.analyses.motion_limits import change_points, limits_of_motion
 from mechdesign.analyses.poses import (
     SolvedPoses,
     expand_outputs,
     in_study_units,
     judge_failures,
+    pose_in_words,
     radians,
     solve_poses,
 )
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.derivatives import Linearization, regularity
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.progress import NULL, Progress
@@ -31,6 +34,8 @@ from mechdesign.study.sections import KinematicsSection
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
+# At a dead centre the angle between links is known to the root of rounding only; below this sine it is at one.
+STALLED = 1e-6
 
 Array = NDArray[np.float64]
 
@@ -76,6 +81,7 @@ class _Motion:
             self.put(output.name, rows, in_study_units(study, output, configuration.value(output)))
         if self.section.rates or self.section.accelerations:
             self._rates(linear, rows)
+        self.put("regularity", rows, regularity(linear))
         if self.square or self.section.loads:
             self._statics(linear, rows)
 
@@ -169,7 +175,7 @@ def kinematics(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
         for name in mechanism.drives:
             if mechanism.quantity(name) == "angle" and name not in poses.names:
                 arrays[f"drive {name}"] = continuous(arrays[f"drive {name}"], study, poses.grid)
-    warnings += _conditioning(study, motion, reason)
+    warnings += _conditioning(study, motion, reason) + _stalled(motion, reason)
     columns = _columns(motion, outputs)
     columns.append(Column("valid", reason == 0, meaning="1 where the pose is assembled and within its limits"))
     tables = {"motion": Table("motion", tuple(columns), "positions, velocities and accelerations per pose")}
@@ -180,17 +186,23 @@ def kinematics(study: Study, *, seed: int | None = None, jobs: int | None = 1, p
     tables["extremes"] = extremes(study, named, poses, swept, reason)
     if swept is not None:
         tables["limits"] = limits_of_motion(study, poses.groups[0], swept, reason)
+        warnings += change_points(study, poses.groups[0], swept, reason)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(reason))}
     return Result("kinematics", tables, warnings, counts, failed)
 
 
 def continuous(angles: Array, study: Study, grid: Sequence[int]) -> Array:
-    """Angles without jumps along the last axis of a grid of poses; nan are stepped over."""
+    """Angles without jumps along a grid of poses, the last axis first; nan are stepped over."""
     turn = 2 * np.pi / study.units.angle_factor
     table = angles.reshape(grid).copy()
     for line in table.reshape(-1, grid[-1]):
         known = np.flatnonzero(np.isfinite(line))
         line[known] = np.unwrap(line[known], period=turn)
+    for axis in range(len(grid) - 2, -1, -1):
+        for stack in table.reshape(-1, grid[axis], math.prod(grid[axis + 1 :])):
+            for before, block in pairwise(stack):
+                jump = (block - before)[np.isfinite(block - before)][:1]
+                block -= turn * np.round(jump / turn).sum()
     return table.reshape(-1)
 
 
@@ -207,6 +219,17 @@ def _conditioning(study: Study, motion: _Motion, reason: NDArray[np.int8]) -> li
         poses = "1 pose is" if count == 1 else f"{count} poses are"
         return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"]
     return []
+
+
+def _stalled(motion: _Motion, reason: NDArray[np.int8]) -> list[str]:
+    rows = np.flatnonzero((reason == 0) & ~(motion.arrays["regularity"] >= STALLED))
+    if not len(rows):
+        return []
+    poses = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
+    return [
+        f"{poses} at a dead centre or change point, where the drives do not move the mechanism in one way: velocities, "
+        f"accelerations and efforts mean nothing there; the first: {pose_in_words(motion.study, motion.poses, rows[0])}"
+    ]
 
 
 def _columns(motion: _Motion, outputs: list[Coordinate]) -> list[Column]:

@@ -20,13 +20,14 @@ The structure used is always that of the drives (their Assur groups), however th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, plus, quiet
+from mechdesign.mechanism.algebra import Value, cross, norm2, plus, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.solve import State, columns
@@ -283,4 +284,20 @@ def determinants(linearization: Linearization) -> list[Value]:
             shape = np.broadcast_shapes(*(np.shape(c) for row in rows for c in row))
             matrix = np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
             found.append(np.linalg.det(matrix))
+    return found
+
+
+@quiet
+def regularity(linearization: Linearization) -> Value:
+    """How far the drives are from a singularity, for each pose: 0 at one, at most 1.
+
+    The smallest over the groups of |det| over the product of the lengths of its columns; for two links that meet it
+    is the sine of the angle between them.
+    """
+    found: Value = 1.0
+    groups = [(k, group) for k, group in enumerate(linearization.structure.groups) if group.form != "place"]
+    for (index, group), determinant in zip(groups, determinants(linearization), strict=True):
+        lines = linearization.loop_columns(index, group)
+        sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(len(lines[0]))]
+        found = np.minimum(found, np.abs(determinant) / np.sqrt(math.prod(sizes)))
     return found

@@ -11,7 +11,7 @@ from helpers.studies import study_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mechdesign.errors import StudyError
+from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
@@ -216,7 +216,12 @@ def test_closed_form_agrees_with_newton_on_the_inverse_problem(made: tuple[str, 
     """Given the second slide, all other unknowns are one group: Newton and continuation instead of dyads."""
     text, numbers = made
     mechanism = build(text)
-    plan = mechanism.plan(("g.slide",))
+    try:
+        plan = mechanism.plan(("g.slide",))
+    except MechanismError as error:
+        # The drawing may decide the drive's assembly clearly, and that of the inverse problem not.
+        assume("1 %" not in str(error))
+        raise
     sketch = mechanism.sketch_configuration
     linear = mechanism.linearize(sketch)
     speed = float(first(sketch, mechanism.coordinate("g.slide"), linear.velocity([1.0])))
