@@ -26,6 +26,8 @@ ROUNDING = 1e-14
 SAME = 1e-9
 # Five samples that a parabola meets to this fraction of their size are of a quadratic function.
 QUADRATIC = 1e-13
+# First and last sample of an interval, as fractions of it.
+INSET = 1e-7
 FIVE = np.linspace(0.0, 1.0, 5)
 
 
@@ -167,7 +169,7 @@ def _others(
     """Cut intervals where one of the margins that are not quadratic is negative or unknown."""
     owner, inner, width = found.ray, found.inner, found.outer - found.inner
     local = {name: value[owner] for name, value in places.items()}
-    fraction = 0.5 * (1 - np.cos(np.pi * (np.arange(samples) + 0.5) / samples))
+    fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, samples))), INSET, 1 - INSET)
     radii = inner + fraction[:, None] * width
     values = designs.field.margins(designs.about + radii * direction[owner], local)
     values = values[np.flatnonzero(np.append(~quadratic, np.ones(len(values) - len(quadratic), dtype=bool)))]

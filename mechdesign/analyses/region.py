@@ -122,9 +122,10 @@ def questions(study: Study, tolerance: float = TOLERANCE) -> list[Question]:
 
 
 def _scan(section: WorkspaceSection, unit: float) -> tuple[float, float]:
-    start = (section.scan.from_ or 0.0) * unit
-    stop = start + 2 * np.pi if section.scan.to is None else section.scan.to * unit
-    return (start, stop) if stop > start else (stop, start)
+    if section.scan.from_ is None or section.scan.to is None:
+        return 0.0, 2 * np.pi
+    start, stop = section.scan.from_ * unit, section.scan.to * unit
+    return min(start, stop), max(start, stop)
 
 
 def _problem(study: Study, key: str, message: str) -> StudyError:
@@ -143,6 +144,9 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
     designs = Designs(question.field, places, count, question.about)
     cuts = tuple(sorted(set(question.counted) - set(question.scan)))
     panels = find_panels(designs, question.scan, effort, cuts)
+    if not panels.closes.any():
+        nothing = {name: np.full(count, np.nan if name in ("GII", "GRI", "SUI") else 0.0) for name in INDICES}
+        return Answer(nothing, {name: np.zeros(count) for name in INDICES}, panels)
     samples, gauss = effort.samples, question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
     integral = integrate(designs, panels, tolerance, samples, question.counted, means=gauss)

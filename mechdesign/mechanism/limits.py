@@ -29,7 +29,7 @@ class Bound:
         return 2 * np.pi if self.coordinate.quantity == "angle" else size
 
     def margins(self, configuration: Configuration, places: Mapping[str, Value]) -> list[tuple[str, Value]]:
-        """Margins of this limit, each named; distances as differences of squares, which are smooth at the limit.
+        """Margins of this limit, each named; distances and legs as differences of squares, quadratic in positions.
 
         An angle between bounds is judged modulo a turn: it holds if (value - min) mod turn <= max - min.
         """
@@ -42,8 +42,10 @@ class Bound:
         if self.coordinate.kind == "distance":
             a, b = configuration.nodes[self.coordinate.node], configuration.nodes[self.coordinate.other]
             value = norm2(b - a)
-            low = None if low is None else low * abs(low)
-            high = None if high is None else high * abs(high)
+            low, high = _squared(low), _squared(high)
+        elif self.coordinate.kind == "slide" and self.coordinate.slide in configuration.graph.telescopic:
+            value = _squared(configuration.slides[self.coordinate.slide])
+            low, high = _squared(low), _squared(high)
         else:
             value = configuration.value(self.coordinate)
             if self.coordinate.quantity == "angle" and low is not None and high is not None:
@@ -56,3 +58,7 @@ class Bound:
         if high is not None:
             found.append((f"{self.label} max", high - value))
         return found
+
+
+def _squared(value: Value | None) -> Value | None:
+    return None if value is None else value * np.abs(value)

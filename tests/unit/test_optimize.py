@@ -1,0 +1,126 @@
+"""Optimisation: the grid, normalisation, weights, conditions, goals of other questions, reasons, repeatability."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mechdesign
+from mechdesign.analyses.designs import best, grid, normalised
+from mechdesign.errors import AssemblyError, StudyError
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+COARSE = ("optimize.variables.l_min.step=0.5", "optimize.variables.l_a.step=0.5")
+
+
+def rrr(*changes: str) -> mechdesign.results.Result:
+    return mechdesign.optimize(mechdesign.load(CONFIGS / "two_rrr.yaml", [*COARSE, *changes]))
+
+
+def test_grid_with_bounds_that_depend_on_variables_above() -> None:
+    found = grid(mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.variables.l_min.to=1.1"]))
+    assert found["l_min"] == pytest.approx([1, 1.03, 1.06, 1.06, 1.09, 1.09])
+    assert found["l_a"] == pytest.approx([1, 1, 1, 1.03, 1, 1.03])
+    everything = grid(mechdesign.load(CONFIGS / "two_rrr.yaml"))
+    assert len(everything["l_min"]) == 4556
+    assert everything["l_min"].max() == pytest.approx(4.99)
+
+
+def test_grid_takes_a_last_step_that_rounding_puts_beyond_the_bound() -> None:
+    found = grid(mechdesign.load(CONFIGS / "two_rpr.yaml", ["optimize.variables.l_min={from: 1, to: 1.3, step: 0.1}"]))
+    assert found["l_min"] == pytest.approx([1, 1.1, 1.2, 1.3])
+
+
+def test_grid_by_number() -> None:
+    found = grid(mechdesign.load(CONFIGS / "two_rpr.yaml", ["optimize.variables.l_min={from: 1, to: 2, number: 5}"]))
+    assert found["l_min"] == pytest.approx([1, 1.25, 1.5, 1.75, 2])
+
+
+def test_an_empty_grid_says_so() -> None:
+    study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.variables.l_a.from=9"])
+    with pytest.raises(StudyError, match=r"optimize.variables.l_a: no value lies"):
+        mechdesign.optimize(study)
+
+
+def test_normalisation_over_feasible_designs() -> None:
+    values, feasible = np.array([3.0, 1.0, 2.0, 9.0]), np.array([True, True, True, False])
+    assert normalised(values, feasible, smallest=False)[:3] == pytest.approx([1, 0, 0.5])
+    assert normalised(values, feasible, smallest=True)[:3] == pytest.approx([0, 1, 0.5])
+    assert np.isnan(normalised(values, feasible, smallest=False)[3])
+    assert normalised(np.ones(4), feasible, smallest=True)[:3] == pytest.approx([0, 0, 0])
+
+
+def test_ties_go_to_the_first_design() -> None:
+    assert best(np.array([np.nan, 1.0, 2.0, 2.0])) == 2
+
+
+def test_scores_are_weighted_sums_of_normalised_indices() -> None:
+    tables = rrr("optimize.weights=[[2, 0, 1], {SUI: 3}]").tables
+    optimum, designs = tables["optimum"], tables["designs"]
+    share = {name: (designs[name] - designs[name].min()) / np.ptp(designs[name]) for name in ("GII", "GRI", "SUI")}
+    assert designs["CPI"] == pytest.approx(sum(share.values()))
+    score = 2 * share["GII"] + share["SUI"]
+    assert optimum["score"] == pytest.approx([score.max(), 3.0])
+    assert optimum["w_SUI"] == pytest.approx([1, 3])
+    assert optimum["l_b"] == pytest.approx(optimum["l_min"] + 2 - optimum["l_a"])
+
+
+def test_conditions_leave_designs_out_and_are_counted() -> None:
+    result = rrr("optimize.subject_to=[{result: workspace.area, at_least: 9}]")
+    designs = result.tables["designs"]
+    area = rrr("optimize.maximize=[area]", "optimize.weights=[[1]]").tables["designs"]["area"]
+    assert (designs["feasible"] == (area >= 9)).all()
+    assert result.counts["infeasible"] == (area < 9).sum() > 0
+    assert set(designs["reason"][area < 9]) == {"not workspace.area at least 9"}
+    assert any("not workspace.area at least 9" in warning for warning in result.warnings)
+    # Normalised over the feasible designs only.
+    assert np.nanmax(designs["CPI"]) <= 3
+    assert np.isnan(designs["CPI"][area < 9]).all()
+
+
+def test_no_feasible_design_says_why() -> None:
+    with pytest.raises(AssemblyError, match=r"not workspace\.area at least 1000"):
+        rrr("optimize.subject_to=[{result: workspace.area, at_least: 1000}]")
+
+
+def test_a_design_without_workspace_is_infeasible() -> None:
+    """Bases too far apart for the legs to meet."""
+    changes = ("optimize.variables={R: {from: 1, to: 4, step: 1}}", "mechanism.parameters.l_max=3")
+    result = mechdesign.optimize(mechdesign.load(CONFIGS / "two_rpr.yaml", changes))
+    designs = result.tables["designs"]
+    assert designs["feasible"].tolist() == [True, True, False, False]
+    assert designs["reason"][3] == "nothing of the workspace can be reached"
+    assert result.counts == {"designs": 4, "infeasible": 2}
+
+
+def test_goals_of_other_questions() -> None:
+    """The worst pose counts: where the arm reaches farthest is minimised, by the length of its first link."""
+    changes = (
+        "optimize={variables: {r1: {from: 9, to: 11, step: 1}}, minimize: [kinematics.P.x], weights: [[1]],"
+        " subject_to: [{result: kinematics.P.y, at_most: 17}]}",
+    )
+    result = mechdesign.optimize(mechdesign.load(CONFIGS / "two_link_arm.yaml", changes))
+    designs = result.tables["designs"]
+    angles = np.radians([(30, 60), (45, 45), (60, 80)]).T
+    reach = np.array([r1 * np.exp(1j * angles[0]) + 8 * np.exp(1j * angles[1]) for r1 in (9, 10, 11)])
+    assert designs["kinematics.P.x"] == pytest.approx(reach.real.max(axis=1))
+    assert designs["feasible"].tolist() == (reach.imag.max(axis=1) <= 17).tolist()
+    assert designs["feasible"].tolist() == [True, True, False]
+    assert result.main["r1"][0] == 9
+
+
+def test_a_goal_that_no_result_has() -> None:
+    changes = "optimize={variables: {r1: {from: 9, to: 11, step: 1}}, maximize: [kinematics.Q.x]}"
+    with pytest.raises(StudyError, match=r"Q\.x"):
+        mechdesign.optimize(mechdesign.load(CONFIGS / "two_link_arm.yaml", [changes]))
+
+
+def test_threads_do_not_change_a_bit() -> None:
+    study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.variables.l_min.step=0.09"])
+    one, two = (mechdesign.optimize(study, jobs=jobs).tables["designs"] for jobs in (1, 2))
+    assert len(one) > 512
+    for column in one.columns:
+        if column.values.dtype.kind == "f":
+            assert column.values.tobytes() == two[column.name].tobytes(), column.name
