@@ -85,7 +85,8 @@ def rectangle_failure(low: Floats, high: Floats, rho: float) -> float:
     """
     if not (low < high).all():
         return 1.0
-    rest = np.sqrt((1.0 - rho) * (1.0 + rho))
+    # Rounding may carry the correlation of one error with itself beyond 1.
+    rest = np.sqrt(max(0.0, (1.0 - rho) * (1.0 + rho)))
     if rest < 1e-12:
         # y is x or -x: one error with the tighter of the two limits.
         other = (low[1], high[1]) if rho > 0 else (-high[1], -low[1])

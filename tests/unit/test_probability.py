@@ -103,3 +103,9 @@ def test_simulation_error_is_that_of_the_paper() -> None:
     # S2, Sec. 5: at most 0.0075 at R = 0.5 and 0.0045 at R = 0.9 with 40,000 samples.
     assert round(simulation_error(0.5, 40_000), 4) == 0.0075
     assert round(simulation_error(0.1, 40_000), 4) == 0.0045
+
+
+@pytest.mark.parametrize("rho", [1 + 1e-15, -1 - 1e-15])
+def test_a_correlation_beyond_one_by_rounding_is_one(rho: float) -> None:
+    found = rectangle_failure(np.array([-2.0, -3.0]), np.array([2.0, 3.0]), rho)
+    assert found == pytest.approx(2 * ndtr(-2.0), rel=1e-12)
