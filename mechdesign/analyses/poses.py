@@ -65,9 +65,12 @@ def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
         for begin in range(0, len(group.rows), CHUNK):
             given = [values[begin : begin + CHUNK] for values in whole]
             configuration = plan.solve(given)
-            known = dict(zip(group.names, given, strict=True))
+            known: dict[str, Value] = dict(zip(group.names, given, strict=True))
             drives = tuple(
-                np.broadcast_to(known.get(name, configuration.value(mechanism.coordinate(name))), configuration.shape)
+                np.broadcast_to(
+                    known[name] if name in known else configuration.value(mechanism.coordinate(name)),
+                    configuration.shape,
+                )
                 for name in mechanism.drives
             )
             yield SolvedPoses(group.rows[begin : begin + CHUNK], group.names, configuration, drives)
