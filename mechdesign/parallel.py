@@ -1,13 +1,16 @@
-"""Chunks of work on threads, in order, with bounded memory."""
+"""Chunks of work on threads or processes, in order, with bounded memory."""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import signal
+import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from itertools import islice
-from typing import TypeVar
+from typing import Any, TypeVar
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
@@ -31,30 +34,60 @@ def worker_count(jobs: int | None) -> int:
     return jobs
 
 
-def map_chunks(function: Callable[[Item], Value], items: Iterable[Item], jobs: int | None = 1) -> Iterator[Value]:
-    """Yield ``function(item)`` in the order of `items`, computed on `jobs` threads.
+def map_chunks(
+    function: Callable[[Item], Value], items: Iterable[Item], jobs: int | None = 1, *, processes: bool = False
+) -> Iterator[Value]:
+    """Yield ``function(item)`` in the order of `items`, computed by `jobs` workers.
 
-    At most ``3 * jobs`` chunks are under way or waiting to be consumed, whatever the number of items. NumPy releases
-    the interpreter's lock in its kernels, so threads gain on chunks of some thousand elements and share memory. An
-    exception or an interrupt (also of the consumer) drops the chunks not begun and waits for those under way.
+    At most ``3 * jobs`` chunks are under way or waiting to be consumed, whatever the number of items. An exception or
+    an interrupt (also of the consumer) drops the chunks not begun and waits for those under way.
 
     Parameters
     ----------
     jobs : int or None
-        Number of threads; None uses every processor. 1 computes in the calling thread.
+        Number of workers; None uses every processor. 1 computes in the calling thread.
+    processes : bool
+        Workers are forked processes where the system has them, else threads. NumPy releases the interpreter's lock in
+        its kernels, so threads gain on few operations of some thousand elements and share memory; many operations of
+        less need processes, whose items and values are pickled.
     """
     workers = worker_count(jobs)
     if workers == 1:
         yield from map(function, items)
         return
+    pool: Executor
+    call: Callable[[Item], Value]
+    if processes and sys.platform == "linux":
+        fork = multiprocessing.get_context("fork")
+        pool = ProcessPoolExecutor(workers, mp_context=fork, initializer=_adopt, initargs=(function,))
+        call = _call
+    else:
+        pool = ThreadPoolExecutor(workers, thread_name_prefix="mechdesign")
+        call = function
     source = iter(items)
-    with ThreadPoolExecutor(workers, thread_name_prefix="mechdesign") as pool:
+    with pool:
         pending: deque[Future[Value]] = deque()
         try:
-            pending.extend(pool.submit(function, item) for item in islice(source, _LOOK_AHEAD * workers))
+            pending.extend(pool.submit(call, item) for item in islice(source, _LOOK_AHEAD * workers))
             while pending:
                 value = pending.popleft().result()
-                pending.extend(pool.submit(function, item) for item in islice(source, 1))
+                pending.extend(pool.submit(call, item) for item in islice(source, 1))
                 yield value
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+# The function of a forked worker: inherited, not pickled, so that it may close over a whole study.
+_adopted: Callable[[Any], Any] | None = None
+
+
+def _adopt(function: Callable[[Any], Any]) -> None:
+    global _adopted
+    _adopted = function
+    # An interrupt is the parent's to handle: it lets the chunks under way finish.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _call(item: Any) -> Any:
+    assert _adopted is not None
+    return _adopted(item)

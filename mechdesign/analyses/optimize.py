@@ -109,7 +109,7 @@ def _evaluate(study: Study, goals: tuple[Goal, ...], jobs: int | None, progress:
             yield {name: column[k : k + CHUNK] for name, column in variables.items()}
 
     found: Evaluated
-    for found in map_chunks(evaluator, chunks(), jobs):
+    for found in map_chunks(evaluator, chunks(), jobs, processes=True):
         at = slice(len(reasons), len(reasons) + len(found.reasons))
         for each, column in found.values.items():
             values[each][at] = column
