@@ -101,6 +101,12 @@ class Field:
             found += [("singularity", f"assembly {k}") for k in range(len(self._signs))]
         return tuple(found)
 
+    @cached_property
+    def singular(self) -> NDArray[np.bool_]:
+        """Which margins end where a leg is stretched or folded, so that indices have square roots there."""
+        closures = len(self._closure_names())
+        return np.arange(len(self.labels)) < closures
+
     def _closure_names(self) -> list[str]:
         """What ends the reach of each closed-form group, in the order of `Configuration.closures`."""
         bodies = self.mechanism.graph.bodies

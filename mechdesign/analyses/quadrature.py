@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.panels import Panels
-from mechdesign.analyses.radial import BLOCK, RADII, along, segments
+from mechdesign.analyses.radial import BLOCK, RADII, along, evaluate, pieces
 from mechdesign.analyses.rays import Designs, Floats, Ints, trace
 from mechdesign.analyses.rules import Rule, quartic, spread
 
@@ -156,14 +156,15 @@ def _evaluate(
     area = np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta))
     value, error = np.zeros((2, len(theta))), np.zeros((2, len(theta)))
     if means:
-        whole = np.zeros(len(ray))
-        pilot = segments(designs, design[ray], theta[ray], inner, outer, whole, whole + 1)
+        parts = pieces(intervals, reach[design], designs.field.singular)
+        at = parts.ray
+        pilot = evaluate(designs, design[at], theta[at], parts)
         if allowed is None:
             share = weight * np.repeat(ANGLES.weights, count)
-            sums = [np.bincount(design[ray], row * share[ray], designs.count) for row in pilot[0]]
+            sums = [np.bincount(design[at], row * share[at], designs.count) for row in pilot[0]]
             allowed = np.asarray(ALONG * tolerance * np.stack(sums), dtype=float)
         each = allowed[:, design] * np.maximum(1 / span[design], SINGLE / weight)
-        value, error = along(designs, design, theta, intervals, pilot, each)
+        value, error = along(designs, design, theta, parts, pilot, each)
     rows = (area, area * counted, *(value * counted))
     total, doubt = np.empty((4, count)), np.empty((4, count))
     for k, row in enumerate(rows):

@@ -2,47 +2,135 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
+from numpy.typing import NDArray
 
-from mechdesign.analyses.rays import Designs, Floats, Intervals, Ints
-from mechdesign.analyses.rules import Rule, cosine, end_values, spread
+from mechdesign.analyses.rays import Designs, Floats, Intervals, Ints, clearances
+from mechdesign.analyses.rules import Rule, cosine
 
-RADII = Rule.of(9, 2, 0.5)
-_ENDS = end_values(RADII)
-# Segments of rays evaluated at once (9 nodes each).
-BLOCK = 4096
+RADII = Rule.of(11, 2, 0.5)
+# Pieces evaluated at once (11 nodes each).
+BLOCK = 2048
 MOST_SPLITS = 12
 # Nearer to the boundary than this fraction of the radius, rounding spoils an index that is infinite there.
 NEAREST = 3e-14
 # Spread of the three places that a ridge is fitted to, as a fraction of the segment.
 FIT = 0.01
+# A segment is split at a ridge that lies within this share of it, else in the middle.
+INSIDE = 0.9
 
-# Integrals and their estimated errors (2, segments), and what shows ridges (nodes, segments).
-Segments = tuple[Floats, Floats, Floats]
+# A ridge is a kink where w = W + B x^2 has W below this share of B; w is nearly 1 only where c is nearly 0.
+SHARP, SINGULAR = 0.25, 1e-6
+NEWTON_STEPS = 4
+
+# A singularity nearer to an interval than this share of its width needs the interval in two halves.
+NEAR = 0.5
+
+# Integrals and their estimated errors (2, pieces), and the place of the ridge, in [-1, 1] (pieces).
+Integrals = tuple[Floats, Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Parts of intervals of rays, each with a map from v in [start, stop] of [0, 1] to the radius.
+
+    A whole interval has r = inner + (outer - inner) (1 - cos pi v)/2, which makes inverse square roots at its ends
+    smooth. Where a further singularity lies just beyond an end, at a distance e, the interval is in two halves, each
+    with r = end -+ e sinh(k v)^2: the product of inverse square roots in the distances to both is constant in v.
+
+    Parameters
+    ----------
+    ray : ndarray of int, shape (n,)
+    origin, span : ndarray
+        End of the interval and (signed) extent of the part's map from there.
+    steep : ndarray
+        k above; 0 for the cosine's map.
+    start, stop : ndarray
+        Range of v.
+    """
+
+    ray: Ints
+    origin: Floats
+    span: Floats
+    steep: Floats
+    start: Floats
+    stop: Floats
+
+    def pick(self, index: NDArray[np.bool_] | Ints | slice) -> Pieces:
+        """Pieces by index."""
+        return Pieces(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
+
+    def split(self, at: Floats) -> Pieces:
+        """Every piece as two, split at the values `at` of v; all first parts come first."""
+        twice = self.pick(np.tile(np.arange(len(at)), 2))
+        return replace(twice, start=np.concatenate([self.start, at]), stop=np.concatenate([at, self.stop]))
+
+    def radius(self, v: Floats) -> tuple[Floats, Floats]:
+        """Radius at `v` and its slope, without cancellation near the ends; `v` has a leading axis of nodes."""
+        bent = np.flatnonzero(self.steep)
+        near, slope = cosine(np.minimum(v, 1 - v))
+        share = np.where(v < 0.5, near, 0.0)
+        # From the far end of a whole interval, from the origin else.
+        radius = np.where(v < 0.5, self.origin + self.span * share, self.origin + self.span - self.span * near)
+        slope = slope * np.abs(self.span)
+        if bent.size:
+            k = self.steep[bent]
+            rise, scale = np.sinh(k * v[:, bent]), 1 / np.sinh(k) ** 2
+            radius[:, bent] = self.origin[bent] + self.span[bent] * scale * rise * rise
+            slope[:, bent] = np.abs(self.span[bent]) * 2 * k * scale * rise * np.sqrt(1 + rise * rise)
+        return radius, slope
+
+    @property
+    def limits(self) -> tuple[Floats, Floats]:
+        """Least and largest radius of the maps."""
+        return np.minimum(self.origin, self.origin + self.span), np.maximum(self.origin, self.origin + self.span)
+
+
+def pieces(intervals: Intervals, reach: Floats, singular: NDArray[np.bool_]) -> Pieces:
+    """The intervals of rays, in halves where a further singularity (of the margins `singular`) is near an end."""
+    below, above = clearances(intervals, reach, singular)
+    inner, outer = intervals.inner, intervals.outer
+    width = outer - inner
+    # Where intervals are as thin as rounding, nothing is gained.
+    halved = (np.minimum(below, above) < NEAR * width) & (width > 1e3 * NEAREST * outer)
+    whole, half = np.flatnonzero(~halved), np.flatnonzero(halved)
+    length = 0.5 * width[half]
+    steep = [np.arcsinh(np.sqrt(length / np.minimum(gap[half], 1e3 * length))) for gap in (below, above)]
+    count = len(whole) + 2 * len(half)
+    return Pieces(
+        np.concatenate([intervals.ray[whole], intervals.ray[half], intervals.ray[half]]),
+        np.concatenate([inner[whole], inner[half], outer[half]]),
+        np.concatenate([width[whole], length, -length]),
+        np.concatenate([np.zeros(len(whole)), *steep]),
+        np.zeros(count),
+        np.ones(count),
+    )
 
 
 def along(
-    designs: Designs, design: Ints, theta: Floats, intervals: Intervals, pilot: Segments, allowed: Floats
+    designs: Designs, design: Ints, theta: Floats, parts: Pieces, pilot: Integrals, allowed: Floats
 ) -> tuple[Floats, Floats]:
     """Integrals of the indices along rays and their estimated errors, both of shape (2, rays).
 
     Parameters
     ----------
     design, theta : ndarray, shape (rays,)
-    pilot : Segments
-        The whole intervals, as evaluated by `segments`.
+    pilot : Integrals
+        Of `parts`, as evaluated by `evaluate`.
     allowed : ndarray, shape (2, rays)
-        Error that a segment may have; those with a larger one are split, at the ridge of the inverse condition where
-        this is what errs, else in the middle.
+        Error that a piece may have; those with a larger one are split, at the ridge of the inverse condition where this
+        is what errs, else in the middle.
     """
     value, error = np.zeros((2, len(theta))), np.zeros((2, len(theta)))
-    ray, inner, outer = intervals.ray, intervals.inner, intervals.outer
-    start, stop = np.zeros(len(ray)), np.ones(len(ray))
-    found, doubt, smooth = pilot
+    found, doubt, ridge = pilot
+    low, high = parts.limits
     with np.errstate(divide="ignore", invalid="ignore"):
         # What an inverse square root has within `NEAREST` of the boundary.
-        noise = np.sqrt(NEAREST * outer / (outer - inner)) * np.abs(found)
+        noise = np.sqrt(NEAREST * high / (high - low)) * np.abs(found)
     for splits in range(MOST_SPLITS + 1):
+        ray = parts.ray
         rough = doubt > np.maximum(allowed[:, ray], noise)
         split = rough.any(axis=0) & (splits < MOST_SPLITS)
         for k in range(2):
@@ -50,117 +138,112 @@ def along(
             error[k] += np.bincount(ray[~split], doubt[k, ~split], len(theta))
         if not split.any():
             break
-        ray, inner, outer, start, stop = (v[split] for v in (ray, inner, outer, start, stop))
-        share = np.where(rough[0, split], _ridge(smooth[:, split]), 0.0)
-        at = _refined(designs, design[ray], theta[ray], inner, outer, start, stop, share)
-        ray, inner, outer, noise = (np.concatenate([v, v], axis=-1) for v in (ray, inner, outer, noise[:, split]))
-        start, stop = np.concatenate([start, at]), np.concatenate([at, stop])
-        found, doubt, smooth = segments(designs, design[ray], theta[ray], inner, outer, start, stop)
+        share = np.where(rough[0] & (np.abs(ridge) < INSIDE), ridge, 0.0)[split]
+        parts = parts.pick(split)
+        parts = parts.split(_refined(designs, design[parts.ray], theta[parts.ray], parts, share))
+        noise = np.concatenate([noise[:, split]] * 2, axis=1)
+        found, doubt, ridge = evaluate(designs, design[parts.ray], theta[parts.ray], parts)
     return value, error
 
 
-def _refined(
-    designs: Designs,
-    design: Ints,
-    theta: Floats,
-    inner: Floats,
-    outer: Floats,
-    start: Floats,
-    stop: Floats,
-    share: Floats,
-) -> Floats:
-    """Where to split: the ridges near `share` (of [-1, 1]) of segments by a parabola; the middle where that is 0."""
-    at = 0.5 * (start + stop) + 0.5 * (stop - start) * share
+def _refined(designs: Designs, design: Ints, theta: Floats, parts: Pieces, share: Floats) -> Floats:
+    """Where to split: the ridges near `share` (of [-1, 1]) of pieces by a parabola; the middle where that is 0."""
+    at = 0.5 * (parts.start + parts.stop) + 0.5 * (parts.stop - parts.start) * share
     ridges = np.flatnonzero(share)
     if not ridges.size:
         return at
-    step = FIT * (stop - start)[ridges]
+    step = FIT * (parts.stop - parts.start)[ridges]
     around = at[ridges] + step * np.array([-1.0, 0.0, 1.0])[:, None]
-    z = designs.about + spread(inner[ridges], outer[ridges], around, cosine)[0] * np.exp(1j * theta[ridges])
-    low, middle, high = _isotropy(designs.field.indices(z, designs.of(design[ridges]))[0])
+    z = designs.about + parts.pick(ridges).radius(around)[0] * np.exp(1j * theta[ridges])
+    condition = designs.field.indices(z, designs.of(design[ridges]))[0]
+    low, middle, high = ((1 - condition) / (1 + condition)) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         shift = 0.5 * (low - high) / (low + high - 2 * middle)
     at[ridges] += step * np.where(np.abs(shift) < 1, shift, 0.0)
     return at
 
 
-def segments(
-    designs: Designs, design: Ints, theta: Floats, inner: Floats, outer: Floats, start: Floats, stop: Floats
-) -> Segments:
-    """Integrals of index times radius over parts of intervals and their errors (2, segments), and what shows ridges."""
+def evaluate(designs: Designs, design: Ints, theta: Floats, parts: Pieces) -> Integrals:
+    """Integrals of index times radius over pieces, their errors (2, pieces), and where to split."""
     found, doubt = np.empty((2, len(theta))), np.empty((2, len(theta)))
-    smooth = np.empty((len(RADII.nodes), len(theta)))
+    ridges = np.empty(len(theta))
     for k in range(0, len(theta), BLOCK):
         at = slice(k, k + BLOCK)
-        middle, half = 0.5 * (start[at] + stop[at]), 0.5 * (stop[at] - start[at])
-        r, density = spread(inner[at], outer[at], middle + half * RADII.nodes[:, None], cosine)
+        part = parts.pick(at)
+        middle, half = 0.5 * (part.start + part.stop), 0.5 * (part.stop - part.start)
+        r, slope = part.radius(middle + half * RADII.nodes[:, None])
+        low, high = part.limits
         # In an interval so narrow, rounding leaves nothing of the closures: it only exists at a cusp.
-        measure = np.where(outer[at] - inner[at] > 100 * NEAREST * outer[at], r * density * half, 0.0)
-        gap = np.minimum(NEAREST * outer[at], 0.5 * (outer[at] - inner[at]))
-        r = np.clip(r, inner[at] + gap, outer[at] - gap)
-        z = designs.about + r * np.exp(1j * theta[at])
+        measure = np.where(high - low > 100 * NEAREST * high, r * slope * half, 0.0)
+        gap = np.minimum(NEAREST * high, 0.5 * (high - low))
+        z = designs.about + np.clip(r, low + gap, high - gap) * np.exp(1j * theta[at])
         condition, resistivity, _ = designs.field.indices(z, designs.of(design[at]))
-        for index, values in enumerate((condition, resistivity)):
-            # On the boundary itself, where rounding leaves an interval of no width, an index has no value.
-            product = np.where(np.isfinite(values), values, 0.0) * measure
-            found[index, at], doubt[index, at] = RADII.apply(product)
-        smooth[:, at] = _isotropy(condition)
-        doubt[0, at] += _hidden(smooth[:, at], measure)
-    return found, doubt, smooth
+        # On the boundary itself, where rounding leaves an interval of no width, an index has no value.
+        condition = np.where(np.isfinite(condition), condition, 0.0)
+        resistivity = np.where(np.isfinite(resistivity), resistivity, 0.0)
+        found[1, at], doubt[1, at] = RADII.apply(resistivity * measure)
+        found[0, at], doubt[0, at], ridges[at] = _with_ridge(condition, measure)
+    return found, doubt, ridges
 
 
-def _ridge(smooth: Floats) -> Floats:
-    """Where the inverse condition c is largest along segments, within (-1, 1) of each; the middle if at an end.
+def _with_ridge(condition: Floats, measure: Floats) -> tuple[Floats, Floats, Floats]:
+    """Integrals of inverse condition c times `measure` over segments, their errors, and the place of the ridge of c.
 
-    At isotropy c has a kink (the singular values cross), but ((1 - c)/(1 + c))^2, of which `smooth` holds the values at
-    the nodes, has none: the least value of its polynomial is found by Newton's method, begun at the lowest node. A kink
-    that the split misses by a little would hide between a segment's end and its last node, where no rule can see it.
+    At isotropy c has a kink (the singular values cross), but w = ((1 - c)/(1 + c))^2 has none, and
+
+        c = (1 + w)/(1 - w) - sqrt(w) 2/(1 - w)
+
+    so with w about W + B x^2 + C x^3 at the place x = 0 where it is least, and q = 2 measure/(1 - w), all of the kink
+    but its third order is in g = (q + (q' + q C/2B) x) sqrt(W + B x^2). What the rule integrates is c measure + g; the
+    integral of g is closed and taken off again, so that g need not be exact.
     """
-    degrees = len(RADII.nodes)
-    spectrum = RADII.spectrum @ smooth
-    x = RADII.nodes[np.clip(smooth.argmin(axis=0), 1, degrees - 2)]
-    span = 0.5 * (RADII.nodes[2:] - RADII.nodes[:-2]).max()
-    begun = x
+    w = ((1 - condition) / (1 + condition)) ** 2
+    weight = 2 * measure / np.maximum(1 - w, SINGULAR)
+    spectrum = RADII.spectrum @ w
+    ridge = _least(w, spectrum)
+    value, _, bend, third = _series(spectrum, ridge)
+    q, q_slope, _, _ = _series(RADII.spectrum @ weight, ridge)
+    b = 0.5 * bend
+    sharp = (b > 0) & (value < SHARP * b)
+    b, floor = np.where(sharp, b, 1.0), np.maximum(value, 1e-24)
+    a0 = np.where(sharp, q, 0.0)
+    a1 = np.where(sharp, q_slope + q * third / (12 * b), 0.0)
+    x = RADII.nodes[:, None] - ridge
+    total, doubt = RADII.apply(condition * measure + (a0 + a1 * x) * np.sqrt(floor + b * x * x))
+    root = np.sqrt(b)
+    for sign, end in ((-1, 1 - ridge), (1, -1 - ridge)):
+        height = np.sqrt(floor + b * end * end)
+        area = 0.5 * (end * height + floor / root * np.arcsinh(end * root / np.sqrt(floor)))
+        total = total + sign * (a0 * area + a1 * height**3 / (3 * b))
+    # What W is not known to is the height of a tip that may lie between two nodes, unseen.
+    last, decay = RADII.tail(spectrum)
+    unseen = 4 * np.abs(a0) * last * decay / root
+    return total, doubt + unseen, ridge
+
+
+def _least(w: Floats, spectrum: Floats) -> Floats:
+    """Where the polynomials through `w` at the nodes are least, by Newton's method from the lowest node."""
+    x = RADII.nodes[w.argmin(axis=0)]
+    begun, span = x, 0.6 * np.diff(RADII.nodes).max()
     with np.errstate(divide="ignore", invalid="ignore"):
-        for _ in range(6):
-            slope, bend = _derivatives(spectrum, x)
+        for _ in range(NEWTON_STEPS):
+            _, slope, bend, _ = _series(spectrum, x)
             x = np.clip(x - slope / np.abs(bend), begun - span, begun + span)
-    return np.where(np.abs(x) < 0.9, x, 0.0)
+    return np.asarray(np.where(np.isfinite(x), x, begun))
 
 
-def _hidden(smooth: Floats, measure: Floats) -> Floats:
-    """What a ridge of the inverse condition at either end of segments may hide from the rule.
+def _series(spectrum: Floats, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Values and three derivatives at `x` of Legendre series, one a column.
 
-    With w = ((1 - c)/(1 + c))^2 about W + B x^2 near the ridge, c is about 1 - 2 sqrt(w), a hyperbola whose rounded tip
-    (of width sqrt(W/B)), and whose part beyond a tip that the split missed, lie between the end and the nearest node.
+    By P'(k+1) = P'(k-1) + (2k + 1) P(k), differentiated as often as needed.
     """
-    total = np.zeros(smooth.shape[1])
-    values = _ENDS @ smooth
-    for end, (w, slope, curve) in enumerate((values[:3], values[3:])):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            bend = np.maximum(0.5 * curve, 0.0)
-            tip = (np.abs(w) + 0.25 * slope * slope / bend) / np.sqrt(bend)
-            unseen = (w < 0.02 * bend) & np.isfinite(tip)
-        total += 4 * np.where(unseen, tip, 0.0) * measure[-end]
-    return total
-
-
-def _isotropy(condition: Floats) -> Floats:
-    distance = (1 - condition) / (1 + condition)
-    return np.where(np.isfinite(distance), distance * distance, 1.0)
-
-
-def _derivatives(spectrum: Floats, x: Floats) -> tuple[Floats, Floats]:
-    """First and second derivatives at `x` of Legendre series, one a column."""
-    before, now = np.ones_like(x), x
-    slope_before, slope_now = np.zeros_like(x), np.ones_like(x)
-    bend_before, bend_now = np.zeros_like(x), np.zeros_like(x)
-    slope, bend = spectrum[1].copy(), np.zeros_like(x)
+    before = [np.ones_like(x), *(np.zeros_like(x) for _ in range(3))]
+    now = [x, np.ones_like(x), np.zeros_like(x), np.zeros_like(x)]
+    sums = [spectrum[0] + spectrum[1] * x, spectrum[1].copy(), np.zeros_like(x), np.zeros_like(x)]
     for k in range(1, len(spectrum) - 1):
-        # P'(k+1) = P'(k-1) + (2k + 1) P(k), and the same once more.
-        before, now = now, ((2 * k + 1) * x * now - k * before) / (k + 1)
-        bend_before, bend_now = bend_now, bend_before + (2 * k + 1) * slope_now
-        slope_before, slope_now = slope_now, slope_before + (2 * k + 1) * before
-        slope += spectrum[k + 1] * slope_now
-        bend += spectrum[k + 1] * bend_now
-    return slope, bend
+        after = [((2 * k + 1) * x * now[0] - k * before[0]) / (k + 1)]
+        after += [before[j] + (2 * k + 1) * now[j - 1] for j in (1, 2, 3)]
+        for total, term in zip(sums, after, strict=True):
+            total += spectrum[k + 1] * term
+        before, now = now, after
+    return sums[0], sums[1], sums[2], sums[3]

@@ -268,3 +268,20 @@ def _first_named(owner: Ints, at: Floats, label: Ints, margin: Ints, ray: Ints, 
         match[match] = np.abs(radius[at_k[match]] - at[match]) <= tie[owner[match]]
         best[match] = np.minimum(best[match], margin[at_k[match]])
     return best
+
+
+def clearances(intervals: Intervals, reach: Floats, among: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Distance from each interval's ends to the next root of a margin `among` some, below and above; inf where none."""
+    rays, radii, margins, _ = intervals.crossings
+    use = among[margins]
+    rays, radii = rays[use], radii[use]
+    begin, end = np.searchsorted(rays, intervals.ray), np.searchsorted(rays, intervals.ray, side="right")
+    below, above = np.full(len(begin), np.inf), np.full(len(begin), np.inf)
+    tie = SAME * reach[intervals.ray]
+    for k in range(int(np.max(end - begin, initial=0))):
+        at = radii[np.minimum(begin + k, len(radii) - 1)]
+        here = begin + k < end
+        under, over = intervals.inner - at, at - intervals.outer
+        below = np.where(here & (under > tie), np.minimum(below, under), below)
+        above = np.where(here & (over > tie), np.minimum(above, over), above)
+    return below, above
