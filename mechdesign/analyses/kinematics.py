@@ -18,6 +18,7 @@ from mechdesign.analyses.poses import (
     expand_outputs,
     in_study_units,
     judge_failures,
+    pose_columns,
     pose_in_words,
     radians,
     solve_poses,
@@ -78,7 +79,11 @@ class _Motion:
                 # As the study gives it, not there and back through radians; also where the pose fails.
                 self.put(f"drive {name}", rows, self.poses.values[name][rows])
         for output in self.outputs:
-            self.put(output.name, rows, in_study_units(study, output, configuration.value(output)))
+            value = in_study_units(study, output, configuration.value(output))
+            if output.name in solved.given:
+                # A pose that fails still says where it was asked for.
+                value = np.where(lost, self.poses.values[output.name][rows], value)
+            self.put(output.name, rows, value)
         if self.section.rates or self.section.accelerations:
             self._rates(linear, rows)
         self.put("regularity", rows, regularity(linear))
@@ -238,6 +243,8 @@ def _columns(motion: _Motion, outputs: list[Coordinate]) -> list[Column]:
     columns: list[Column] = []
     for name in mechanism.drives:
         columns.append(Column(name, arrays[f"drive {name}"], units.label(mechanism.quantity(name)), "drive"))
+    shown = {*mechanism.drives, *(output.name for output in outputs)}
+    columns += [column for column in pose_columns(study, motion.poses) if column.name not in shown]
     rates = {"length": ("velocity", "acceleration"), "angle": ("angular_velocity", "angular_acceleration")}
     for output in outputs:
         if output.name not in mechanism.drives:

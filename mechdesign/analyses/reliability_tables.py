@@ -91,13 +91,14 @@ def moments(answer: Answer) -> Table:
     shape = (count, methods, channels)
     mean, sigma, worst = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
     nominal = np.broadcast_to(answer.nominal.T[:, None, :], shape)
+    if answer.linear is not None:
+        worst[:] = (answer.linear.worst_case(answer.linear.sensitivity()).T * answer.scale)[:, None]
     for m, method in enumerate(answer.methods):
         if method == "analytic" and answer.linear is not None:
             linear = answer.linear
             variance = np.einsum("czp,z->cp", linear.components**2, linear.variance)
             mean[:, m] = np.where(np.isfinite(variance.T), answer.nominal.T, np.nan)
             sigma[:, m] = np.sqrt(variance).T * answer.scale
-            worst[:, m] = linear.worst_case(linear.sensitivity()).T * answer.scale
         elif method == "monte_carlo":
             for row, sums in enumerate(answer.sums):
                 if sums is not None and sums.valid:

@@ -152,3 +152,12 @@ def test_a_listed_pose_that_fails_is_named_after_the_others_are_solved() -> None
     assert list(result.tables["motion"]["valid"]) == [True, False]
     with pytest.raises(AssemblyError, match="no pose is valid"):
         kinematics(study_of(ARM, "kinematics.poses=[{P.x: 30, P.y: 12}]"))
+
+
+def test_the_pose_that_was_asked_for_stands_in_its_row() -> None:
+    study = study_of(
+        ARM, "kinematics.poses=[{P.x: 30, P.y: 12}, {P.x: 3, P.y: 12}]", "kinematics.outputs=[forearm.angle]"
+    )
+    table = kinematics(study).tables["motion"]
+    assert table["P.x"].tolist() == [30, 3]
+    assert np.isnan(table["forearm.angle"][0])
