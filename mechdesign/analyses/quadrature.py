@@ -4,7 +4,7 @@ In polar coordinates about the scan's centre, with each panel's angle and each i
 
     theta = low + (high - low) q(u),   r = inner + (outer - inner) (1 - cos pi t)/2,   0 <= u, t <= 1
 
-where q has fourfold points at 0 and 1: inverse square roots at the boundary (resistivity where a leg is stretched or
+where q has threefold points at 0 and 1: inverse square roots at the boundary (resistivity where a leg is stretched or
 folded) become smooth in t, and cusps, tangent rays and the logarithms that two such boundaries leave in their corner
 nearly so in u. The rule is Gauss-Legendre in u and in t. Kinks inside (isotropic points and curves) are met by
 splitting the intervals of rays and the panels.
@@ -21,9 +21,9 @@ import numpy as np
 from mechdesign.analyses.panels import Panels
 from mechdesign.analyses.radial import BLOCK, RADII, along, evaluate, pieces
 from mechdesign.analyses.rays import Designs, Floats, Ints, trace
-from mechdesign.analyses.rules import Rule, quartic, spread
+from mechdesign.analyses.rules import Rule, cubic, spread
 
-ANGLES = Rule.of(22, 4, 6.0)
+ANGLES = Rule.of(20, 4, 6.0)
 MOST_PASSES = 24
 # Cells are not halved more often than this.
 MOST_HALVINGS = 12
@@ -148,7 +148,7 @@ def _evaluate(
     """Values and errors (4, cells) of new cells, the error allowed along rays (2, designs), boundary points met."""
     nodes, count = len(ANGLES.nodes), len(cells.low)
     middle, half = 0.5 * (cells.start + cells.stop), 0.5 * (cells.stop - cells.start)
-    place, density = spread(cells.low, cells.high, middle + half * ANGLES.nodes[:, None], quartic)
+    place, density = spread(cells.low, cells.high, middle + half * ANGLES.nodes[:, None], cubic)
     theta, weight = place.ravel(), (half * density).ravel()
     design, counted = np.tile(cells.design, nodes), np.tile(cells.counted, nodes)
     intervals = trace(designs, design, theta, reach[design], samples)

@@ -23,7 +23,9 @@ INSIDE = 0.9
 
 # A ridge is a kink where w = W + B x^2 has W below this share of B; w is nearly 1 only where c is nearly 0.
 SHARP, SINGULAR = 0.25, 1e-6
-NEWTON_STEPS = 4
+# Pieces with w above this everywhere have no ridge that would matter (c below 0.39).
+FLAT = 0.2
+NEWTON_STEPS = 3
 
 # A singularity nearer to an interval than this share of its width needs the interval in two halves.
 NEAR = 0.5
@@ -198,11 +200,22 @@ def _with_ridge(condition: Floats, measure: Floats) -> tuple[Floats, Floats, Flo
     integral of g is closed and taken off again, so that g need not be exact.
     """
     w = ((1 - condition) / (1 + condition)) ** 2
+    kinked = np.flatnonzero(w.min(axis=0) < FLAT)
+    total, doubt = np.empty(w.shape[1]), np.empty(w.shape[1])
+    ridge = np.zeros(w.shape[1])
+    smooth = np.flatnonzero(w.min(axis=0) >= FLAT)
+    total[smooth], doubt[smooth] = RADII.apply((condition * measure)[:, smooth])
+    total[kinked], doubt[kinked], ridge[kinked] = _kinked(w[:, kinked], condition[:, kinked], measure[:, kinked])
+    return total, doubt, ridge
+
+
+def _kinked(w: Floats, condition: Floats, measure: Floats) -> tuple[Floats, Floats, Floats]:
+    """As `_with_ridge`, for segments whose w comes near zero."""
     weight = 2 * measure / np.maximum(1 - w, SINGULAR)
     spectrum = RADII.spectrum @ w
     ridge = _least(w, spectrum)
-    value, _, bend, third = _series(spectrum, ridge)
-    q, q_slope, _, _ = _series(RADII.spectrum @ weight, ridge)
+    value, _, bend, third = _series(spectrum, ridge, 3)
+    q, q_slope = _series(RADII.spectrum @ weight, ridge, 1)
     b = 0.5 * bend
     sharp = (b > 0) & (value < SHARP * b)
     b, floor = np.where(sharp, b, 1.0), np.maximum(value, 1e-24)
@@ -227,23 +240,23 @@ def _least(w: Floats, spectrum: Floats) -> Floats:
     begun, span = x, 0.6 * np.diff(RADII.nodes).max()
     with np.errstate(divide="ignore", invalid="ignore"):
         for _ in range(NEWTON_STEPS):
-            _, slope, bend, _ = _series(spectrum, x)
+            _, slope, bend = _series(spectrum, x, 2)
             x = np.clip(x - slope / np.abs(bend), begun - span, begun + span)
     return np.asarray(np.where(np.isfinite(x), x, begun))
 
 
-def _series(spectrum: Floats, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Values and three derivatives at `x` of Legendre series, one a column.
+def _series(spectrum: Floats, x: Floats, orders: int) -> list[Floats]:
+    """Values and derivatives at `x` of Legendre series, one a column, up to the order asked for.
 
     By P'(k+1) = P'(k-1) + (2k + 1) P(k), differentiated as often as needed.
     """
-    before = [np.ones_like(x), *(np.zeros_like(x) for _ in range(3))]
-    now = [x, np.ones_like(x), np.zeros_like(x), np.zeros_like(x)]
-    sums = [spectrum[0] + spectrum[1] * x, spectrum[1].copy(), np.zeros_like(x), np.zeros_like(x)]
+    zeros = [np.zeros_like(x) for _ in range(orders - 1)]
+    before, now = [np.ones_like(x), np.zeros_like(x), *zeros], [x, np.ones_like(x), *zeros]
+    sums = [spectrum[0] + spectrum[1] * x, spectrum[1].copy(), *(zero.copy() for zero in zeros)]
     for k in range(1, len(spectrum) - 1):
-        after = [((2 * k + 1) * x * now[0] - k * before[0]) / (k + 1)]
-        after += [before[j] + (2 * k + 1) * now[j - 1] for j in (1, 2, 3)]
+        after = [((2 * k + 1) / (k + 1)) * (x * now[0]) - (k / (k + 1)) * before[0]]
+        after += [before[j] + (2 * k + 1) * now[j - 1] for j in range(1, orders + 1)]
         for total, term in zip(sums, after, strict=True):
             total += spectrum[k + 1] * term
         before, now = now, after
-    return sums[0], sums[1], sums[2], sums[3]
+    return sums

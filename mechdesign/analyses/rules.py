@@ -47,7 +47,7 @@ class Rule:
     def tail(self, spectrum: Floats) -> tuple[Floats, Floats]:
         """Size of the last group of Legendre coefficients, and the slowest decay from group to group before it."""
         size = np.abs(spectrum[-(len(self.nodes) // self.window) * self.window :])
-        groups = size.reshape(-1, self.window, spectrum.shape[1]).max(axis=1)[-4:]
+        groups = size.reshape(len(size) // self.window, self.window, spectrum.shape[1]).max(axis=1)[-4:]
         with np.errstate(divide="ignore", invalid="ignore"):
             decay = np.minimum((groups[1:] / groups[:-1]).max(axis=0), 1.0)
         return groups[-1], np.where(np.isfinite(decay), decay, 1.0)
@@ -58,10 +58,10 @@ def cosine(v: Floats) -> tuple[Floats, Floats]:
     return np.sin(0.5 * np.pi * v) ** 2, 0.5 * np.pi * np.sin(np.pi * v)
 
 
-def quartic(v: Floats) -> tuple[Floats, Floats]:
-    """Map of [0, 1] onto itself with a fourfold point at either end, and its slope."""
+def cubic(v: Floats) -> tuple[Floats, Floats]:
+    """Map of [0, 1] onto itself with a threefold point at either end, and its slope."""
     w = v * (1 - v)
-    return v**4 * (35 + v * (-84 + v * (70 - 20 * v))), 140 * w**3
+    return v**3 * (10 + v * (6 * v - 15)), 30 * w * w
 
 
 def spread(low: Floats, high: Floats, v: Floats, bend: Map) -> tuple[Floats, Floats]:
