@@ -19,7 +19,7 @@ from mechdesign.study import Study
 from mechdesign.study.sections import WorkspaceSection
 
 # One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
-CLOSE, BRISK = Effort(128, 48), Effort(16, 8)
+CLOSE, BRISK = Effort(128, 48), Effort(16, 6)
 SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
 RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
 # The area that the rules of comparison divide is integrated to this relative tolerance.
