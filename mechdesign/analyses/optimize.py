@@ -20,7 +20,7 @@ from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
 # Designs evaluated together: enough that arrays are long, few enough that chunks are shared evenly by the threads.
-CHUNK = 256
+CHUNK = 512
 
 
 @dataclass(frozen=True, eq=False)
