@@ -28,14 +28,14 @@ def homogeneous(jacobian: Array, rows: Sequence[Coordinate], columns: Sequence[C
     """
     up = np.array([length if c.quantity == "angle" else 1.0 for c in rows])
     down = np.array([length if c.quantity == "angle" else 1.0 for c in columns])
-    return jacobian * up[:, None] / down
+    return np.asarray(jacobian * up[:, None] / down)
 
 
 def determinant(jacobian: Array) -> Array:
     """Determinant; nan where an entry is."""
     if jacobian.shape[-1] == 2:
-        return jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
-    finite = np.isfinite(jacobian).all(axis=(-1, -2))
+        return np.asarray(jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0])
+    finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))
     safe = np.where(finite[..., None, None], jacobian, 0.0)
     return np.where(finite, np.linalg.det(safe), np.nan)
 
@@ -50,8 +50,8 @@ def inverse_condition(jacobian: Array) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
             twice = squares / np.abs(determinant(jacobian))
             # (s - 2)(s + 2) rather than s^2 - 4 keeps the digits near isotropy.
-            return 2 / (twice + np.sqrt(np.maximum(twice - 2, 0.0) * (twice + 2)))
-    finite = np.isfinite(jacobian).all(axis=(-1, -2))
+            return np.asarray(2 / (twice + np.sqrt(np.maximum(twice - 2, 0.0) * (twice + 2))))
+    finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))
     safe = np.where(finite[..., None, None], jacobian, 0.0)
     values = np.linalg.svd(safe, compute_uv=False)
     with np.errstate(divide="ignore", invalid="ignore"):

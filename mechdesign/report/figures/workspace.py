@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from mechdesign.study import Study
 
 Floats = NDArray[np.float64]
-# Contours of an index that grows without bound stop at this percentile of the nodes away from the boundary.
-CLIP = 80.0
+# Contours of an index that grows without bound stop at this multiple of its mean over the region.
+CLIP = 3.0
 # Poses of the mechanism along each curve of the boundary.
 POSES = {"inner": 1, "outer": 2}
 SIDES = {"inner": (style.BLUE, "-"), "outer": (style.VERMILION, "-")}
@@ -37,9 +37,10 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
     local, boundary = _first(study, result, "local"), _first(study, result, "boundary")
     if not len(local):
         return {}
+    mean = float(result.tables["indices"]["GRI"][0])
     found = {
-        "inverse_condition": _map(study, local, boundary, "inverse_condition", "inverse condition number"),
-        "resistivity": _map(study, local, boundary, "resistivity", "resistivity 1/|det J|"),
+        "inverse_condition": _map(study, local, boundary, "inverse_condition", "inverse condition number", None),
+        "resistivity": _map(study, local, boundary, "resistivity", "resistivity 1/|det J|", CLIP * mean),
         "workspace": _workspace(study, result, boundary),
     }
     if len(boundary):
@@ -84,12 +85,10 @@ def _height(table: Table, width: float, *, extra: float = 0.9) -> float:
     return float(np.clip(width * tall / max(wide, 1e-12) + extra, 2.8, 8.5))
 
 
-def _map(study: Study, local: Table, boundary: Table, column: str, name: str) -> Figure:
+def _map(study: Study, local: Table, boundary: Table, column: str, name: str, ceiling: float | None) -> Figure:
     values = local[column]
-    clipped = column != "inverse_condition"
-    last = local["node"].max()
-    inside = (local["node"] > last // 4) & (local["node"] < last - last // 4) & np.isfinite(values)
-    top = float(np.percentile(values[inside], CLIP)) if clipped else float(np.nanmax(values))
+    clipped = ceiling is not None
+    top = float(np.nanmax(values)) if ceiling is None else min(ceiling, float(np.nanmax(values)))
     levels = MaxNLocator(nbins=12, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, top)
     figure = style.new_figure(style.WIDTH, _height(local, 5.6))
     axes = figure.add_subplot()
