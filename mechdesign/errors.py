@@ -58,12 +58,6 @@ class AssemblyError(MechdesignError):
     exit_code = 3
 
 
-class NumericalError(MechdesignError):
-    """A computation failed to reach a trustworthy result."""
-
-    exit_code = 4
-
-
 class OutputError(MechdesignError):
     """Results could not be written."""
 

@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from mechdesign.errors import AssemblyError, NumericalError
+from mechdesign.errors import AssemblyError, MechdesignError
 
 from .conftest import SLIDER, answer
 
@@ -118,7 +118,7 @@ def test_a_listed_pose_that_fails_is_told_after_the_files_are_written(folder, an
 
 @pytest.mark.parametrize(
     ("error", "code"),
-    [(AssemblyError("no feasible design"), 3), (NumericalError("no convergence"), 4), (KeyboardInterrupt(), 130)],
+    [(AssemblyError("no feasible design"), 3), (MechdesignError("no convergence"), 4), (KeyboardInterrupt(), 130)],
 )
 def test_what_an_analysis_raises_becomes_a_line_and_an_exit_code(folder, analysis, invoke, error, code):
     def fail(study, **options):
