@@ -42,7 +42,8 @@ def vector(x: Value, y: Value) -> Value:
     """Complex number x + i y without the temporaries of ``x + 1j * y``."""
     shape = np.broadcast_shapes(np.shape(x), np.shape(y))
     if not shape:
-        return complex(x, y)
+        # A NumPy scalar, not Python's: it divides by zero without raising.
+        return np.complex128(complex(x, y))
     z = np.empty(shape, dtype=complex)
     z.real = x
     z.imag = y

@@ -210,3 +210,11 @@ mechanism:
         arm.plan(("a",))
     with pytest.raises(MechanismError, match=r"did you mean 'P\.y'"):
         arm.plan(("P.c", "P.y"))
+
+
+def test_outer_joints_that_coincide_are_no_division_by_zero() -> None:
+    # At 0 deg the crank's pin lies on the other pivot: rod and rocker, of unequal lengths, cannot meet there.
+    mechanism = study_of(FOUR_BAR.replace("crank: [O, A, 1]", "crank: [O, A, 4]")).mechanism
+    with pytest.raises(AssemblyError, match="cannot be assembled"):
+        mechanism.solve({"crank": 0})
+    assert list(mechanism.solve({"crank": [0.0, 60.0]}).valid) == [False, True]
