@@ -19,8 +19,8 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
-# Designs evaluated together: enough that arrays are long, few enough that chunks are shared evenly by the threads.
-CHUNK = 512
+# Designs evaluated together: enough that arrays are long, few enough that the workers end together.
+CHUNK = 384
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from mechdesign.analyses.rules import Rule, cosine
 
 RADII = Rule.of(11, 2, 0.5)
 # Pieces evaluated at once (11 nodes each).
-BLOCK = 2048
+BLOCK = 4096
 MOST_SPLITS = 12
 # Nearer to the boundary than this fraction of the radius, rounding spoils an index that is infinite there.
 NEAREST = 3e-14
