@@ -49,7 +49,9 @@ def _curves(study: Study, result: Result) -> Figure | None:
     # Margins by hand: a layout engine would draw everything twice.
     height = 0.7 + 1.75 * len(keys)
     figure = style.new_figure(style.WIDTH, height, layout=None)
-    margins = {"left": 0.11, "right": 0.83, "bottom": 0.5 / height, "top": 1 - 0.15 / height, "hspace": 0.14}
+    longest = max(len(c.name.removesuffix(f"_{key[0]}")) for key in keys for c in panels[key][:MOST_CURVES])
+    right = 1 - (0.6 + 0.08 * longest) / style.WIDTH  # room for the legend, inches
+    margins = {"left": 0.11, "right": right, "bottom": 0.5 / height, "top": 1 - 0.15 / height, "hspace": 0.14}
     axes = figure.subplots(len(keys), 1, sharex=True, squeeze=False, gridspec_kw=margins)[:, 0]
     for axis, key in zip(axes, keys, strict=True):
         shown = panels[key][:MOST_CURVES]
