@@ -108,11 +108,7 @@ def _exact(inverse: Array, compliances: Sequence[Array]) -> Array:
     for block in compliances:
         rows = inverse[first : first + len(block)]
         first += len(block)
-        for i, j in np.ndindex(len(block), len(block)):
-            for a in range(size):
-                weighted = rows[i, a] * block[i, j]
-                for b in range(size):
-                    total[a, b] += weighted * rows[j, b]
+        _add_congruence(total, rows.swapaxes(0, 1), block)
     return np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
 
 
@@ -132,12 +128,19 @@ def _sum_of_legs(legs: Sequence[Array], compliances: Sequence[Array]) -> Array:
                 inverse = np.where(good, adjugate / determinant, np.nan)
         elif len(block):
             inverse = _inverse_of_three(block)
-        for i, j in np.ndindex(len(block), len(block)):
-            for a in range(size):
-                weighted = wrenches[a, i] * inverse[i, j]
-                for b in range(size):
-                    total[a, b] += weighted * wrenches[b, j]
+        if len(block):
+            _add_congruence(total, wrenches, inverse)
     return np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
+
+
+def _add_congruence(total: Array, outer: Array, inner: Array) -> None:
+    """Add outer inner outer^T to `total` in place; the last axis runs over poses."""
+    size = len(total)
+    for i, j in np.ndindex(len(inner), len(inner)):
+        for a in range(size):
+            weighted = outer[a, i] * inner[i, j]
+            for b in range(size):
+                total[a, b] += weighted * outer[b, j]
 
 
 def _inverse_of_three(block: Array) -> Array:

@@ -35,8 +35,7 @@ def local_indices(jacobian: Sequence[Sequence[Value]]) -> tuple[Value, Value, Va
         determinant = a * d - b * c
         size = np.abs(determinant)
         twice = (a * a + b * b + c * c + d * d) / size
-        # (s - 2)(s + 2) rather than s^2 - 4 keeps the digits near isotropy; rounding may leave s just below 2.
-        return 2 / (twice + np.sqrt(np.maximum(twice - 2, 0) * (twice + 2))), 1 / size, determinant
+        return jacobians.of_two(twice), 1 / size, determinant
     shape = np.broadcast_shapes(*(np.shape(entry) for row in jacobian for entry in row))
     matrix = np.stack([np.stack([np.broadcast_to(e, shape) for e in row], axis=-1) for row in jacobian], axis=-2)
     determinant = jacobians.determinant(matrix)

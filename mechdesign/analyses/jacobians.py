@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 
 Array = NDArray[np.float64]
@@ -40,17 +41,21 @@ def determinant(jacobian: Array) -> Array:
     return np.where(finite, np.linalg.det(safe), np.nan)
 
 
+def of_two(twice: Value) -> Value:
+    """Inverse condition c of a 2 x 2 matrix from c + 1/c = ||J||_F^2 / |det J| [S1, eq. 8]."""
+    # (s - 2)(s + 2) rather than s^2 - 4 keeps the digits near isotropy; rounding may leave s just below 2.
+    return 2 / (twice + np.sqrt(np.maximum(twice - 2, 0) * (twice + 2)))
+
+
 def inverse_condition(jacobian: Array) -> Array:
     """Smallest over largest singular value, 0 at a singularity; nan where an entry is.
 
-    For 2 x 2 without a decomposition: kappa + 1/kappa = ||J||_F^2 / |det J| [S1, eq. 8].
+    2 x 2 needs no decomposition, see `of_two`.
     """
     if jacobian.shape[-1] == 2:
         squares = np.einsum("...ij,...ij->...", jacobian, jacobian)
         with np.errstate(divide="ignore", invalid="ignore"):
-            twice = squares / np.abs(determinant(jacobian))
-            # (s - 2)(s + 2) rather than s^2 - 4 keeps the digits near isotropy.
-            return np.asarray(2 / (twice + np.sqrt(np.maximum(twice - 2, 0.0) * (twice + 2))))
+            return np.asarray(of_two(squares / np.abs(determinant(jacobian))))
     finite = np.asarray(np.isfinite(jacobian).all(axis=(-1, -2)))
     safe = np.where(finite[..., None, None], jacobian, 0.0)
     values = np.linalg.svd(safe, compute_uv=False)

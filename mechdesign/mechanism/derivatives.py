@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, cross, norm2, plus, quiet
 from mechdesign.mechanism.configuration import Configuration
@@ -256,18 +257,24 @@ class Linearization:
 
 def _solve_small(loop_columns: list[list[Value]], right: list[Value]) -> list[Value]:
     """Solve sum_j c_j y_j = -right per loop (complex equations, real unknowns)."""
-    rows = [part for line in loop_columns for part in ([c.real for c in line], [c.imag for c in line])]
+    matrix = _matrix(loop_columns)
     sides = [part for value in right for part in (np.real(value), np.imag(value))]
-    shape = np.broadcast_shapes(*(np.shape(c) for row in rows for c in row))
-    matrix = np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
-    full = np.broadcast_shapes(shape, *(np.shape(s) for s in sides))
+    identity = np.eye(len(sides))
+    full = np.broadcast_shapes(matrix.shape[:-2], *(np.shape(s) for s in sides))
     vector = np.stack([np.broadcast_to(-s, full) for s in sides], axis=-1)
-    good = np.isfinite(matrix).all(axis=(-1, -2))
-    good &= np.linalg.det(np.where(good[..., None, None], matrix, np.eye(len(rows)))) != 0
-    safe = np.where(good[..., None, None], matrix, np.eye(len(rows)))
+    good = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
+    good &= np.linalg.det(np.where(good[..., None, None], matrix, identity)) != 0
+    safe = np.where(good[..., None, None], matrix, identity)
     solution = np.linalg.solve(safe, vector[..., None])[..., 0]
     solution = np.where(good[..., None], solution, np.nan)
-    return [solution[..., j] for j in range(len(rows))]
+    return [solution[..., j] for j in range(len(sides))]
+
+
+def _matrix(loop_columns: list[list[Value]]) -> NDArray[np.float64]:
+    """Loop equations of a group as real matrices, shape (..., equations, unknowns)."""
+    rows = [part for line in loop_columns for part in ([c.real for c in line], [c.imag for c in line])]
+    shape = np.broadcast_shapes(*(np.shape(c) for row in rows for c in row))
+    return np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
 
 
 def determinants(linearization: Linearization) -> list[Value]:
@@ -277,13 +284,7 @@ def determinants(linearization: Linearization) -> list[Value]:
         if group.form == "place":
             continue
         lines = linearization.loop_columns(index, group)
-        if len(lines) == 1:
-            found.append(cross(*lines[0]))
-        else:
-            rows = [part for line in lines for part in ([c.real for c in line], [c.imag for c in line])]
-            shape = np.broadcast_shapes(*(np.shape(c) for row in rows for c in row))
-            matrix = np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
-            found.append(np.linalg.det(matrix))
+        found.append(cross(*lines[0]) if len(lines) == 1 else np.linalg.det(_matrix(lines)))
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.poses import radians
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import draw_mechanism, link_colors
@@ -81,8 +82,7 @@ def _paths(study: Study) -> Figure:
     mechanism = study.mechanism
     group = study.poses("kinematics").groups[0]
     plan = mechanism.plan(group.names)
-    factors = [study.units.angle_factor if c.quantity == "angle" else 1.0 for c in plan.structure.given]
-    given = [values * factor for values, factor in zip(group.columns(), factors, strict=True)]
+    given = [radians(study, c, v) for c, v in zip(plan.structure.given, group.columns(), strict=True)]
     configuration = plan.solve(given)
     valid = np.flatnonzero(configuration.valid)
     figure = style.new_figure(style.WIDTH, 5.4, layout=None)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.poses import pose_in_words, solve_poses
 from mechdesign.analyses.stiffness import ask, evaluate
 from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
@@ -50,13 +50,10 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
 
 def first_pose(study: Study) -> tuple[Configuration, int] | None:
     """The first pose that can be assembled, and its row."""
-    for group in study.poses("stiffness").groups:
-        plan = study.mechanism.plan(group.names)
-        factors = [study.units.angle_factor if c.quantity == "angle" else 1.0 for c in plan.structure.given]
-        configuration = plan.solve([v * f for v, f in zip(group.columns(), factors, strict=True)])
-        valid = np.flatnonzero(configuration.valid)
+    for solved in solve_poses(study, study.poses("stiffness")):
+        valid = np.flatnonzero(solved.configuration.valid)
         if len(valid):
-            return configuration.take(valid[:1]), int(group.rows[valid[0]])
+            return solved.configuration.take(valid[:1]), int(solved.rows[valid[0]])
     return None
 
 
