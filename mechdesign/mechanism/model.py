@@ -129,6 +129,8 @@ class Description:
     ----------
     sketch : mapping of str to complex
         Rough positions of points in the world.
+    branch : str
+        What happens where two assemblies meet: ``side`` keeps each joint on its side, ``follow`` goes on smoothly.
     angle_unit : float
         Radians in one of the study's units of angle; only the public door `Mechanism.solve` and measure expressions
         use it.
@@ -141,4 +143,5 @@ class Description:
     measures: Mapping[str, Measure] = field(default_factory=dict)
     limits: tuple[Limit, ...] = ()
     sketch: Mapping[str, complex] = field(default_factory=dict)
+    branch: Literal["side", "follow"] = "side"
     angle_unit: float = 1.0

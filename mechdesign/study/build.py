@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Mapping
+from typing import Literal
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.model import Description, Link, Place, Quantity, Term
@@ -46,8 +47,9 @@ class Builder:
         drives = quantities.drives(self)
         measures = quantities.measures(self)
         limits = quantities.limits(self)
+        branch: Literal["side", "follow"] = "follow" if self.section.branch == "follow" else "side"
         return Description(
-            self.places, self.links, joints, drives, measures, limits, self.sketch, self.units.angle_factor
+            self.places, self.links, joints, drives, measures, limits, self.sketch, branch, self.units.angle_factor
         )
 
     def parameters(self, nominal: Mapping[str, float], formulas: Mapping[str, Expression]) -> Parameters:

@@ -236,7 +236,7 @@ class MechanismSection(Model):
     links: dict[LinkName, Link]
     joints: dict[JointName, Joint] = {}
     drives: Annotated[dict[AnyName, Drive | None], BeforeValidator(names_to_mapping), OrShort((NAMES_FORM,))] = {}
-    branch: Annotated[str, Choice(("side",), later=("follow",))] = "side"
+    branch: Annotated[str, Choice(("side", "follow"))] = "side"
     sketch: dict[PointName, Point] = {}
     measures: dict[MeasureName, Measure] = {}
     limits: tuple[Limit, ...] = ()
