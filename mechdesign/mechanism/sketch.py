@@ -152,7 +152,7 @@ def _mode(graph: Graph, geometry: Geometry, structure: Structure, group: Group, 
         side = -dot(radius, sign * direction)
         return _decide(graph, structure, group, side, abs(radius), parts[group.angles[0]])
     rest = [(e, s) for e, s in parts[group.angles[0]] if e != k]
-    whole = along + _span(graph, sketch, rest, structure) / sign
+    whole = along + _span(graph, sketch, rest, structure)
     return _decide(graph, structure, group, sign * dot(whole, direction), abs(whole), [slide])
 
 
