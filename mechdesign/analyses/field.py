@@ -14,7 +14,8 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import Rates, determinants
+from mechdesign.mechanism.derivatives import determinants
+from mechdesign.mechanism.rates import Rates
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
 

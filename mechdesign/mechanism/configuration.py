@@ -103,7 +103,7 @@ class Configuration:
             for part in coordinate.parts
         }
 
-    def take(self, index: NDArray[np.intp] | int | tuple[int, ...]) -> Configuration:
+    def take(self, index: NDArray[np.intp] | int | tuple[int, ...] | tuple[NDArray[np.intp], ...]) -> Configuration:
         """Poses of a flat batch by index (shape (n,) or scalar)."""
 
         def pick(value: Value) -> Value:
@@ -120,3 +120,14 @@ class Configuration:
             [pick(s) for s in self.slides], [pick(c) for c in self.closures], np.asarray(reason),
             {name: pick(v) for name, v in self.places.items()},
         )  # fmt: skip
+
+
+def hide(value: Value, lost: NDArray[np.bool_]) -> Value:
+    """nan for poses that cannot be assembled; what is the same for every pose (the ground) is left alone."""
+    value = np.asarray(value)
+    if value.ndim == 0 and not lost.all():
+        value = np.broadcast_to(value, lost.shape)
+    elif value.ndim == 0:
+        return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
+    # Both parts of a position: (nan + 0i) would leave its y at zero.
+    return np.where(lost, complex(np.nan, np.nan) if np.iscomplexobj(value) else np.nan, value)

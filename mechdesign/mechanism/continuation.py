@@ -1,7 +1,7 @@
 """Groups without a closed form: from a solved pose to another along a straight line in the given coordinates.
 
-Every step solves all groups by Newton's method from the last accepted pose. It is accepted if the method converged,
-the unknowns moved little, and no determinant of a group changed its sign (a singularity lies between the
+Every step solves all groups by Newton's method from what the last steps lead to expect. It is accepted if the method
+converged, the unknowns moved little, and no determinant of a group changed its sign (a singularity lies between the
 assemblies); otherwise it is halved, pose by pose. What is not reached is another assembly, or none.
 """
 
@@ -14,12 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, angle_of, wrap
-from mechdesign.mechanism.solve import Guess, State
+from mechdesign.mechanism.newton import STEPS
+from mechdesign.mechanism.state import Guess, State
 from mechdesign.mechanism.structure import Structure
 
+# Largest change of an unknown in one step: radians, or parts of the mechanism's size.
 MAX_CHANGE = 0.35
+# Steps are planned a little shorter, so that few are refused.
+PLANNED = 0.8 * MAX_CHANGE
 SMALLEST_STEP = 2e-4
 MAX_ROUNDS = 400
+# Part of the path over which the first direction is taken.
+BEGINNING = 1e-6
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -32,7 +40,8 @@ class Start:
     signs: Sequence[Value]
 
 
-Solver = Callable[[Sequence[Value], Mapping[str, Value], Guess], State]
+# Solves all groups for given values, dimensions and a guess, with a bound of Newton's steps.
+Solver = Callable[[Sequence[Value], Mapping[str, Value], Guess, int], State]
 
 
 def unknowns_of(structure: Structure, rotations: Sequence[Value], slides: Sequence[Value]) -> Guess:
@@ -44,20 +53,71 @@ def unknowns_of(structure: Structure, rotations: Sequence[Value], slides: Sequen
     }
 
 
-def _pick(value: Value, mask: NDArray[np.bool_]) -> Value:
-    return np.broadcast_to(np.asarray(value, dtype=float), mask.shape)[mask]
+class _Path:
+    """Straight lines from a start to `count` poses, and the unknowns of the Newton groups as one table."""
+
+    def __init__(
+        self, structure: Structure, solver: Solver, start: Start, given: Sequence[Value], places: Mapping[str, Value],
+        nominal: Mapping[str, float], size: float, count: int,
+    ) -> None:  # fmt: skip
+        self.structure, self.solver, self.count = structure, solver, count
+        self.indices = [index for index, group in enumerate(structure.groups) if group.form == "newton"]
+        groups = [structure.groups[index] for index in self.indices]
+        self.is_angle = np.concatenate([[True] * len(g.angles) + [False] * len(g.slides) for g in groups]).astype(bool)
+        self.scale = np.where(self.is_angle, 1.0, size)[:, None]
+        self.given = [(np.asarray(a, dtype=float), b) for a, b in zip(start.given, given, strict=True)]
+        names = set(places) | set(start.places)
+        self.places = {
+            name: (start.places.get(name, nominal.get(name, 0.0)), places.get(name, nominal.get(name, 0.0)))
+            for name in names
+        }
+        self.signs = [np.broadcast_to(np.asarray(v), (count,)) for v in start.signs]
+        self.begin = np.stack(
+            [np.broadcast_to(v, (count,)) for index in self.indices for part in start.unknowns[index] for v in part]
+        )
+
+    def guess(self, table: Array) -> Guess:
+        """Rows of a table as angles and slides by group."""
+        found, row = {}, 0
+        for index in self.indices:
+            group = self.structure.groups[index]
+            angles, slides = len(group.angles), len(group.slides)
+            found[index] = (list(table[row : row + angles]), list(table[row + angles : row + angles + slides]))
+            row += angles + slides
+        return found
+
+    def solve(self, lanes: NDArray[np.intp], at: Value, guess: Array, steps: int = STEPS) -> tuple[Array, State]:
+        """Unknowns and state of some poses at parts `at` of their paths."""
+
+        def between(ends: tuple[Value, Value]) -> Value:
+            a, b = (_pick(end, lanes) for end in ends)
+            return a + at * (b - a)
+
+        state = self.solver(
+            [between(ends) for ends in self.given],
+            {name: between(ends) for name, ends in self.places.items()},
+            self.guess(guess),
+            steps,
+        )
+        shape = (len(lanes),)
+        rows = [np.broadcast_to(v, shape) for index in self.indices for part in state.unknowns[index] for v in part]
+        return np.stack(rows), state
+
+    def change(self, new: Array, old: Array) -> Array:
+        """How far the unknowns moved, angles the short way round."""
+        difference = new - old
+        return np.where(self.is_angle[:, None], wrap(difference), difference)
+
+
+def _pick(value: Value, lanes: NDArray[np.intp]) -> Value:
+    value = np.asarray(value, dtype=float)
+    return value if value.ndim == 0 else value[lanes]
 
 
 def follow(
-    structure: Structure,
-    solver: Solver,
-    start: Start,
-    given: Sequence[Value],
-    places: Mapping[str, Value],
-    nominal: Mapping[str, float],
-    size: float,
-    count: int,
-) -> tuple[Guess, NDArray[np.bool_]]:
+    structure: Structure, solver: Solver, start: Start, given: Sequence[Value], places: Mapping[str, Value],
+    nominal: Mapping[str, float], size: float, count: int,
+) -> tuple[Guess, NDArray[np.bool_]]:  # fmt: skip
     """Continue `count` poses from `start`; returns their unknowns and which poses were reached.
 
     Parameters
@@ -66,58 +126,40 @@ def follow(
     nominal : nominal value of every place
     size : a length of the mechanism, against which slides are judged
     """
-    indices = [index for index, group in enumerate(structure.groups) if group.form == "newton"]
-    flat = {
-        index: [np.array(np.broadcast_to(v, (count,)), dtype=float) for part in start.unknowns[index] for v in part]
-        for index in indices
-    }
-    scales = {
-        index: np.array([1.0] * len(structure.groups[index].angles) + [size] * len(structure.groups[index].slides))
-        for index in indices
-    }
-    begin = [np.broadcast_to(np.asarray(v, dtype=float), (count,)) for v in start.given]
-    end = [np.broadcast_to(np.asarray(v, dtype=float), (count,)) for v in given]
-    names = set(places) | set(start.places)
-    path = {
-        name: (start.places.get(name, nominal.get(name, 0.0)), places.get(name, nominal.get(name, 0.0)))
-        for name in names
-    }
-    signs = [np.broadcast_to(np.asarray(v), (count,)) for v in start.signs]
+    path = _Path(structure, solver, start, given, places, nominal, size, count)
+    every = np.arange(count)
+    table = path.begin.copy()
+    # One step of Newton's method at the very beginning gives the direction in which the unknowns set out.
+    first, _ = path.solve(every, BEGINNING, table, 1)
+    slope = path.change(first, table) / BEGINNING
+    slope = np.where(np.isfinite(slope).all(axis=0), slope, 0.0)
     done = np.zeros(count)
-    step = np.ones(count)
-    moving = np.ones(count, dtype=bool)
+    step = _planned(path, slope)
+    moving = every
     for _ in range(MAX_ROUNDS):
-        if not moving.any():
+        if not len(moving):
             break
-        target = np.minimum(1.0, done + step)[moving]
-        now = [b[moving] + target * (e[moving] - b[moving]) for b, e in zip(begin, end, strict=True)]
-        dims = {
-            name: _pick(a, moving) + target * (_pick(b, moving) - _pick(a, moving)) for name, (a, b) in path.items()
-        }
-        old = {index: [v[moving] for v in flat[index]] for index in indices}
-        guess = {index: _split(structure, index, old[index]) for index in indices}
-        state = solver(now, dims, guess)
-        good = np.ones(len(target), dtype=bool)
-        for converged, determinant, sign in zip(state.converged, state.determinants, signs, strict=True):
+        target = np.minimum(1.0, done[moving] + step[moving])
+        taken = target - done[moving]
+        old = table[:, moving]
+        new, state = path.solve(moving, target, old + slope[:, moving] * taken)
+        moved = path.change(new, old)
+        with np.errstate(invalid="ignore"):
+            good = (np.abs(moved) <= MAX_CHANGE * path.scale).all(axis=0)
+        for converged, determinant, sign in zip(state.converged, state.determinants, path.signs, strict=True):
             good &= converged & (np.sign(determinant) == sign[moving])
-        new = unknowns_of(structure, state.rotations, state.slides)
-        for index in indices:
-            angles = len(structure.groups[index].angles)
-            values = [np.broadcast_to(v, good.shape) for part in new[index] for v in part]
-            for position, (value, before) in enumerate(zip(values, old[index], strict=True)):
-                change = wrap(value - before) if position < angles else value - before
-                good &= np.abs(change) <= MAX_CHANGE * scales[index][position]
-            where = np.flatnonzero(moving)[good]
-            for store, value in zip(flat[index], values, strict=True):
-                store[where] = value[good]
-        active = np.flatnonzero(moving)
-        done[active[good]] = target[good]
-        step[active[good]] *= 2
-        step[active[~good]] /= 2
-        moving = (done < 1) & (step >= SMALLEST_STEP)
-    return {index: _split(structure, index, flat[index]) for index in indices}, done >= 1
+        reached = moving[good]
+        table[:, reached] = old[:, good] + moved[:, good]
+        slope[:, reached] = moved[:, good] / taken[good]
+        done[reached] = target[good]
+        step[reached] = np.minimum(_planned(path, slope[:, reached]), 2 * step[reached])
+        step[moving[~good]] = taken[~good] / 2
+        moving = moving[(done[moving] < 1) & (step[moving] >= SMALLEST_STEP)]
+    return path.guess(table), done >= 1
 
 
-def _split(structure: Structure, index: int, values: Sequence[Value]) -> tuple[list[Value], list[Value]]:
-    angles = len(structure.groups[index].angles)
-    return list(values[:angles]), list(values[angles:])
+def _planned(path: _Path, slope: Array) -> Array:
+    """Step over which the unknowns change as much as is planned."""
+    speed = (np.abs(slope) / path.scale).max(axis=0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.minimum(1.0, PLANNED / speed))

@@ -22,30 +22,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, cross, norm2, plus, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.solve import State, columns
+from mechdesign.mechanism.newton import solve_linear
+from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.state import State, columns, scalars
 from mechdesign.mechanism.structure import Group, Structure
-
-
-@dataclass(frozen=True, eq=False)
-class Rates:
-    """One derivative of everything: node positions (complex), angles of classes, slides, offsets of bodies.
-
-    Arrays broadcast to the batch, with further leading axes where several derivatives are taken at once.
-    """
-
-    nodes: Sequence[Value]
-    angles: Sequence[Value]
-    slides: Sequence[Value]
-    offsets: dict[str, Value]
 
 
 class Linearization:
@@ -57,8 +44,8 @@ class Linearization:
         self.configuration = configuration
         vectors = configuration.vectors
         self.state = State(
-            structure, vectors, list(vectors.w), list(configuration.nodes), list(configuration.rotations),
-            [], list(configuration.slides),
+            configuration.graph, structure, vectors, list(vectors.w), list(configuration.nodes),
+            list(configuration.rotations), [], list(configuration.slides),
         )  # fmt: skip
         self._columns: dict[int, list[list[Value]]] = {}
         self._scales: dict[int, Value] = {}
@@ -77,13 +64,14 @@ class Linearization:
     def loop_columns(self, index: int, group: Group) -> list[list[Value]]:
         """Per loop of a group, the derivatives of its closure with respect to the group's unknowns."""
         if index not in self._columns:
-            self._columns[index] = [columns(self.state, group, loop.edges) for loop in group.loops]
+            self._columns[index] = [columns(self.state, group, loop.edges)[1] for loop in group.loops]
         return self._columns[index]
 
     def _solve_group(self, index: int, group: Group, right: list[Value]) -> list[Value]:
         lines = self.loop_columns(index, group)
         if len(lines) > 1:
-            return _solve_small(lines, right)
+            sides = [part for value in right for part in (-np.real(value), -np.imag(value))]
+            return solve_linear(_rows(lines), sides)[0]
         a, b = lines[0]
         if index not in self._scales:
             self._scales[index] = -1 / cross(a, b)
@@ -255,26 +243,9 @@ class Linearization:
         return given, explicit, offsets
 
 
-def _solve_small(loop_columns: list[list[Value]], right: list[Value]) -> list[Value]:
-    """Solve sum_j c_j y_j = -right per loop (complex equations, real unknowns)."""
-    matrix = _matrix(loop_columns)
-    sides = [part for value in right for part in (np.real(value), np.imag(value))]
-    identity = np.eye(len(sides))
-    full = np.broadcast_shapes(matrix.shape[:-2], *(np.shape(s) for s in sides))
-    vector = np.stack([np.broadcast_to(-s, full) for s in sides], axis=-1)
-    good = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
-    good &= np.linalg.det(np.where(good[..., None, None], matrix, identity)) != 0
-    safe = np.where(good[..., None, None], matrix, identity)
-    solution = np.linalg.solve(safe, vector[..., None])[..., 0]
-    solution = np.where(good[..., None], solution, np.nan)
-    return [solution[..., j] for j in range(len(sides))]
-
-
-def _matrix(loop_columns: list[list[Value]]) -> NDArray[np.float64]:
-    """Loop equations of a group as real matrices, shape (..., equations, unknowns)."""
-    rows = [part for line in loop_columns for part in ([c.real for c in line], [c.imag for c in line])]
-    shape = np.broadcast_shapes(*(np.shape(c) for row in rows for c in row))
-    return np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
+def _rows(loop_columns: list[list[Value]]) -> list[list[Value]]:
+    """Loop equations of a group as rows of a real matrix."""
+    return [row for line in loop_columns for row in scalars(line)]
 
 
 def determinants(linearization: Linearization) -> list[Value]:
@@ -284,7 +255,7 @@ def determinants(linearization: Linearization) -> list[Value]:
         if group.form == "place":
             continue
         lines = linearization.loop_columns(index, group)
-        found.append(cross(*lines[0]) if len(lines) == 1 else np.linalg.det(_matrix(lines)))
+        found.append(cross(*lines[0]) if len(lines) == 1 else solve_linear(_rows(lines), [0.0] * 2 * len(lines))[1])
     return found
 
 

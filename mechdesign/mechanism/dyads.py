@@ -36,7 +36,7 @@ def _root(product: Value, *sizes: Value) -> Value:
     return np.sqrt(product)
 
 
-def two_angles(k: Value, z1: Value, z2: Value, mode: int) -> Solution:
+def two_angles(k: Value, z1: Value, z2: Value, mode: Value) -> Solution:
     """Rotations U1, U2 of two links that meet; `mode` is the side of the line -k on which they meet (+1 left)."""
     n1, n2, reach = norm2(z1), norm2(z2), norm2(k)
     product = 2 * np.sqrt(n1 * n2)
@@ -49,7 +49,7 @@ def two_angles(k: Value, z1: Value, z2: Value, mode: int) -> Solution:
     return u1, u2, (outer, inner)
 
 
-def angle_and_fixed_slide(k: Value, z: Value, d: Value, mode: int) -> Solution:
+def angle_and_fixed_slide(k: Value, z: Value, d: Value, mode: Value) -> Solution:
     """Rotation U and displacement s along a known direction; `mode` is the side of the perpendicular's foot."""
     n = norm2(z)
     offset = cross(d, k)
@@ -59,7 +59,7 @@ def angle_and_fixed_slide(k: Value, z: Value, d: Value, mode: int) -> Solution:
     return u, s, (closure,)
 
 
-def angle_and_turning_slide(k: Value, z: Value, d: Value, mode: int) -> Solution:
+def angle_and_turning_slide(k: Value, z: Value, d: Value, mode: Value) -> Solution:
     """Rotation U and displacement s of a slide that turns with it; `mode` is the sign of the slide from its foot."""
     offset = cross(d, z)
     reach = norm2(k)

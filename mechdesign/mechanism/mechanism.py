@@ -22,7 +22,7 @@ from mechdesign.mechanism.model import Description, Limit, Quantity
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import Sketch, assembly_modes, drawn_value, locate, roots_as_drawn
-from mechdesign.mechanism.solve import State
+from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Undetermined, compile_structure
 
 # Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).
@@ -247,7 +247,7 @@ class Mechanism:
                 raise MechanismError(f"'{name}' is not a dimension of this mechanism", name)
             angle = place is not None and place.quantity == "angle"
             dims[name] = np.asarray(value, dtype=float) * (unit if angle else 1.0)
-        configuration = plan.solve(given, dims)
+        configuration = plan.solve(given, dims, jobs=None)
         if configuration.shape == () and not configuration.valid:
             where = ", ".join(f"{name} = {float(np.asarray(value)):g}" for name, value in pose.items())
             raise AssemblyError(f"pose {where}: {Reason(int(configuration.reason)).text}")

@@ -11,7 +11,7 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import Rates
+from mechdesign.mechanism.rates import Rates
 
 # Step of the central difference of an expression's exact gradient, relative to its arguments' scale.
 STEP = 1e-6

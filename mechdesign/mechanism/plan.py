@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mechdesign.mechanism import chunks
 from mechdesign.mechanism.algebra import Value, quiet
-from mechdesign.mechanism.configuration import Configuration, Reason
+from mechdesign.mechanism.change_points import ChangePoints
+from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import Start, follow, unknowns_of
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Vectors
-from mechdesign.mechanism.solve import Guess, State, run, start_state
+from mechdesign.mechanism.newton import STEPS
+from mechdesign.mechanism.solve import run
+from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.mechanism.structure import Structure
 
 if TYPE_CHECKING:
@@ -24,7 +29,13 @@ LIMIT_ROUNDING = 1e-14
 
 
 class Plan:
-    """How to find the whole mechanism from given coordinates; made by `Mechanism.plan`."""
+    """How to find the whole mechanism from given coordinates; made by `Mechanism.plan`.
+
+    Parameters
+    ----------
+    modes : sequence of int
+        Assembly mode of each group as drawn; 0 for groups that have none.
+    """
 
     def __init__(self, mechanism: Mechanism, structure: Structure, modes: Sequence[int]) -> None:
         self.mechanism = mechanism
@@ -32,10 +43,28 @@ class Plan:
         self.modes = tuple(modes)
         self.iterative = any(group.form == "newton" for group in structure.groups)
 
+    @cached_property
+    def change_points(self) -> ChangePoints | None:
+        """Where the motion passes from one assembly to another, if the study lets it (``branch: follow``)."""
+        wanted = self.mechanism.description.branch == "follow"
+        return ChangePoints(self) if wanted and len(self.structure.given) == 1 and any(self.modes) else None
+
+    def _modes(self, given: Sequence[Value]) -> Sequence[Value]:
+        return self.modes if self.change_points is None else self.change_points.modes(given[0])
+
     @quiet
-    def run(self, given: Sequence[Value], vectors: Vectors, guess: Guess | None) -> State:
+    def run(
+        self,
+        given: Sequence[Value],
+        vectors: Vectors,
+        guess: Guess | None,
+        modes: Sequence[Value] | None = None,
+        steps: int = STEPS,
+    ) -> State:
+        """Solve all groups, in the assembly as drawn unless `modes` says another."""
         state = start_state(self.mechanism.graph, self.structure, vectors, given)
-        return run(state, self.modes, guess, given)
+        size = self.mechanism.size if self.iterative else 1.0
+        return run(state, self.modes if modes is None else modes, guess, given, size, steps)
 
     def _start(self, at: Configuration | None) -> Start:
         at = self.mechanism.sketch_configuration if at is None else at
@@ -58,6 +87,7 @@ class Plan:
         *,
         start: Configuration | None = None,
         limits: bool = True,
+        jobs: int | None = 1,
     ) -> Configuration:
         """Assemble the mechanism for a batch of poses.
 
@@ -72,6 +102,8 @@ class Plan:
             where left out.
         limits : bool
             Whether the study's limits make a pose invalid.
+        jobs : int or None
+            Threads for a large batch; None uses every processor. The result does not depend on it.
 
         Returns
         -------
@@ -83,17 +115,24 @@ class Plan:
             raise ValueError(f"{len(self.structure.given)} given coordinates needed, {len(values)} passed")
         dims: dict[str, Value] = {name: np.asarray(v, dtype=float) for name, v in (places or {}).items()}
         shape = np.broadcast_shapes(*(v.shape for v in values), *(v.shape for v in dims.values()))
+        if chunks.too_large(shape):
+            if self.change_points is not None:
+                self.change_points.cover(values[0])
+            return chunks.solve(self, values, dims, shape, start, limits, jobs)
         vectors = self.mechanism.geometry.vectors(dims)
         reached: NDArray[np.bool_] | None = None
+        guess: Guess | None = None
         if self.iterative:
             guess, reached = self._follow(values, dims, shape, start)
-            state = self.run(values, vectors, guess)
-        else:
-            state = self.run(values, vectors, None)
+        state = self.run(values, vectors, guess, self._modes(values))
         return self.configuration(state, shape, dims, vectors, reached, limits)
 
     def _follow(
-        self, values: Sequence[Value], dims: Mapping[str, Value], shape: tuple[int, ...], at: Configuration | None
+        self,
+        values: Sequence[Value],
+        dims: Mapping[str, Value],
+        shape: tuple[int, ...],
+        at: Configuration | None,
     ) -> tuple[Guess, NDArray[np.bool_]]:
         geometry = self.mechanism.geometry
         begin = self._start(at)
@@ -110,7 +149,9 @@ class Plan:
         )
         found, reached = follow(
             self.structure,
-            lambda given, places, guess: self.run(given, geometry.vectors(places), guess),
+            lambda given, places, guess, steps: self.run(
+                given, geometry.vectors(places), guess, self._modes(given), steps
+            ),
             begin,
             [flat(v) for v in values],
             {name: flat(v) for name, v in dims.items()},
@@ -156,9 +197,9 @@ class Plan:
         nodes, rotations, slides = state.nodes, state.rotations[: graph.classes], state.slides
         if (reason != Reason.OK).any():
             lost = reason != Reason.OK
-            nodes = [_hide(x, lost) for x in nodes]
-            rotations = [_hide(u, lost) for u in rotations]
-            slides = [_hide(s, lost) for s in slides]
+            nodes = [hide(x, lost) for x in nodes]
+            rotations = [hide(u, lost) for u in rotations]
+            slides = [hide(s, lost) for s in slides]
         configuration = Configuration(
             graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims)
         )
@@ -178,14 +219,3 @@ class Plan:
         if coordinate.kind == "angle":
             return np.real(state.rotations[self.mechanism.graph.bodies[coordinate.body][0]])
         return 0.0
-
-
-def _hide(value: Value, lost: NDArray[np.bool_]) -> Value:
-    """nan for poses that cannot be assembled; what is the same for every pose (the ground) is left alone."""
-    value = np.asarray(value)
-    if value.ndim == 0 and not lost.all():
-        value = np.broadcast_to(value, lost.shape)
-    elif value.ndim == 0:
-        return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
-    # Both parts of a position: (nan + 0i) would leave its y at zero.
-    return np.where(lost, complex(np.nan, np.nan) if np.iscomplexobj(value) else np.nan, value)

@@ -54,8 +54,8 @@ class Group:
         Closures between nodes known before.
     tree : tuple of (int, int)
         Edges, each with its sign, that place the group's nodes in order once angles and slides are known.
-    fixed : tuple of (int, str, int)
-        Scalar equations: node, ``x`` or ``y``, and which given coordinate it must equal.
+    conditions : tuple of int
+        Scalar equations: which given coordinates the group's unknowns must meet beside its loops.
     """
 
     form: Form
@@ -63,7 +63,7 @@ class Group:
     slides: tuple[int, ...]
     loops: tuple[Loop, ...]
     tree: tuple[tuple[int, int], ...]
-    fixed: tuple[tuple[int, str, int], ...] = ()
+    conditions: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -128,6 +128,7 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
     known_slides: list[tuple[int, int]] = []
     node_given: dict[tuple[int, str], int] = {}
     spans: list[tuple[int, int]] = []
+    expressions: dict[int, Coordinate] = {}
     for k, coordinate in enumerate(given):
         if coordinate.kind == "angle":
             frame, reference = graph.bodies[coordinate.body][0], graph.bodies[coordinate.reference][0]
@@ -144,10 +145,10 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
             edges.append(Edge(coordinate.node, coordinate.other, classes))
             classes += 1
         else:
-            raise Undetermined(f"'{coordinate.name}' is an expression: it can be an output, not a given coordinate")
+            expressions[k] = coordinate
     found = [ties.find(k) for k in range(classes)]
     known = {slide for slide, _ in known_slides}
-    groups = _decompose(graph, edges, [tie.root for tie in found], known, node_given)
+    groups = _decompose(graph, edges, [tie.root for tie in found], known, node_given, expressions)
     known_nodes = []
     for node in {node for node, _ in node_given}:
         pair = (node_given.get((node, "x"), -1), node_given.get((node, "y"), -1))
@@ -165,6 +166,7 @@ def _decompose(
     roots: Sequence[int],
     known_slides: set[int],
     node_given: dict[tuple[int, str], int],
+    expressions: dict[int, Coordinate],
 ) -> list[Group]:
     known: set[Variable] = {("x", 0), ("y", 0)}
     known.update(("x" if part == "x" else "y", node) for node, part in node_given)
@@ -192,6 +194,8 @@ def _decompose(
         for part in ("x", "y"):
             ends: list[Variable] = [(part, edge.tail), (part, edge.head)]  # type: ignore[list-item]
             rows.append([column(v) for v in [*shared, *ends] if v not in known])
+    for coordinate in expressions.values():
+        rows.append([variables[v] for v in _variables(graph, roots, coordinate) if v in variables])
     if len(rows) != len(variables):
         raise Undetermined(_count_message(len(variables) - len(rows)))
     matched = _match(rows, len(variables))
@@ -201,8 +205,9 @@ def _decompose(
     # The two equations of an edge stay together, and so do those matched to the two coordinates of a node.
     units: dict[Hashable, set[int]] = defaultdict(set)
     names = list(variables)
+    loose = 2 * len(edges)  # from here on rows are scalar equations
     for row in range(len(rows)):
-        units["edge", row // 2].add(row)
+        units["edge", row // 2 if row < loose else row].add(row)
         kind, index = names[matched[row]]
         if kind in ("x", "y"):
             units["node", index].add(row)
@@ -216,8 +221,23 @@ def _decompose(
     groups = []
     for members in _components(arcs, len(rows)):
         unknowns = [names[matched[row]] for row in members]
-        groups.append(_group(edges, roots, sorted({row // 2 for row in members}), unknowns, node_given))
+        own = [list(expressions)[row - loose] for row in members if row >= loose]
+        inner = sorted({row // 2 for row in members if row < loose})
+        groups.append(_group(edges, roots, inner, unknowns, node_given, own))
     return groups
+
+
+def _variables(graph: Graph, roots: Sequence[int], coordinate: Coordinate) -> list[Variable]:
+    """What an expression depends on."""
+    if coordinate.kind == "expression":
+        return list(dict.fromkeys(v for part in coordinate.parts for v in _variables(graph, roots, part)))
+    if coordinate.kind == "angle":
+        return [("angle", roots[graph.bodies[body][0]]) for body in (coordinate.body, coordinate.reference)]
+    if coordinate.kind == "distance":
+        return [(axis, node) for node in (coordinate.node, coordinate.other) for axis in ("x", "y")]  # type: ignore[misc]
+    if coordinate.kind == "slide":
+        return [("slide", coordinate.slide)]
+    return [(coordinate.kind, coordinate.node)]
 
 
 def _count_message(free: int) -> str:
@@ -272,6 +292,7 @@ def _group(
     members: list[int],
     unknowns: list[Variable],
     node_given: dict[tuple[int, str], int],
+    own: Sequence[int],
 ) -> Group:
     angles = tuple(sorted(index for kind, index in unknowns if kind == "angle"))
     slides = tuple(sorted(index for kind, index in unknowns if kind == "slide"))
@@ -297,9 +318,9 @@ def _group(
         else:
             raise Undetermined("a part of the mechanism is not connected to the ground by given coordinates")
         pending.remove(k)
-    fixed = tuple((node, part, which) for (node, part), which in sorted(node_given.items()) if node in free)
-    used = tuple(loop for loop in loops)
-    return Group(_form(edges, roots, angles, slides, used, fixed), angles, slides, used, tuple(tree), fixed)
+    conditions = (*(which for (node, _), which in sorted(node_given.items()) if node in free), *own)
+    form = _form(edges, roots, angles, slides, loops, conditions)
+    return Group(form, angles, slides, tuple(loops), tuple(tree), conditions)
 
 
 def _loop(paths: dict[int, tuple[int, tuple[tuple[int, int], ...]]], k: int, tail: int, head: int) -> Loop:
@@ -318,12 +339,12 @@ def _form(
     roots: Sequence[int],
     angles: tuple[int, ...],
     slides: tuple[int, ...],
-    loops: tuple[Loop, ...],
-    fixed: tuple[tuple[int, str, int], ...],
+    loops: Sequence[Loop],
+    conditions: Sequence[int],
 ) -> Form:
-    if not angles and not slides and not fixed:
+    if not angles and not slides and not conditions:
         return "place"
-    if len(loops) != 1 or fixed or len(angles) + len(slides) != 2:
+    if len(loops) != 1 or conditions or len(angles) + len(slides) != 2:
         return "newton"
     if len(angles) == 2:
         return "two angles"

@@ -1,0 +1,118 @@
+"""Change points: where two assemblies of a group meet and the motion may go on in either.
+
+A closure (see `mechdesign.mechanism.dyads`) touches zero there without crossing it. Under ``branch: follow`` a motion
+goes on smoothly, which means that the group's assembly mode changes its sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.mechanism.algebra import Value
+
+if TYPE_CHECKING:
+    from mechdesign.mechanism.plan import Plan
+    from mechdesign.mechanism.structure import Group
+
+# A closure that falls below this part of its largest value touches zero: it is a difference of squared lengths.
+TOUCHING = 1e-10
+# Closures are looked at this often in a turn of the drive, or in the mechanism's size of a slide's travel.
+SAMPLES = 720
+HALVINGS = 60
+GOLDEN = (np.sqrt(5) - 1) / 2
+
+Array = NDArray[np.float64]
+
+
+def closing_groups(groups: Sequence[Group]) -> list[int]:
+    """Index of the group of each closure of a configuration."""
+    counts = {"two angles": 2, "angle and fixed slide": 1, "angle and turning slide": 1}
+    return [index for index, group in enumerate(groups) for _ in range(counts.get(group.form, 0))]
+
+
+def lowest(function: Callable[[Array], Array], begin: Array, end: Array) -> tuple[Array, Array]:
+    """Places and values of the smallest values between `begin` and `end`, one a lane, by golden section."""
+    for _ in range(HALVINGS):
+        left, right = end - GOLDEN * (end - begin), begin + GOLDEN * (end - begin)
+        lower = function(left) < function(right)
+        begin, end = np.where(lower, begin, left), np.where(lower, right, end)
+    return begin, function(begin)
+
+
+class ChangePoints:
+    """Assembly modes along one given coordinate: as drawn at the sketch, changed at every change point between.
+
+    The points are searched once for each range of the coordinate that is asked for, and kept.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        coordinate = plan.structure.given[0]
+        self.sketch = float(plan.mechanism.sketch_configuration.value(coordinate))
+        self._period = 2 * np.pi if coordinate.quantity == "angle" else max(plan.mechanism.size, 1e-300)
+        self._range = (self.sketch, self.sketch)
+        self._places: list[Array] = [np.empty(0) for _ in plan.modes]
+
+    def modes(self, values: Value) -> list[Value]:
+        """Mode of each group at values of the given coordinate (radians or lengths)."""
+        self.cover(values)
+        return self._parity(values, len(self._places))
+
+    def cover(self, values: Value) -> None:
+        """Search the range of some values, if it has not been searched."""
+        finite = np.asarray(values, dtype=float)[np.isfinite(values)]
+        if finite.size:
+            self._cover(float(finite.min()), float(finite.max()))
+
+    def _parity(self, values: Array, groups: int) -> list[Value]:
+        """Modes of the first groups; the others as drawn."""
+        found: list[Value] = list(self._plan.modes)
+        for index in range(groups):
+            places = self._places[index]
+            if len(places):
+                passed = np.searchsorted(places, values) - np.searchsorted(places, self.sketch)
+                found[index] = found[index] * np.where(passed % 2, -1, 1)
+        return found
+
+    def _cover(self, low: float, high: float) -> None:
+        begin, end = self._range
+        if begin <= low and high <= end:
+            return
+        # At least a turn to each side at once, so that few calls search at all.
+        low = min(begin, low, self.sketch - self._period)
+        high = max(end, high, self.sketch + self._period)
+        count = int(np.ceil((high - low) / self._period * SAMPLES)) + 1
+        samples = np.linspace(low, high, count)
+        # Modes of a group decide where those behind it have their change points.
+        self._places = [np.empty(0) for _ in self._plan.modes]
+        for index, (group, mode) in enumerate(zip(self._plan.structure.groups, self._plan.modes, strict=True)):
+            if group.form == "newton":
+                # Its assembly is followed by continuity; what is solved behind it stays as drawn.
+                break
+            if mode:
+                self._places[index] = self._search(index, samples)
+        self._range = (low, high)
+
+    def _closures(self, index: int, values: Array) -> Array:
+        plan = self._plan
+        groups = plan.structure.groups[: index + 1]
+        modes = self._parity(values, index)
+        state = plan.run([values], plan.mechanism.geometry.nominal, None, modes[: index + 1])
+        own = [c for c, group in zip(state.closures, closing_groups(groups), strict=True) if group == index]
+        return np.stack([np.broadcast_to(c, values.shape) for c in own])
+
+    def _search(self, index: int, samples: Array) -> Array:
+        table = self._closures(index, samples)
+        with np.errstate(invalid="ignore"):
+            low = (table[:, 1:-1] <= table[:, :-2]) & (table[:, 1:-1] < table[:, 2:])
+        which, row = np.nonzero(low)
+        if not len(row):
+            return np.empty(0)
+        lanes = np.arange(len(row))
+        place, value = lowest(lambda at: self._closures(index, at)[which, lanes], samples[row], samples[row + 2])
+        scale = np.nanmax(np.abs(table), axis=1)[which]
+        return np.unique(place[np.abs(value) <= TOUCHING * scale])

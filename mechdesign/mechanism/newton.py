@@ -1,0 +1,187 @@
+"""Groups without a closed form: Newton's method on their loops and conditions, for the whole batch at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.mechanism.algebra import Value, plus, rotation
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.state import State, columns, loop_gap, scalars
+from mechdesign.mechanism.structure import Group
+
+STEPS = 10
+# After a correction this small (radians, or parts of the mechanism's size) a further one would be below rounding:
+# the method converges quadratically.
+CONVERGED = 1e-8
+# Up to this many unknowns the equations are solved by minors, array by array; above it matrix by matrix.
+BY_MINORS = 4
+
+
+def solve_newton(
+    state: State,
+    index: int,
+    angles: Sequence[Value],
+    slides: Sequence[Value],
+    given: Sequence[Value],
+    size: float,
+    steps: int = STEPS,
+) -> None:
+    """Solve group `index` of a state from a guess of its angles and slides, and note what came out in the state.
+
+    Parameters
+    ----------
+    size : float
+        A length of the mechanism, by which corrections of slides are measured.
+    steps : int
+        Most corrections. A pose that has converged is left alone: its result does not depend on its batch.
+    """
+    group = state.structure.groups[index]
+    theta: list[Value] = [np.asarray(a, dtype=float) for a in angles]
+    s: list[Value] = [np.asarray(a, dtype=float) for a in slides]
+    active: NDArray[np.bool_] | None = None
+    determinant: Value = 0.0
+    for _ in range(steps):
+        _set(state, group, theta, s)
+        rows, right = equations(state, group, given)
+        solution, determinant = solve_linear(rows, right)
+        largest: Value = 0.0
+        for k, step in enumerate(solution):
+            largest = np.maximum(largest, np.abs(step) if k < len(theta) else np.abs(step) / size)
+        moving = ~(largest < CONVERGED)
+        if active is not None:
+            solution = [np.where(active, step, 0.0) for step in solution]
+            moving &= active
+        theta = [value - step for value, step in zip(theta, solution[: len(theta)], strict=True)]
+        s = [value - step for value, step in zip(s, solution[len(theta) :], strict=True)]
+        active = np.asarray(moving)
+        if not active.any():
+            break
+    _set(state, group, theta, s)
+    assert active is not None
+    state.unknowns[index] = (theta, s)
+    state.converged.append(~active)
+    state.determinants.append(determinant)
+
+
+def _set(state: State, group: Group, theta: Sequence[Value], s: Sequence[Value]) -> None:
+    for root, value in zip(group.angles, theta, strict=True):
+        state.turn(root, rotation(value))
+    for slide, value in zip(group.slides, s, strict=True):
+        state.slides[slide] = value
+
+
+def equations(state: State, group: Group, given: Sequence[Value]) -> tuple[list[list[Value]], list[Value]]:
+    """Matrix (a list of rows) and errors of a group's equations at the state's angles and slides."""
+    rows: list[list[Value]] = []
+    errors: list[Value] = []
+    for loop in group.loops:
+        total, derivatives = columns(state, group, loop.edges)
+        rows += scalars(derivatives)
+        gap = plus(loop_gap(state, loop.start, loop.end), 1, total)
+        errors += [gap.real, gap.imag]
+    if group.conditions:
+        state.place(group)
+        configuration = Configuration(
+            state.graph, state.vectors, (), state.nodes, state.rotations, state.slides, [], np.zeros((), np.int8), {}
+        )
+        moves = _moves(state, group)
+        for which in group.conditions:
+            coordinate: Coordinate = state.structure.given[which]
+            rows.append([first(configuration, coordinate, move) for move in moves])
+            errors.append(configuration.value(coordinate) - given[which])
+    return rows, errors
+
+
+def _moves(state: State, group: Group) -> list[Rates]:
+    """Derivatives of every position with respect to each of a group's unknowns."""
+    structure = state.structure
+    count = len(group.angles) + len(group.slides)
+    nodes: list[list[Value]] = [[0.0j] * len(state.nodes) for _ in range(count)]
+    into = {}
+    for k, sign in group.tree:
+        edge = structure.edges[k]
+        tail, head = (edge.tail, edge.head) if sign > 0 else (edge.head, edge.tail)
+        into[head] = (*into.get(tail, ()), (k, sign))
+        _, derivatives = columns(state, group, into[head])
+        for j, value in enumerate(derivatives):
+            nodes[j][head] = value
+    angles = [[float(tie.root == root) for tie in structure.ties] for root in group.angles]
+    slides = [[float(slide == own) for slide in range(len(state.slides))] for own in group.slides]
+    still, held = [0.0] * structure.classes, [0.0] * len(state.slides)
+    turns = [*angles, *([still] * len(group.slides))]
+    shifts = [*([held] * len(group.angles)), *slides]
+    return [Rates(*each, {}) for each in zip(nodes, turns, shifts, strict=True)]
+
+
+def solve_linear(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple[list[Value], Value]:
+    """Solve small linear systems, one for each pose; returns the unknowns and the determinant.
+
+    `rows` and `right` hold arrays that broadcast, or plain floats where an entry is the same for all. Where a matrix
+    is singular or not finite the unknowns are not finite.
+    """
+    return _by_minors(rows, right) if len(rows) <= BY_MINORS else _by_matrix(rows, right)
+
+
+def _by_minors(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple[list[Value], Value]:
+    """Cramer's rule with Laplace's expansion by the 2 x 2 minors of the upper and of the lower rows."""
+    count = len(rows)
+    # Rows and columns of the identity fill up to two pairs of rows; the plain numbers in them cost nothing.
+    full = [[*row, *(0.0 for _ in range(count, BY_MINORS)), side] for row, side in zip(rows, right, strict=True)]
+    full += [[float(i == j) for j in range(BY_MINORS)] + [0.0] for i in range(count, BY_MINORS)]
+    upper, lower = _minors(full[0], full[1]), _minors(full[2], full[3])
+
+    def expand(order: Sequence[int]) -> Value:
+        total: Value = 0.0
+        for i, j in combinations(range(BY_MINORS), 2):
+            k, m = (x for x in range(BY_MINORS) if x not in (i, j))
+            sign, one = _signed(upper, order[i], order[j])
+            other_sign, other = _signed(lower, order[k], order[m])
+            total = plus(total, sign * other_sign * (-1) ** (i + j + 1), _times(one, other))
+        return total
+
+    determinant = expand(range(BY_MINORS))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        scale = np.divide(1.0, determinant)
+        unknowns = [
+            expand([BY_MINORS if column == j else column for column in range(BY_MINORS)]) * scale for j in range(count)
+        ]
+    return unknowns, determinant
+
+
+def _minors(one: Sequence[Value], two: Sequence[Value]) -> dict[tuple[int, int], Value]:
+    return {
+        (i, j): plus(_times(one[i], two[j]), -1, _times(one[j], two[i])) for i, j in combinations(range(len(one)), 2)
+    }
+
+
+def _signed(minors: dict[tuple[int, int], Value], i: int, j: int) -> tuple[int, Value]:
+    return (1, minors[i, j]) if i < j else (-1, minors[j, i])
+
+
+def _times(a: Value, b: Value) -> Value:
+    """Product without a pass over an array where one factor is plainly 0 or 1."""
+    for one, other in ((a, b), (b, a)):
+        if isinstance(one, float) and one in (0.0, 1.0):
+            return 0.0 if one == 0.0 else other
+    return a * b
+
+
+def _by_matrix(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple[list[Value], Value]:
+    shape = np.broadcast_shapes(*(np.shape(e) for row in rows for e in row), *(np.shape(e) for e in right))
+    matrix = np.stack([np.stack([np.broadcast_to(c, shape) for c in row], axis=-1) for row in rows], axis=-2)
+    sides = np.stack([np.broadcast_to(e, shape) for e in right], axis=-1)
+    good = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)) & np.isfinite(sides).all(axis=-1))
+    identity = np.eye(len(rows))
+    determinant = np.linalg.det(np.where(good[..., None, None], matrix, identity))
+    determinant = np.where(good, determinant, 0.0)
+    good &= determinant != 0
+    solution = np.linalg.solve(np.where(good[..., None, None], matrix, identity), sides[..., None])[..., 0]
+    solution = np.where(good[..., None], solution, np.nan)
+    return [solution[..., j] for j in range(len(rows))], determinant
