@@ -104,7 +104,7 @@ def _moves(state: State, group: Group) -> list[Rates]:
     structure = state.structure
     count = len(group.angles) + len(group.slides)
     nodes: list[list[Value]] = [[0.0j] * len(state.nodes) for _ in range(count)]
-    into = {}
+    into: dict[int, tuple[tuple[int, int], ...]] = {}
     for k, sign in group.tree:
         edge = structure.edges[k]
         tail, head = (edge.tail, edge.head) if sign > 0 else (edge.head, edge.tail)

@@ -49,7 +49,8 @@ class Plan:
         wanted = self.mechanism.description.branch == "follow"
         return ChangePoints(self) if wanted and len(self.structure.given) == 1 and any(self.modes) else None
 
-    def _modes(self, given: Sequence[Value]) -> Sequence[Value]:
+    def modes_at(self, given: Sequence[Value]) -> Sequence[Value]:
+        """Assembly mode of each group at given values: as drawn, or changed at change points that are followed."""
         return self.modes if self.change_points is None else self.change_points.modes(given[0])
 
     @quiet
@@ -69,11 +70,12 @@ class Plan:
     def _start(self, at: Configuration | None) -> Start:
         at = self.mechanism.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
-        guess = unknowns_of(self.structure, self._all_rotations(at, given), at.slides)
+        guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides)
         state = self.run(given, at.vectors, guess)
         return Start(given, at.places, guess, [np.sign(d) for d in state.determinants])
 
-    def _all_rotations(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
+    def all_rotations(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
+        """Rotations of a solved pose's classes, and of those that stand for given distances."""
         extra = []
         for position, (_, k) in enumerate(self.structure.spans):
             edge = self.structure.edges[len(self.mechanism.graph.edges) + position]
@@ -124,7 +126,7 @@ class Plan:
         guess: Guess | None = None
         if self.iterative:
             guess, reached = self._follow(values, dims, shape, start)
-        state = self.run(values, vectors, guess, self._modes(values))
+        state = self.run(values, vectors, guess, self.modes_at(values))
         return self.configuration(state, shape, dims, vectors, reached, limits)
 
     def _follow(
@@ -150,7 +152,7 @@ class Plan:
         found, reached = follow(
             self.structure,
             lambda given, places, guess, steps: self.run(
-                given, geometry.vectors(places), guess, self._modes(given), steps
+                given, geometry.vectors(places), guess, self.modes_at(given), steps
             ),
             begin,
             [flat(v) for v in values],

@@ -23,6 +23,7 @@ def run(
     given: Sequence[Value] = (),
     size: float = 1.0,
     steps: int = STEPS,
+    begin: int = 0,
 ) -> State:
     """Solve all groups in order.
 
@@ -35,8 +36,12 @@ def run(
         Where Newton's method starts, for the groups without a closed form.
     size, steps
         See `mechdesign.mechanism.newton.solve_newton`.
+    begin : int
+        First group to solve; those before it are known already.
     """
     for index, (group, mode) in enumerate(zip(state.structure.groups, modes, strict=False)):
+        if index < begin:
+            continue
         if group.form == "newton":
             assert guess is not None
             solve_newton(state, index, *guess[index], given, size, steps)

@@ -234,7 +234,7 @@ def _variables(graph: Graph, roots: Sequence[int], coordinate: Coordinate) -> li
     if coordinate.kind == "angle":
         return [("angle", roots[graph.bodies[body][0]]) for body in (coordinate.body, coordinate.reference)]
     if coordinate.kind == "distance":
-        return [(axis, node) for node in (coordinate.node, coordinate.other) for axis in ("x", "y")]  # type: ignore[misc]
+        return [(axis, node) for node in (coordinate.node, coordinate.other) for axis in ("x", "y")]
     if coordinate.kind == "slide":
         return [("slide", coordinate.slide)]
     return [(coordinate.kind, coordinate.node)]

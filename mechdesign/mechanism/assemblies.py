@@ -1,0 +1,162 @@
+"""All assembly modes of a mechanism: every way in which its groups can be put together from given coordinates."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.errors import MechanismError
+from mechdesign.mechanism.algebra import wrap
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.state import Guess
+from mechdesign.mechanism.structure import Group
+
+if TYPE_CHECKING:
+    from mechdesign.mechanism.mechanism import Mechanism
+
+# Bound of the assemblies that are listed and followed.
+MOST = 256
+# Starts of Newton's method from which the assemblies of a group without a closed form are found, and its steps.
+STARTS = 512
+STEPS = 40
+# Solutions nearer than this (radians, or parts of the mechanism's size) are the same.
+SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """One assembly mode.
+
+    Parameters
+    ----------
+    label : str
+        The joint that decides of each group with its mode, ``B+ F-``; a number for groups without a closed form.
+    mechanism : Mechanism
+        The same mechanism, whose plan for the given coordinates keeps this assembly.
+    drawn : bool
+        Whether it is the sketch's.
+    """
+
+    label: str
+    mechanism: Mechanism
+    drawn: bool
+
+
+def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
+    """Names of the joints whose place the assembly mode of a group chooses; those of slides where it has no other."""
+    edges = [graph.edges[k] for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)]
+    ends = {node for loop in group.loops for node in (loop.start, loop.end)}
+    inner = [node for edge in edges for node in (edge.tail, edge.head) if node not in ends]
+    names = [graph.nodes[node] for node in dict.fromkeys(inner) if ":" not in graph.nodes[node]]
+    return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)
+
+
+def assemblies(mechanism: Mechanism, given: Sequence[str]) -> tuple[Assembly, ...]:
+    """Every assembly mode of the plan of given coordinates, the sketch's first.
+
+    Groups with a closed form have two modes each, whether or not they close at the sketch. Those of a group without
+    one are searched at the sketch's values of the given coordinates by Newton's method from many starts: all that were
+    found are followed, and there may be more.
+
+    Raises
+    ------
+    MechanismError
+        If there are more than 256, or the coordinates do not determine the mechanism.
+    """
+    plan = mechanism.plan(given)
+    choosing = [index for index, mode in enumerate(plan.modes) if mode]
+    if 2 ** len(choosing) > MOST:
+        raise MechanismError(f"{len(choosing)} joints choose the assembly: more than {MOST} modes", "mechanism.sketch")
+    found: list[Assembly] = []
+    for signs in product((1, -1), repeat=len(choosing)):
+        modes = list(plan.modes)
+        for index, sign in zip(choosing, signs, strict=True):
+            modes[index] *= sign
+        names = [
+            f"{deciding_joints(mechanism.graph, plan.structure.groups[index])[0]}{modes[index]:+d}"[:-1]
+            for index in choosing
+        ]
+        drawn = modes == list(plan.modes)
+        if not plan.iterative:
+            found.append(Assembly(" ".join(names) or "only", _variant(mechanism, plan, modes, None), drawn))
+            continue
+        for number, configuration in enumerate(_solutions(plan, modes, drawn), 1):
+            label = " ".join([*names, f"#{number}"])
+            found.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
+            if len(found) > MOST:
+                raise MechanismError(f"more than {MOST} assembly modes", "mechanism.sketch")
+    return tuple(found)
+
+
+def _variant(
+    mechanism: Mechanism, plan: Plan, modes: Sequence[int], configuration: Configuration | None
+) -> Mechanism:  # fmt: skip
+    other = copy.copy(mechanism)
+    mine = Plan(other, plan.structure, modes)
+    key = tuple(coordinate.name for coordinate in plan.structure.given)
+    other.adopt(key, mine)
+    if configuration is not None:
+        other.sketch_configuration = configuration
+    elif modes != list(plan.modes):
+        given = [mechanism.sketch_configuration.value(coordinate) for coordinate in plan.structure.given]
+        there = mine.solve(given, limits=False)
+        if there.valid:
+            other.sketch_configuration = there
+    return other
+
+
+def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configuration]:
+    """Assembled poses at the sketch's values for some modes of the closed forms; the sketch first, if it is one."""
+    sketch = plan.mechanism.sketch_configuration
+    vectors = plan.mechanism.geometry.nominal
+    given = [np.asarray(sketch.value(coordinate), dtype=float) for coordinate in plan.structure.given]
+    random = np.random.default_rng(0)
+    size = plan.mechanism.size
+    guess: Guess = {
+        index: (
+            [random.uniform(-np.pi, np.pi, STARTS) for _ in group.angles],
+            [random.uniform(-2 * size, 2 * size, STARTS) for _ in group.slides],
+        )
+        for index, group in enumerate(plan.structure.groups)
+        if group.form == "newton"
+    }
+    state = plan.run(given, vectors, guess, modes, STEPS)
+    solved: NDArray[np.bool_] = np.ones(STARTS, dtype=bool)
+    for converged in state.converged:
+        solved &= converged
+    every = plan.configuration(state, (STARTS,), {}, vectors, solved, limits=False)
+    found = [sketch] if drawn else []
+    for lane in np.flatnonzero(every.valid):
+        one = every.take(int(lane))
+        if not any(_same(one, other, size) for other in found):
+            found.append(one)
+    return found
+
+
+def _same(one: Configuration, other: Configuration, size: float) -> bool:
+    turns = [wrap(np.angle(a) - np.angle(b)) for a, b in zip(one.rotations, other.rotations, strict=True)]
+    shifts = [(a - b) / size for a, b in zip(one.slides, other.slides, strict=True)]
+    return bool(np.all(np.abs([*turns, *shifts]) < SAME))
+
+
+def in_words(mechanism: Mechanism) -> list[str]:
+    """How many assembly modes the drives leave, and which joints choose them."""
+    plan = mechanism.forward
+    choosing = [group for group, mode in zip(plan.structure.groups, plan.modes, strict=True) if mode]
+    joints = [" or ".join(deciding_joints(mechanism.graph, group)[:1]) for group in choosing]
+    if not plan.iterative:
+        if not joints:
+            return ["assembly modes: 1"]
+        return [f"assembly modes: {2 ** len(joints)}, chosen by {', '.join(joints)} (2 each)"]
+    free = [j for g in plan.structure.groups if g.form == "newton" for j in deciding_joints(mechanism.graph, g)]
+    count = len(assemblies(mechanism, mechanism.drives))
+    also = f"; {', '.join(joints)} have 2 each" if joints else ""
+    return [f"assembly modes: {count} found at the sketch's drive values, for {', '.join(dict.fromkeys(free))}{also}"]
