@@ -6,7 +6,8 @@ from matplotlib.patches import PathPatch
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.mechanism import draw_mechanism, mechanism_figure
+from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.scene import hull, pose
 
 SLIDER = """

@@ -1,125 +1,32 @@
-"""Drawings of the mechanism: links, named joints, slides, ground and drives."""
+"""The mechanism as the study means it: its sketch pose, its first pose, and how roughly the sketch is drawn."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
-from mechdesign.report.figures.annotations import Turn, drive_arrows, name_labels, obstacles
-from mechdesign.report.figures.labels import place_labels
-from mechdesign.report.figures.scene import GROUND, Scene, hull, pose, travels
-from mechdesign.report.figures.shapes import Pen
+from mechdesign.report.figures.drawing import Travel, draw_mechanism
+from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, fit, framed, scale_of
+from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.scene import Scene, pose, travels
+from mechdesign.report.figures.sweep import solve_sweep
 
 if TYPE_CHECKING:
     from mechdesign.mechanism import Mechanism
     from mechdesign.mechanism.configuration import Configuration
     from mechdesign.study import Study
 
-DRIVE = style.VERMILION
 Panel = tuple[str, "Configuration", int]
-LINKS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
-_TRAVEL_POSES = 100  # poses from which the travel of the slides is taken
-# Inches around a panel's drawing (for symbols and names), left of it, below and above it (for axis labels and title).
-_PAD, _LEFT, _BELOW, _ABOVE = 0.5, 0.68, 0.55, 0.42
-_LINE, _LETTERS = 0.18, 11.5  # height of a further line of a title, and letters in an inch of it
-
-
-def link_colors(mechanism: Mechanism) -> dict[str, str]:
-    """The colour of each link, the same in every picture."""
-    moving = [name for name in mechanism.description.links if name != GROUND]
-    return {name: LINKS[k % len(LINKS)] for k, name in enumerate(moving)} | {GROUND: style.INK}
-
-
-def draw_mechanism(
-    axes: Axes,
-    mechanism: Mechanism,
-    configuration: Configuration,
-    index: int = 0,
-    *,
-    faint: bool = False,
-    labels: bool = True,
-    drives: bool = True,
-    travel: Mapping[str, tuple[float, float]] | None = None,
-) -> None:
-    """Draw a mechanism in one pose of a batch; a pose that cannot be assembled draws nothing.
-
-    Sizes of symbols are in points on paper, so that limits may change after drawing; only labels need final limits.
-
-    Parameters
-    ----------
-    index : int
-        Pose in the flattened batch.
-    faint : bool
-        Pale and below what is drawn otherwise, without labels and drives: for further poses.
-    travel : mapping, optional
-        Range of each slide (lengths from the line's origin), which its guide should cover.
-    """
-    scene = pose(mechanism, configuration, index)
-    if scene is None:
-        return
-    colors = link_colors(mechanism)
-    pen = Pen(axes, alpha=0.22, order=2.0) if faint else Pen(axes)
-    for point in scene.pivots():
-        pen.pivot(scene.points[point])
-    _draw_guides(pen, scene, colors, travel or {})
-    for name, link in scene.description.links.items():
-        if name == GROUND:
-            continue
-        places = [scene.points[point] for point in scene.link_points(name)]
-        if link.telescopic and link.ends:
-            pen.leg(scene.points[link.ends[0]], scene.points[link.ends[1]], colors[name])
-            body = hull([scene.points[point] for point in link.points])
-        else:
-            body = hull(places)
-        if len(body) > 2:
-            pen.plate(body, colors[name])
-        elif len(body) == 2:
-            pen.bar(body, colors[name])
-    for point, kind in scene.kinds().items():
-        if kind == "pin":
-            pen.pin(scene.points[point])
-        elif kind == "clamp":
-            pen.clamp(scene.points[point])
-        elif kind == "tracer":
-            owner = next(name for name in scene.description.links if point in scene.link_points(name))
-            pen.tracer(scene.points[point], colors[owner])
-    if faint:
-        return
-    arrows = drive_arrows(scene) if drives else ()
-    for arrow in arrows:
-        if isinstance(arrow, Turn):
-            pen.turn(arrow.place, arrow.start, arrow.sweep, arrow.radius, DRIVE)
-        else:
-            pen.push(arrow.place, arrow.along, arrow.length, arrow.away, DRIVE)
-    if labels:
-        named = name_labels(scene, colors, arrows, DRIVE)
-        place_labels(axes, named, obstacles(axes, scene, arrows, travel or {}), order=pen.order + 2)
-
-
-def _draw_guides(
-    pen: Pen, scene: Scene, colors: Mapping[str, str], travel: Mapping[str, tuple[float, float]]
-) -> None:  # fmt: skip
-    for guide in scene.guides:
-        start, end = guide.ends(travel, scene.span)
-        if guide.owner == GROUND:
-            pen.rail(start, end)
-        else:
-            # The link reaches from where its line begins to beyond the slider.
-            places = [scene.points[point] for point in scene.link_points(guide.owner)]
-            along = [((place - guide.origin) * guide.along.conjugate()).real for place in places]
-            along += [((place - guide.origin) * guide.along.conjugate()).real for place in (start, end)]
-            pen.bar([guide.origin + s * guide.along for s in (min(along), max(along))], colors[guide.owner])
-            if guide.slider is None:
-                pen.slot((start, end))
-        if guide.slider is not None:
-            pen.block(guide.pin, guide.along, colors[guide.slider])
+_POSES = 100  # poses from which the range of the motion is taken
+_TITLE, _LINE, _LETTERS = 0.42, 0.18, 11.5  # inches for a title and a further line of it, letters in an inch
+_SAME = 0.02  # part of the mechanism's size by which the points of two poses differ that need not both be drawn
+_ROUGH = 10.0  # points on paper: a place drawn nearer than this lies under the symbol of its joint
+_TALLEST = 4.2
 
 
 def mechanism_figure(study: Study) -> Figure:
@@ -128,55 +35,53 @@ def mechanism_figure(study: Study) -> Figure:
     sketch = mechanism.sketch_configuration
     panels: list[Panel] = [("sketch pose", sketch, 0)]
     scenes = [pose(mechanism, sketch)]
-    solved = _poses(study)
-    if solved is not None:
-        configuration, titles = solved
-        poses = [pose(mechanism, configuration, k) for k in range(len(titles))]
-        first = next((k for k, scene in enumerate(poses) if scene is not None), None)
-        if first is not None:
-            note = "first pose" if first == 0 else "first pose that can be assembled"
-            if _same(scenes[0], poses[first]):
-                panels = []
-                note = f"sketch and {note}"
-            panels.append((f"{note}: {titles[first]}", configuration, first))
-            scenes += poses
-    return _compose(mechanism, panels, travels([scene for scene in scenes if scene is not None]), study.units.length)
-
-
-def _poses(study: Study) -> tuple[Configuration, list[str]] | None:
-    """Poses over the whole range of the study's kinematics, the first one first, and their coordinates in words."""
     try:
-        group = study.poses("kinematics").groups[0]
-        rows = np.unique(np.linspace(0, len(group.rows) - 1, _TRAVEL_POSES).astype(int))
-        quantities = [study.mechanism.quantity(name) for name in group.names]
-        factors = [study.units.angle_factor if quantity == "angle" else 1.0 for quantity in quantities]
-        values = [group.values[name][rows] for name in group.names]
-        given = [column * factor for column, factor in zip(values, factors, strict=True)]
-        configuration = study.mechanism.plan(group.names).solve(given)
+        sweep = solve_sweep(study, _POSES)
     except MechdesignError:
-        return None
-    labels = [study.units.label(quantity) for quantity in quantities]
-    # A title may be broken between coordinates only.
-    words = [
-        ", ".join(
-            f"{name} = {value:.4g} {label}".rstrip().replace(" ", "\N{NO-BREAK SPACE}")
-            for name, value, label in zip(group.names, row, labels, strict=True)
-        )
-        for row in zip(*values, strict=True)
-    ]
-    return configuration, words
+        return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.length)
+    poses = [pose(mechanism, sweep.configuration, k) for k in range(len(sweep.rows))]
+    first = next((k for k, scene in enumerate(poses) if scene is not None), None)
+    if first is not None:
+        note = "first pose" if first == 0 else "first pose that can be assembled"
+        if _same(scenes[0], poses[first]):
+            panels = []
+            note = f"sketch and {note}"
+        panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
+        scenes += poses
+    return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.length)
+
+
+def sketch_figure(study: Study) -> Figure:
+    """The sketch as it is assembled, with crosses where points are drawn elsewhere; use inside `style.context`."""
+    mechanism = study.mechanism
+    scene = pose(mechanism, mechanism.sketch_configuration)
+    assert scene is not None
+    places = [*scene.points.values(), *(end for guide in scene.guides for end in guide.ends({}, scene.span))]
+    drawn = mechanism.description.sketch
+    figure, axes = framed([*places, *drawn.values()], study.units.length, height=5.4, above=_TITLE)
+    ends = np.array([(place, scene.points[name]) for name, place in drawn.items()], dtype=complex).reshape(-1, 2)
+    moves = paper(axes, ends[:, 0]) - paper(axes, ends[:, 1])
+    rough = ends[np.hypot(*moves.T) > _ROUGH]
+    for line in rough:
+        axes.plot(line.real, line.imag, color=style.FAINT, linewidth=0.9, linestyle=":", zorder=2.4)
+    crosses = rough[:, 0]
+    axes.plot(crosses.real, crosses.imag, "x", color=style.FAINT, markersize=7, markeredgewidth=1.5)
+    axes.set_title("the sketch, assembled" + ("; crosses: where it is drawn" if len(rough) else ""), loc="left")
+    draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=crosses)
+    return figure
+
+
+def _drawable(scenes: list[Scene | None]) -> list[Scene]:
+    return [scene for scene in scenes if scene is not None]
 
 
 def _same(one: Scene | None, other: Scene | None) -> bool:
     if one is None or other is None:
         return False
-    near = 0.02 * one.span
-    return all(abs(one.points[name] - other.points[name]) <= near for name in one.points)
+    return all(abs(one.points[name] - other.points[name]) <= _SAME * one.span for name in one.points)
 
 
-def _compose(
-    mechanism: Mechanism, panels: list[Panel], travel: Mapping[str, tuple[float, float]], unit: str
-) -> Figure:  # fmt: skip
+def _compose(mechanism: Mechanism, panels: list[Panel], travel: Travel, unit: str) -> Figure:
     """Panels beside or above each other, whichever shows the mechanism larger."""
     places: list[complex] = []
     for _, configuration, index in panels:
@@ -185,32 +90,27 @@ def _compose(
         places += scene.points.values()
         for guide in scene.guides:
             places += guide.ends(travel, scene.span)
-    found = np.array(places)
-    wide, tall = max(float(np.ptp(found.real)), 1e-9), max(float(np.ptp(found.imag)), 1e-9)
+    _, wide, tall = extent(places)
     count = len(panels)
 
     def scale(columns: int) -> float:
-        width, height = _room(columns, count // columns)
-        return min((width - 2 * _PAD) / wide, (height - 2 * _PAD) / tall)
+        return scale_of(wide, tall, *_room(columns, count // columns))
 
     columns = count if count == 1 or scale(count) >= 0.55 * scale(1) else 1
     rows = count // columns
-    inches = scale(columns)
-    width, _ = _room(columns, rows)
-    height = max(inches * tall + 2 * _PAD, 1.5)
-    titles = [textwrap.fill(title, int(width * _LETTERS)) for title, _, _ in panels]
-    above = _ABOVE + _LINE * max(title.count("\n") for title in titles)
-    outer = rows * (height + above) + _BELOW
+    window: Window = fit(places, *_room(columns, rows))
+    titles = [textwrap.fill(title, int(window.width * _LETTERS)) for title, _, _ in panels]
+    above = _TITLE + _LINE * max(title.count("\n") for title in titles)
+    outer = rows * (window.height + above) + BELOW
     figure = style.new_figure(style.WIDTH, outer, layout=None)
-    middle = complex(np.ptp(found.real) / 2 + found.real.min(), np.ptp(found.imag) / 2 + found.imag.min())
     for k, (_, configuration, index) in enumerate(panels):
         column, row = k % columns, k // columns
-        left = _LEFT + column * (width + _LEFT)
-        low = _BELOW + (rows - 1 - row) * (height + above)
-        axes = figure.add_axes((left / style.WIDTH, low / outer, width / style.WIDTH, height / outer))
-        axes.set_xlim(middle.real - width / 2 / inches, middle.real + width / 2 / inches)
-        axes.set_ylim(middle.imag - height / 2 / inches, middle.imag + height / 2 / inches)
-        axes.set_aspect("equal")
+        left = LEFT + column * (window.width + LEFT)
+        low = BELOW + (rows - 1 - row) * (window.height + above)
+        axes = figure.add_axes(
+            (left / style.WIDTH, low / outer, window.width / style.WIDTH, window.height / outer)
+        )  # fmt: skip
+        window.limit(axes)
         axes.set_title(titles[k], loc="left")
         axes.set_ylabel(style.axis_label("y", unit))
         if row == rows - 1:
@@ -223,4 +123,4 @@ def _compose(
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    return (style.WIDTH - 0.15 - _LEFT * columns) / columns, 3.0 if rows > 1 else 4.2
+    return (style.WIDTH - RIGHT - LEFT * columns) / columns, 3.0 if rows > 1 else _TALLEST

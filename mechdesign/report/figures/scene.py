@@ -54,19 +54,15 @@ class Scene:
         World place of every named point.
     rotations : mapping of str to complex
         Unit vector of every link's x axis.
+    span : float
+        Width or height of the sketch pose, the larger: what guides are drawn longer by must not change with the pose.
     """
 
     description: Description
     points: Mapping[str, complex]
     rotations: Mapping[str, complex]
     guides: tuple[Guide, ...]
-
-    @property
-    def span(self) -> float:
-        """Width or height of the pose, the larger."""
-        places = self.points.values()
-        widths = [max(part) - min(part) for part in ([p.real for p in places], [p.imag for p in places])]
-        return max(*widths, 1e-12)
+    span: float
 
     def link_points(self, name: str) -> tuple[str, ...]:
         """Names of a link's points, its ends first."""
@@ -145,7 +141,9 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
         origin, along = line(joint.line)
         slider = None if isinstance(joint, Slot) else joint.slider
         guides.append(Guide(name, joint.line.link, joint.point, origin, along, points[joint.point], slider))
-    return Scene(description, points, rotations, tuple(guides))
+    drawn = np.array([mechanism.sketch_configuration.point(name) for name in points])
+    span = max(float(np.ptp(drawn.real)), float(np.ptp(drawn.imag)), 1e-12)
+    return Scene(description, points, rotations, tuple(guides), span)
 
 
 def travels(scenes: Sequence[Scene]) -> dict[str, tuple[float, float]]:

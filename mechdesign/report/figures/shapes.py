@@ -51,10 +51,11 @@ class Pen:
     axes: Axes
     alpha: float = 1.0
     order: float = 3.0
+    size: float = 1.0
 
     def _line(self, ends: Sequence[complex], lift: float, width: float, color: Color, **more: Any) -> Line2D:
         line = Line2D(
-            [end.real for end in ends], [end.imag for end in ends], lw=width, color=color, alpha=self.alpha,
+            [end.real for end in ends], [end.imag for end in ends], lw=width * self.size, color=color, alpha=self.alpha,
             zorder=self.order + lift, **more,
         )  # fmt: skip
         self.axes.add_line(line)
@@ -66,25 +67,30 @@ class Pen:
         assert figure is not None
         # The stubs ask for an affine transform; any that maps the place to pixels will do.
         moved = ScaledTranslation(place.real, place.imag, self.axes.transData)  # type: ignore[arg-type]
-        return Affine2D().rotate(turn).scale(1 / 72) + figure.dpi_scale_trans + moved
+        return Affine2D().rotate(turn).scale(self.size / 72) + figure.dpi_scale_trans + moved
 
     def _symbol(self, path: Path, transform: Transform, lift: float, **look: Any) -> None:
         self.axes.add_artist(
             PathPatch(path, transform=transform, alpha=self.alpha, zorder=self.order + lift, clip_on=True, **look)
         )
 
+    def line(self, ends: Sequence[complex], color: str) -> None:
+        """A link as a thin line along its points: for ghosts."""
+        self._line(ends, 0.1, 1.9, color, solid_capstyle="round", solid_joinstyle="round")
+
     def bar(self, ends: Sequence[complex], color: str, width: float = BAR) -> None:
         """A link as a bar with round ends along a line of points."""
         self._line(ends, 0.1, width, color, solid_capstyle="round", solid_joinstyle="round")
         self._line(ends, 0.11, width - 2.4, lighter(color), solid_capstyle="round", solid_joinstyle="round")
 
-    def plate(self, corners: Sequence[complex], color: str) -> None:
-        """A link with more than two points as a plate with round corners."""
+    def plate(self, corners: Sequence[complex], color: str, rank: int = 0) -> None:
+        """A link with more than two points as a plate with round corners; a higher rank lies on a lower one."""
         vertices = [(corner.real, corner.imag) for corner in corners]
-        for lift, width, shade in ((0.1, BAR, color), (0.11, BAR - 2.4, lighter(color))):
+        below = 0.1 * (1 - 0.5**rank)
+        for lift, width, shade in ((below, BAR, color), (below, BAR - 2.4, lighter(color))):
             self.axes.add_patch(
-                Polygon(vertices, closed=True, facecolor=shade, edgecolor=shade, lw=width, joinstyle="round",
-                        alpha=self.alpha, zorder=self.order + lift)
+                Polygon(vertices, closed=True, facecolor=shade, edgecolor=shade, lw=width * self.size,
+                        joinstyle="round", alpha=self.alpha, zorder=self.order + lift)
             )  # fmt: skip
 
     def slot(self, ends: Sequence[complex]) -> None:
@@ -134,7 +140,7 @@ class Pen:
         down = rail_side(along)
         figure = self.axes.get_figure(root=True)
         assert figure is not None
-        shift = down * (BLOCK[1] / 2 + 1.2) / 72
+        shift = down * (BLOCK[1] / 2 + 1.2) * self.size / 72
         offset = self.axes.transData + ScaledTranslation(shift.real, shift.imag, figure.dpi_scale_trans)
         # Ticks stand to the left of the path's direction: run so that this is away from the slider.
         first, last = (start, end) if (1j * along * down.conjugate()).real > 0 else (end, start)

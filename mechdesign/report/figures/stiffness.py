@@ -12,8 +12,8 @@ from mechdesign.analyses.stiffness import ask, evaluate
 from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import name_labels, obstacles
+from mechdesign.report.figures.drawing import draw_mechanism, link_colors
 from mechdesign.report.figures.labels import place_labels
-from mechdesign.report.figures.mechanism import draw_mechanism, link_colors
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
 from mechdesign.results import Result

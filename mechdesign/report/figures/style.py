@@ -30,6 +30,8 @@ INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
 
+_PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
+
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 10,
@@ -76,7 +78,9 @@ def new_figure(
 
 
 def axis_label(name: str, unit: str = "") -> str:
-    """``name [unit]``, or the name alone where there is no unit."""
+    """``name [unit]``, or the name alone where there is no unit; powers and products as they are set in print."""
+    for plain, printed in _PRINTED.items():
+        unit = unit.replace(plain, printed)
     return f"{name} [{unit}]" if unit else name
 
 

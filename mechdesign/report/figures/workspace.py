@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.mechanism import draw_mechanism
+from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.results import Result, Table
 
 if TYPE_CHECKING:

@@ -1,0 +1,63 @@
+"""The mechanism in several poses of its motion, with the paths of its points."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
+from mechdesign.report.figures.framing import framed
+from mechdesign.report.figures.scene import link_points
+from mechdesign.report.figures.sweep import Sweep, ranks
+
+TALLEST = 5.6
+# Ghosts for that many moving links at most, and how much of a ghost is colour.
+_GHOSTS = ((3, 7, 0.42), (5, 6, 0.38), (8, 4, 0.32), (10**6, 2, 0.3))
+# Line width and share of colour of a path by the rank of its point.
+_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
+_MARKS = 240  # places of a path that names keep off
+
+
+def paths_figure(sweep: Sweep) -> Figure:
+    """The first valid pose with its names, ghosts of later ones, and the path of every moving point."""
+    figure, axes = framed(sweep.extent, sweep.study.units.length, height=TALLEST)
+    count = len(sweep.mechanism.description.links) - 1
+    _, ghosts, share = next(entry for entry in _GHOSTS if count <= entry[0])
+    # A closed motion ends where it begins: its last ghost would hide the first.
+    some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
+    for index in np.unique(some[1 : -1 if sweep.closed else None]):
+        draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index), share=share)
+    draw_paths(axes, sweep)
+    avoid = np.concatenate([_thinned(path) for path in sweep.places.values()])
+    first = int(sweep.valid[0])
+    draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel, avoid=avoid)
+    return figure
+
+
+def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
+    """Draw the path of every moving point, the more boldly the more it tells."""
+    section = sweep.study.kinematics
+    asked = section.outputs if section is not None and section.outputs is not None else ()
+    ranked = ranks(sweep.mechanism, tuple(asked))
+    # Where no point tells more than the others, none is thin.
+    lift = 2 - max(ranked.values(), default=2)
+    colors = link_colors(sweep.mechanism)
+    owners: dict[str, str] = {}
+    for name, link in sweep.mechanism.description.links.items():
+        if name != GROUND:
+            for point in link_points(link):
+                owners.setdefault(point, name)
+    for point, path in sweep.places.items():
+        line, share = _LOOKS[min(ranked[point] + lift, 2)]
+        axes.plot(
+            path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,
+            zorder=2.5 + 0.1 * ranked[point], solid_joinstyle="round",
+        )  # fmt: skip
+
+
+def _thinned(path: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    known = path[np.isfinite(path)]
+    return known[np.unique(np.linspace(0, len(known) - 1, _MARKS).astype(int))] if len(known) else known
