@@ -1,4 +1,4 @@
-"""Scalars of a Jacobian: determinant and inverse condition, with a length where lengths and angles mix."""
+"""Jacobians and their scalars: determinant and inverse condition, with a length where lengths and angles mix."""
 
 from __future__ import annotations
 
@@ -9,8 +9,24 @@ from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.rates import Rates
 
 Array = NDArray[np.float64]
+
+
+def jacobian(linear: Linearization, rates: Rates, rows: Sequence[Coordinate]) -> Array:
+    """Derivatives of coordinates by the drives, per radian; shape (..., rows, drives).
+
+    Parameters
+    ----------
+    rates : Rates
+        Derivatives of everything by each drive, ``linear.drives()``.
+    """
+    full = (len(linear.structure.given), *linear.configuration.shape)
+    found = np.stack([np.broadcast_to(first(linear.configuration, c, rates), full) for c in rows])
+    return np.moveaxis(found, (0, 1), (-2, -1))
 
 
 def mixes(rows: Sequence[Coordinate], columns: Sequence[Coordinate]) -> bool:

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses import reliability_tables as tables
 from mechdesign.analyses.assembly import forward_plan
+from mechdesign.analyses.continuity import continuous
 from mechdesign.analyses.error_limits import Band, Disc
 from mechdesign.analyses.first_order import Channel, FirstOrder, Rates, linear_errors, nominal_values
-from mechdesign.analyses.kinematics import continuous, default_outputs
+from mechdesign.analyses.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, judge_failures, radians, solve_poses
 from mechdesign.analyses.simulation import Setting, Sums, simulate
 from mechdesign.analyses.sources import Source, find_sources
@@ -257,6 +258,10 @@ def _in_order(study: Study, poses: Poses, question: Question, nominal: NominalPo
     for row, channel in zip(values, question.channels, strict=True):
         if channel.coordinate.quantity == "angle":
             row /= study.units.angle_factor
-            if channel.order == 0 and not poses.listed:
-                row[:] = continuous(row, study, poses.grid)
+    if not poses.listed:
+        turning = {c.coordinate.name: (row, c.coordinate) for row, c in zip(values, question.channels, strict=True)
+                   if c.order == 0 and c.coordinate.quantity == "angle"}  # fmt: skip
+        rows = {name: row for name, (row, _) in turning.items()}
+        for name, row in continuous(study, poses, [c for _, c in turning.values()], rows).items():
+            rows[name][:] = row
     return values

@@ -6,10 +6,8 @@ import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from mechdesign.errors import MechanismError, StudyError
-from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study import poses
+from mechdesign.study import pose_checks, targets
 from mechdesign.study.document import Path
 from mechdesign.study.names import Names
 from mechdesign.study.numbers import suggestion
@@ -29,21 +27,22 @@ from mechdesign.study.sections import (
 from mechdesign.study.units import KINDS, QUANTITY, QuantityError, describe, measure
 
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
-_RATE_KINDS: dict[Quantity, str] = {"length": "velocity", "angle": "angular_velocity"}
-_ACCELERATION_KINDS: dict[Quantity, str] = {"length": "acceleration", "angle": "angular_acceleration"}
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
-def check(parts: Mapping[str, Any], names: Names, parameters: Parameters, reporter: Reporter) -> dict[str, Any]:
-    """Check all questions that validated; returns them with wildcards and defaults filled in."""
-    checker = _Checker(names, parameters, reporter)
+def check(
+    parts: Mapping[str, Any], names: Names, parameters: Parameters, reporter: Reporter, folder: pathlib.Path
+) -> dict[str, Any]:
+    """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
+    checker = Checker(names, parameters, reporter)
     found = dict(parts)
     for command in COMMANDS:
         section = parts.get(command)
         if isinstance(section, PoseSection):
-            checker.pose_coordinates(command, section)
+            pose_checks.coordinates(checker, command, section)
         if isinstance(section, KinematicsSection | ReliabilitySection):
-            checker.motion(command, section)
+            pose_checks.rates(checker, command, section)
+            checker.outputs(command, section)
         if isinstance(section, KinematicsSection):
             checker.loads(section)
         elif isinstance(section, WorkspaceSection):
@@ -55,32 +54,13 @@ def check(parts: Mapping[str, Any], names: Names, parameters: Parameters, report
         elif isinstance(section, StiffnessSection):
             found[command] = checker.stiffness(section)
     checker.conditions(("requirements",), parts["requirements"])
+    found["targets"] = targets.check(checker, names.section.targets, folder)
     return found
 
 
-def check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path) -> None:
-    """Check that the coordinates that poses give determine the mechanism, and that they are not too many."""
-    for command in COMMANDS:
-        section = parts.get(command)
-        if not isinstance(section, PoseSection):
-            continue
-        key = next((key for key in ("poses", "sweep", "path") if getattr(section, key) is not None), None)
-        if key is None:
-            continue
-        try:
-            found = poses.expand(section, folder)
-        except StudyError as error:
-            reporter.report((command, key), str(error))
-            continue
-        for group in found.groups if found is not None else ():
-            try:
-                mechanism.plan(group.names)
-            except MechanismError as error:
-                place: Path = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
-                reporter.report(place, str(error))
+class Checker:
+    """Looks names and units up, and notes what is wrong with them."""
 
-
-class _Checker:
     def __init__(self, names: Names, parameters: Parameters, reporter: Reporter) -> None:
         self.names = names
         self.parameters = parameters
@@ -106,8 +86,11 @@ class _Checker:
         if powers != KINDS[kind] and not (kind == "rotational_stiffness" and powers == KINDS["moment"]):
             self.reporter.report(path, f"{raw!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected")
 
-    def coordinate(self, name: str, path: Path, *, at_key: bool = False) -> Quantity | None:
-        """Kind of a coordinate; None, and noted, where there is none of that name."""
+    def coordinate(self, name: str, path: Path, *, at_key: bool = False, others: Iterable[str] = ()) -> Quantity | None:
+        """Kind of a coordinate; None, and noted, where there is none of that name.
+
+        `others` are names that might have stood there as well.
+        """
         quantity = self.names.coordinates.get(name)
         if quantity is None:
             if name in self.names.owners:
@@ -117,37 +100,11 @@ class _Checker:
             elif name in self.names.moving:
                 self.reporter.report(path, f"{name!r} is a link; its coordinate is {name}.angle", at_key=at_key)
             else:
-                self.known(name, self.names.coordinates, "coordinate", path, at_key=at_key)
+                what = "coordinate or parameter" if others else "coordinate"
+                self.known(name, [*self.names.coordinates, *others], what, path, at_key=at_key)
         return quantity
 
-    def pose_coordinates(self, command: str, section: PoseSection) -> None:
-        for index, pose in enumerate(section.poses or ()):
-            self._given(pose, (command, "poses", index))
-        for name in section.sweep or ():
-            path: Path = (command, "sweep", name)
-            quantity = self.coordinate(name, path, at_key=True)
-            for key in ("from", "to", "step"):
-                if quantity in ("length", "angle"):
-                    self.kind((*path, key), quantity)
-        for name in section.path or ():
-            if name not in self.names.owners:
-                self.coordinate(name, (command, "path", name), at_key=True)
-
-    def _given(self, values: Iterable[str], path: Path, kinds: Mapping[Quantity, str] | None = None) -> None:
-        for name in values:
-            quantity = self.coordinate(name, (*path, name), at_key=True)
-            kind = quantity if kinds is None or quantity is None else kinds.get(quantity)
-            if kind is not None and kind != "none":
-                self.kind((*path, name), kind)
-
-    def motion(self, command: str, section: KinematicsSection | ReliabilitySection) -> None:
-        self._given(section.rates, (command, "rates"), _RATE_KINDS)
-        self._given(section.accelerations, (command, "accelerations"), _ACCELERATION_KINDS)
-        for key, values in (("rates", section.rates), ("accelerations", section.accelerations)):
-            for name in values:
-                if name in self.names.coordinates and name not in self.names.drives:
-                    message = f"{name!r} is not a drive: {key} are those of {', '.join(self.names.drives)}"
-                    self.reporter.report((command, key, name), message, at_key=True)
+    def outputs(self, command: str, section: KinematicsSection | ReliabilitySection) -> None:
         seen: set[str] = set()
         for index, name in enumerate(section.outputs or ()):
             path: Path = (command, "outputs", index)

@@ -18,7 +18,7 @@ from mechdesign.errors import MechanismError, Problem, StudyError
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
-from mechdesign.study import checks, overrides, poses
+from mechdesign.study import checks, overrides, pose_checks, poses
 from mechdesign.study.build import Builder
 from mechdesign.study.document import Document, plain, read
 from mechdesign.study.models import MechanismSection, UnitsSection
@@ -36,6 +36,7 @@ from mechdesign.study.sections import (
     StudyFile,
     WorkspaceSection,
 )
+from mechdesign.study.targets import Target
 from mechdesign.study.units import Units, units_from
 
 
@@ -67,6 +68,8 @@ class Study:
         The questions; None where the study does not ask.
     requirements : tuple of Requirement
         The gate.
+    targets : mapping of str to Target
+        What outputs should be, by the coordinate or point.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Study:
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
     requirements: tuple[Requirement, ...]
+    targets: Mapping[str, Target]
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -156,10 +160,10 @@ def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), 
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     mechanism = None if reporter.concerns("mechanism", "units") else _compiled(description, reporter)
     parameters = builder.parameters(context.parameters, formulas)
-    parts = checks.check(parts, builder.names, parameters, reporter)
+    parts = checks.check(parts, builder.names, parameters, reporter, path.parent)
     reporter.done()
     assert mechanism is not None
-    checks.check_poses(parts, mechanism, reporter, path.parent)
+    pose_checks.check_poses(parts, mechanism, reporter, path.parent, 2.0 * math.pi / context.units.angle_factor)
     reporter.done()
     name = parts.get("name") or path.stem
     seed = parts["seed"] if seed is None else seed
@@ -185,6 +189,7 @@ def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), 
         reliability=parts.get("reliability"),
         stiffness=parts.get("stiffness"),
         requirements=parts["requirements"],
+        targets=parts["targets"],
     )
 
 

@@ -20,6 +20,7 @@ from mechdesign.study.numbers import (
     AnyName,
     AnyValue,
     Choice,
+    CoordinateName,
     DriveName,
     JointName,
     LengthValue,
@@ -28,13 +29,13 @@ from mechdesign.study.numbers import (
     OrShort,
     PointName,
     PositiveLengthValue,
-    Unavailable,
     Value,
     failure,
     or_short,
     shown,
     suggestion,
 )
+from mechdesign.study.target_models import TargetValue
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
 
@@ -240,7 +241,7 @@ class MechanismSection(Model):
     sketch: dict[PointName, Point] = {}
     measures: dict[MeasureName, Measure] = {}
     limits: tuple[Limit, ...] = ()
-    targets: Unavailable = None
+    targets: dict[CoordinateName, TargetValue] = {}
 
 
 class UnitsSection(Model):

@@ -159,8 +159,8 @@ def _path(path: Mapping[str, str | tuple[object, ...]], folder: Path) -> Poses:
     )
 
 
-def read_table(file: Path) -> Floats:
-    """Read a CSV file of one or two columns of numbers, with or without a line of names.
+def read_table(file: Path, most: int = 2) -> Floats:
+    """Read a CSV file of one to `most` columns of numbers, with or without a line of names.
 
     Raises
     ------
@@ -181,8 +181,9 @@ def read_table(file: Path) -> Floats:
             if rows or number > 1:
                 raise StudyError(f"{file}:{number}: {line!r} is not a row of numbers") from None
             continue
-        if len(row) > 2 or (rows and len(row) != len(rows[0])) or not all(map(math.isfinite, row)):
-            raise StudyError(f"{file}:{number}: a path has one or two columns of finite numbers")
+        if len(row) > most or (rows and len(row) != len(rows[0])) or not all(map(math.isfinite, row)):
+            columns = "one or two" if most == 2 else f"one to {most}"
+            raise StudyError(f"{file}:{number}: {line!r} is not a row of the same {columns} finite numbers")
         rows.append(row)
     if not rows:
         raise StudyError(f"{file} holds no numbers")

@@ -84,7 +84,7 @@ kinematics: {sweep: {theta: {from: 0, to: 360, step: 7.2}}, outputs: [B, theta]}
 """
     )
     result = kinematics(study)
-    assert result.tables["motion"].names == ("theta", "B.x", "B.y", "valid")
+    assert result.tables["motion"].names == ("theta", "B.x", "B.y", "conditioning", "valid")
     table = result.tables["extremes"]
     far, near = np.sqrt(160**2 - 20**2), np.sqrt(80**2 - 20**2)
     stretched, folded = 360 - np.degrees(np.arcsin(20 / 160)), 180 - np.degrees(np.arcsin(20 / 80))

@@ -69,8 +69,7 @@ MECHANISM = [
     ("length: 90", "length: 10", "9:11: mechanism.sketch: the sketch cannot be assembled"),
     ("A: [0, 30]", "A: [0, 30], Q: [1, 1]", "9:24: mechanism.sketch.Q: no link has a point 'Q'"),
     ("A: [0, 30]", "A: 30", "9:15: mechanism.sketch.A: expected [x, y], not the number 30"),
-    ("sketch:", "branch: follow\n  sketch:", "'follow' is not available in this version; available: side"),
-    ("sketch:", "targets: {B.x: 3}\n  sketch:", "9:12: mechanism.targets: is not available in this version"),
+    ("sketch:", "branch: folow\n  sketch:", "9:11: mechanism.branch: expected one of side, follow, not 'folow'"),
     ("sketch:", "measures: {mu: {angle: [rod, rokcer]}}\n  sketch:", "no link 'rokcer'; did you mean 'rocker'?"),
     ("sketch:", "measures: {mu: B.x - Q.x}\n  sketch:", "there is no coordinate 'Q.x'"),
     (

@@ -1,0 +1,80 @@
+"""Rates of a motion: of the drives, or of the coordinates that the poses give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.jacobians import determinant, jacobian
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.outputs import second
+
+Array = NDArray[np.float64]
+
+# At a dead centre the angle between links is known to the root of rounding only; below this sine it is at one.
+STALLED = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class DriveRates:
+    """Velocities and accelerations of the drives (radians and lengths), one entry a drive; nan where there are none."""
+
+    velocities: Sequence[Value]
+    accelerations: Sequence[Value]
+
+
+def inverse_rates(
+    mechanism: Mechanism,
+    linear: Linearization,
+    given: Sequence[Coordinate],
+    velocities: Sequence[Value],
+    accelerations: Sequence[Value],
+) -> DriveRates:
+    """Drive rates that give as many coordinates their velocities v and accelerations a.
+
+    With J the derivatives of the coordinates by the drives q, J q' = v and J q'' = a - b, where b is what the
+    coordinates accelerate by while q'' = 0. Where J is singular there are none.
+
+    Parameters
+    ----------
+    linear : Linearization
+        At configurations of shape (n,).
+    given : sequence of Coordinate
+        As many as drives.
+    velocities, accelerations : sequence of Value
+        Of each of them.
+    """
+    configuration = linear.configuration
+    matrix = jacobian(linear, linear.drives(), given)
+    drives = [mechanism.coordinate(name) for name in mechanism.drives]
+    good = _solvable(matrix, given, drives, mechanism.size)
+    speeds = _solve(matrix, good, velocities)
+    velocity = linear.velocity(speeds)
+    coasting = linear.acceleration(velocity, [0.0] * len(drives))
+    rest = [a - second(configuration, c, velocity, coasting) for a, c in zip(accelerations, given, strict=True)]
+    return DriveRates(speeds, _solve(matrix, good, rest))
+
+
+def _solvable(
+    matrix: Array, given: Sequence[Coordinate], drives: Sequence[Coordinate], size: float
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Whether J is regular: its determinant over the lengths of its rows (at least 1), all without units."""
+    rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
+    columns = np.array([size if c.quantity == "length" else 1.0 for c in drives])
+    pure = matrix * rows[:, None] * columns
+    lengths = np.maximum(np.sqrt(np.einsum("...ij,...ij->...i", pure, pure)), 1.0)
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(np.abs(determinant(pure / lengths[..., None])) >= STALLED)
+
+
+def _solve(matrix: Array, good: NDArray[np.bool_], right: Sequence[Value]) -> list[Array]:
+    safe = np.where(good[..., None, None], matrix, np.eye(matrix.shape[-1]))
+    sides = np.stack([np.broadcast_to(np.asarray(side, dtype=float), good.shape) for side in right], axis=-1)
+    found = np.linalg.solve(safe, sides[..., None])[..., 0]
+    return [np.where(good, found[..., k], np.nan) for k in range(len(right))]

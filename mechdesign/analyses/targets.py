@@ -1,0 +1,193 @@
+"""Errors of outputs against their targets: functions, values a pose, and paths with or without timing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.mechanism.algebra import dot, norm2
+from mechdesign.mechanism.model import Quantity
+from mechdesign.results import Column, Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+from mechdesign.study.targets import Target, timing
+
+Array = NDArray[np.float64]
+
+# Distances between poses and pieces of a path that are held at once.
+BLOCK = 1 << 20
+# A drive's value this part of the table's range beyond its end is still at the end: rounding.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Error:
+    """An output less its target.
+
+    Parameters
+    ----------
+    output : str
+        The coordinate, or the point whose distance from its path it is.
+    values : ndarray
+        In the study's units, angles in (-half a turn, half a turn]; nan where the output or the target has no value.
+    """
+
+    output: str
+    quantity: Quantity
+    values: Array
+
+    @property
+    def name(self) -> str:
+        """Name of the column."""
+        return f"{self.output}_error"
+
+
+def needed(study: Study, poses: Poses) -> tuple[str, ...]:
+    """Coordinates whose values the errors need: those with targets, and those that targets depend on."""
+    names: list[str] = []
+    for target in study.targets.values():
+        names += [*target.coordinates, *(name for name in target.names if name not in study.parameters.nominal)]
+        drive = timing(study.mechanism.drives, poses) if target.timed else None
+        names += [drive] if drive is not None else []
+    return tuple(dict.fromkeys(names))
+
+
+def errors(study: Study, poses: Poses, values: Mapping[str, Array], rows: NDArray[np.intp] | None) -> Iterator[Error]:
+    """Errors of all targets, a point's x and y before its distance.
+
+    Parameters
+    ----------
+    values : mapping of str to ndarray, shape (n,)
+        The coordinates of `needed` in the study's units, angles continuous where they are so in the results.
+    rows : ndarray of int, shape (n,), or None
+        The pose of each value; None for values between the poses, where targets that are given a pose have none.
+    """
+    turn = 2 * np.pi / study.units.angle_factor
+    for target in study.targets.values():
+        wanted = _wanted(study, target, poses, values, rows)
+        if wanted is None:
+            continue
+        parts = []
+        for name, should in zip(target.coordinates, wanted, strict=True):
+            quantity = study.mechanism.quantity(name)
+            gap = values[name] - should
+            if quantity == "angle":
+                gap = gap - turn * np.ceil(gap / turn - 0.5)
+            parts.append(gap)
+            yield Error(name, quantity, gap)
+        if len(parts) == 2:
+            yield Error(target.owner, "length", np.hypot(*parts))
+
+
+def _wanted(
+    study: Study, target: Target, poses: Poses, values: Mapping[str, Array], rows: NDArray[np.intp] | None
+) -> Sequence[Array] | None:
+    """What each coordinate of a target should be; None where that is not known between the poses."""
+    if target.expression is not None:
+        env: dict[str, ArrayLike] = {**study.parameters.nominal, **values}
+        return [np.asarray(target.expression.evaluate(env), dtype=float) + 0 * values[target.owner]]
+    table = target.table
+    assert table is not None
+    if target.timed:
+        drive = timing(study.mechanism.drives, poses)
+        assert drive is not None
+        turn = 2 * np.pi / study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else None
+        return _interpolated(table, values[drive], turn)
+    if len(table) == poses.count:
+        return None if rows is None else list(table[rows].T)
+    x, y = (values[name] for name in target.coordinates)
+    foot = nearest(x + 1j * y, table[:, 0] + 1j * table[:, 1])
+    return [foot.real, foot.imag]
+
+
+def _interpolated(table: Array, at: Array, turn: float | None) -> list[Array]:
+    """Columns of a table at values of its first, linearly; nan outside.
+
+    Where `turn` is given, values outside the table are taken at the turn in which it may hold them.
+    """
+    first, last = table[0, 0], table[-1, 0]
+    slack = ROUNDING * max(last - first, abs(first))
+    outside = (at < first - slack) | (at > last + slack)
+    if turn is not None:
+        at = np.where(outside, first + np.mod(at - first, turn), at)
+        outside = at > last + slack
+    return [np.where(outside | np.isnan(at), np.nan, np.interp(at, table[:, 0], column)) for column in table[:, 1:].T]
+
+
+def nearest(points: NDArray[np.complex128], corners: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """The point of a polyline that is nearest to each point.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n,)
+        x + i y.
+    corners : ndarray, shape (m,)
+        Of the polyline, which is closed where the last is the first; a single one is a point.
+    """
+    if len(corners) == 1:
+        return np.where(np.isnan(points), np.nan, corners[0])
+    begins, spans = corners[:-1], np.diff(corners)
+    lengths = norm2(spans)
+    # A piece without length is its corner: any positive divisor gives part 0.
+    lengths = np.where(lengths > 0, lengths, 1.0)
+    found = np.empty(len(points), dtype=complex)
+    step = max(1, BLOCK // len(spans))
+    for first in range(0, len(points), step):
+        some = points[first : first + step, None]
+        feet = begins + np.clip(dot(spans, some - begins) / lengths, 0.0, 1.0) * spans
+        best = np.argmin(norm2(some - feet), axis=1)
+        found[first : first + step] = feet[np.arange(len(feet)), best]
+    return found
+
+
+def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None, valid: NDArray[np.bool_]) -> Table:
+    """Mean and largest errors over the valid poses that have a target."""
+    at = poses.values[swept] if swept is not None else np.arange(poses.count, dtype=float)
+    rows: list[tuple[float, ...]] = []
+    for error in found:
+        known = np.flatnonzero(valid & np.isfinite(error.values))
+        values = error.values[known]
+        if not len(known):
+            rows.append((np.nan,) * 4)
+            continue
+        worst = int(np.argmax(np.abs(values)))
+        rows.append(
+            (
+                float(np.sqrt(np.mean(values**2))),
+                float(np.mean(values)),
+                abs(float(values[worst])),
+                float(at[known[worst]]),
+            )
+        )
+    rms, mean, largest, where = np.array(rows, dtype=float).reshape(-1, 4).T
+    unit = study.units.label(study.mechanism.quantity(swept)) if swept is not None else ""
+    units = np.array([study.units.label(error.quantity) for error in found], dtype=str)
+    return Table(
+        "targets",
+        (
+            Column("output", np.array([error.output for error in found], dtype=str), "", "what has a target"),
+            Column("rms", rms, "", "root of the mean square of the error (of a point: of its distance from the path)"),
+            Column("mean", mean, "", "mean error"),
+            Column("max_abs", largest, "", "largest absolute error"),
+            Column("at", where, unit, f"{swept or 'row'} at the largest error"),
+            Column("unit", units, "", "unit of its errors"),
+        ),
+        "errors of the outputs against their targets, over the valid poses",
+    )
+
+
+def gaps(study: Study, found: Sequence[Error], poses: Poses, valid: NDArray[np.bool_]) -> list[str]:
+    """Warnings where a valid pose has no target."""
+    warnings = []
+    for error in found:
+        lost = np.flatnonzero(valid & ~np.isfinite(error.values))
+        if len(lost) and error.output not in {f"{owner}.{axis}" for owner in study.targets for axis in "xy"}:
+            warnings.append(
+                f"{len(lost)} of {poses.count} poses lie where the target of {error.output} has no value: their "
+                f"{error.name} is nan; the first: {pose_in_words(study, poses, int(lost[0]))}"
+            )
+    return warnings

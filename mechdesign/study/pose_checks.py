@@ -1,0 +1,126 @@
+"""Checks of poses and rates: names, units, and whether what they give determines the mechanism."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from mechdesign.errors import MechanismError, StudyError
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.model import Quantity
+from mechdesign.study import poses, targets
+from mechdesign.study.document import Path
+from mechdesign.study.pose_models import PoseSection
+from mechdesign.study.reporter import Reporter
+from mechdesign.study.sections import COMMANDS, KinematicsSection, ReliabilitySection
+from mechdesign.study.targets import Target
+
+if TYPE_CHECKING:
+    from mechdesign.study.checks import Checker
+
+_RATE_KINDS: dict[Quantity, str] = {"length": "velocity", "angle": "angular_velocity"}
+_ACCELERATION_KINDS: dict[Quantity, str] = {"length": "acceleration", "angle": "angular_acceleration"}
+
+
+def coordinates(checker: Checker, command: str, section: PoseSection) -> None:
+    """Check the names and units of the coordinates that poses give."""
+    for index, pose in enumerate(section.poses or ()):
+        _given(checker, pose, (command, "poses", index))
+    for name in section.sweep or ():
+        path: Path = (command, "sweep", name)
+        quantity = checker.coordinate(name, path, at_key=True)
+        for key in ("from", "to", "step"):
+            if quantity in ("length", "angle"):
+                checker.kind((*path, key), quantity)
+    for name in section.path or ():
+        if name not in checker.names.owners:
+            checker.coordinate(name, (command, "path", name), at_key=True)
+
+
+def _given(
+    checker: Checker, values: Iterable[str], path: Path, kinds: Mapping[Quantity, str] | None = None
+) -> None:  # fmt: skip
+    for name in values:
+        quantity = checker.coordinate(name, (*path, name), at_key=True)
+        kind = quantity if kinds is None or quantity is None else kinds.get(quantity)
+        if kind is not None and kind != "none":
+            checker.kind((*path, name), kind)
+
+
+def rates(checker: Checker, command: str, section: KinematicsSection | ReliabilitySection) -> None:
+    """Check that rates and accelerations are those of drives, or (kinematics) of all coordinates that poses give."""
+    _given(checker, section.rates, (command, "rates"), _RATE_KINDS)
+    _given(checker, section.accelerations, (command, "accelerations"), _ACCELERATION_KINDS)
+    drives = checker.names.drives
+    given = _sets(checker, section) if isinstance(section, KinematicsSection) else []
+    one = given[0] if len(given) == 1 else set()
+    parts = (("rates", section.rates), ("accelerations", section.accelerations))
+    of_given = any(name in one and name not in drives for _, values in parts for name in values)
+    for key, values in parts:
+        for name in values:
+            if name not in checker.names.coordinates or name in (one if of_given else drives):
+                continue
+            message = f"{name!r} is not a drive: {key} are those of {', '.join(drives)}"
+            if of_given:
+                message = f"{name!r} is not among what the poses give: {key} are those of {', '.join(sorted(one))}"
+            elif one and not one <= set(drives):
+                message += f", or of all that the poses give, {', '.join(sorted(one))}"
+            elif len(given) > 1:
+                message += " where poses give different coordinates"
+            checker.reporter.report((command, key, name), message, at_key=True)
+        missing = sorted(one - set(values)) if of_given and values else []
+        if missing:
+            message = f"{', '.join(missing)} missing: {key} are those of all coordinates that the poses give"
+            checker.reporter.report((command, key), message, at_key=True)
+
+
+def _sets(checker: Checker, section: PoseSection) -> list[set[str]]:
+    """The different sets of coordinates that the poses of a section give."""
+    if section.poses is not None:
+        return [set(names) for names in dict.fromkeys(frozenset(pose) for pose in section.poses)]
+    if section.sweep is not None:
+        return [set(section.sweep)]
+    path = section.path or {}
+    found = {
+        part for name in path for part in ((f"{name}.x", f"{name}.y") if name in checker.names.owners else (name,))
+    }
+    return [found] if found else []
+
+
+def check_poses(
+    parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path, turn: float
+) -> None:
+    """Check that the coordinates that poses give determine the mechanism, that they are not too many, and that the
+    targets fit those of kinematics.
+
+    Parameters
+    ----------
+    turn : float
+        A full turn in the study's unit.
+    """
+    wanted: Mapping[str, Target] = parts["targets"]
+    for command in COMMANDS:
+        section = parts.get(command)
+        found: poses.Poses | None = None
+        key = None
+        if isinstance(section, PoseSection):
+            key = next((key for key in ("poses", "sweep", "path") if getattr(section, key) is not None), None)
+        if key is not None and isinstance(section, PoseSection):
+            try:
+                found = poses.expand(section, folder)
+            except StudyError as error:
+                reporter.report((command, key), str(error))
+                continue
+        for group in found.groups if found is not None else ():
+            try:
+                mechanism.plan(group.names)
+            except MechanismError as error:
+                place: Path = (command, key, int(group.rows[0])) if key == "poses" else (command, str(key))
+                reporter.report(place, str(error))
+        if command == "kinematics" and wanted:
+            try:
+                assumed = found or poses.default(mechanism.description, turn)
+            except StudyError:
+                continue
+            targets.check_poses(wanted, mechanism.drives, assumed, reporter)
