@@ -9,20 +9,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.errors import AssemblyError, MechanismError
+from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
 from mechdesign.mechanism.algebra import Value, rotation
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.describe import joints_in_words, report
+from mechdesign.mechanism.describe import report
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph, build_graph
 from mechdesign.mechanism.limits import Bound
 from mechdesign.mechanism.model import Description, Limit, Quantity
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.rigidity import Equations
 from mechdesign.mechanism.sketch import Sketch, assembly_modes, drawn_value, locate, roots_as_drawn
-from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Undetermined, compile_structure
 
 # Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).
@@ -45,8 +46,8 @@ class Mechanism:
         self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
         self._plans: dict[tuple[str, ...], Plan] = {}
         self._check_ties()
-        self._check_mobility()
         self.sketch: Sketch = locate(description, self.graph, self.geometry)
+        self._check_mobility()
         self.drives: tuple[str, ...] = tuple(description.drives)
         self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
         self.forward = self.plan(self.drives)
@@ -105,19 +106,14 @@ class Mechanism:
                 )
 
     def _check_mobility(self) -> None:
-        count = len(self.description.drives)
-        if count != self.mobility:
-            joints = "; ".join(joints_in_words(self.description, self.graph))
-            fewer = "remove" if count > self.mobility else "add"
-            change = abs(count - self.mobility)
-            mend = (
-                f"{fewer} {change} drive{'s' if change > 1 else ''}" if self.mobility > 0 else "free a joint or a link"
-            )
-            raise MechanismError(
-                f"the mobility is {self.mobility} but {count} drive{'s are' if count != 1 else ' is'} given: {mend}. "
-                f"Joints found: {joints or 'none'}",
-                "mechanism.drives",
-            )
+        if len(self.description.drives) != self.mobility:
+            drives = [self.coordinate(name) for name in self.description.drives]
+            raise diagnosis.wrong_count(self.description, self.equations, self.sketch, self.mobility, drives)
+
+    @property
+    def equations(self) -> Equations:
+        """All equations at once, to tell what is wrong with a mechanism."""
+        return Equations(self.graph, self.geometry, self.size or 1.0)
 
     def plan(self, given: Sequence[str]) -> Plan:
         """Plan for given coordinates, exactly as many as the mobility; compiled once.
@@ -138,13 +134,21 @@ class Mechanism:
                 )
             try:
                 structure = compile_structure(self.graph, coordinates)
+                diagnosis.check_independent(self.equations, structure)
             except Undetermined as error:
                 what = "drives" if key == tuple(self.description.drives) else ", ".join(key)
                 where = "mechanism.drives" if what == "drives" else "poses"
-                raise MechanismError(f"{what} do not determine the mechanism: {error}", where) from None
+                told = diagnosis.undetermined(self.equations, coordinates, str(error))
+                raise MechanismError(f"{what} do not determine the mechanism: {told}", where) from None
             modes = assembly_modes(self.graph, self.geometry, structure, self.sketch)
             self._plans[key] = Plan(self, structure, modes)
         return self._plans[key]
+
+    def adopt(self, given: tuple[str, ...], plan: Plan) -> None:
+        """Use a plan of another assembly for given coordinates."""
+        self._plans = {given: plan}
+        if given == self.drives:
+            self.forward = plan
 
     def _bound(self, limit: Limit, index: int) -> Bound:
         if limit.kind == "distance":
@@ -193,29 +197,10 @@ class Mechanism:
             reached = np.asarray(all(bool(np.all(c)) for c in state.converged))
         configuration = plan.configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
         if not configuration.valid:
-            where = self._open_group(state)
-            values_text = ", ".join(
-                f"{c.name} = {g / (self.description.angle_unit if c.quantity == 'angle' else 1.0):.6g}"
-                for c, g in zip(plan.structure.given, given, strict=True)
-            )
-            raise MechanismError(
-                f"the sketch cannot be assembled at its own drive values ({values_text}): {where}; "
-                "check the lengths, or draw it nearer to a pose that closes",
-                "mechanism.sketch",
-            )
+            pose = list(zip(plan.structure.given, given, strict=True))
+            told = closing.cannot_assemble(self, state, pose)
+            raise MechanismError(told, "mechanism.sketch")
         return configuration
-
-    def _open_group(self, state: State) -> str:
-        for group in self.forward.structure.groups:
-            bad = [r for r in group.angles if not np.isfinite(np.real(state.rotations[r]))]
-            if bad or group.form == "newton":
-                bodies = [b for b, (frame, _) in self.graph.bodies.items() if frame in group.angles]
-                edges = {k for loop in group.loops for k, _ in loop.edges}
-                nodes = {n for k in edges for n in (self.graph.edges[k].tail, self.graph.edges[k].head)}
-                joints = sorted(self.graph.nodes[n] for n in nodes if ":" not in self.graph.nodes[n])
-                links = ", ".join(dict.fromkeys(body.removesuffix(":rod") for body in bodies))
-                return f"links {links} do not meet (joints {', '.join(joints)})"
-        return "its legs have no positive length"
 
     def solve(self, pose: Mapping[str, ArrayLike], places: Mapping[str, ArrayLike] | None = None) -> Pose:
         """One pose or a batch, in the study's units: ``mechanism.solve({"theta": 60})["C.x"]``.

@@ -1,0 +1,242 @@
+"""The mobility that a mechanism really has, with its own dimensions: ranks and null spaces of all its equations.
+
+Counting unknowns and equations is right for links of any dimensions; special dimensions (equal cranks, parallel
+guides) make equations depend on each other. Here the equations of all edges are solved from the sketch by least
+squares, and their Jacobian is judged at the place found and at a second one, reached along its null space: a motion
+that is only infinitesimal (a stretched chain) is none. The motions are the right null space, and the equations that
+depend on each other, the states of self-stress, the left one [Pellegrino and Calladine 1986].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.mechanism.algebra import vector, wrap
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.sketch import Sketch
+
+Vector = NDArray[np.float64]
+# Singular values below this fraction of the largest are zeros, of columns scaled to length 1.
+RANK = 1e-7
+# What closes to this fraction of the mechanism's size is assembled.
+CLOSED = 1e-9
+# A step along the null space (radians, or fractions of the size), and the part of it that a real motion keeps.
+STEP, KEPT = 0.05, 0.3
+# Directions and starts that are tried: deterministic, and enough that chance leaves none out.
+TRIES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """All edges' equations; the unknowns are angles of classes, slides, and nodes, lengths as fractions of `size`."""
+
+    graph: Graph
+    geometry: Geometry
+    size: float
+
+    @cached_property
+    def _ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        edges = self.graph.edges
+        slides = [-1 if edge.slide is None else edge.slide for edge in edges]
+        columns = ([e.tail for e in edges], [e.head for e in edges], [e.frame for e in edges], slides)
+        tail, head, frame, slide = (np.array(column, dtype=np.intp) for column in columns)
+        return tail, head, frame, slide
+
+    @cached_property
+    def _arms(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        vectors = self.geometry.nominal
+        return np.array(vectors.w, dtype=complex) / self.size, np.array(vectors.d, dtype=complex)
+
+    @property
+    def angles(self) -> int:
+        """Number of unknown angles, which come first."""
+        return self.graph.classes - 1
+
+    @property
+    def inner(self) -> int:
+        """Number of unknown angles and slides; the x of all nodes but the first follow, then the y."""
+        return self.angles + len(self.graph.slides)
+
+    def pack(self, nodes: NDArray[np.complex128], angles: Vector, slides: Vector) -> Vector:
+        """Unknowns from positions (lengths as in the study), angles of all classes and slides."""
+        scaled = nodes[1:] / self.size
+        return np.concatenate([angles[1:], slides / self.size, scaled.real, scaled.imag])
+
+    def unpack(self, x: Vector) -> tuple[NDArray[np.complex128], Vector, Vector]:
+        """Positions as fractions of the size, angles of all classes, slides as fractions of the size."""
+        places = x[self.inner :].reshape(2, -1)
+        nodes = np.concatenate([[0j], vector(places[0], places[1])])
+        return nodes, np.concatenate([[0.0], x[: self.angles]]), x[self.angles : self.inner]
+
+    def from_sketch(self, sketch: Sketch, spread: float = 0.0, seed: int = 0) -> Vector:
+        """Unknowns as drawn; what is not drawn is put anywhere, and everything is moved by up to `spread`."""
+        rng = np.random.default_rng(seed)
+        drawn = np.array([np.nan if node is None else node for node in sketch.nodes], dtype=complex)
+        known = np.isfinite(drawn)
+        anywhere = self.size * vector(*rng.uniform(-0.5, 0.5, (2, len(drawn))))
+        nodes = np.where(known, drawn, drawn[known].mean() + anywhere)
+        turns = [np.exp(1j * rng.uniform(-3, 3)) if turn is None else turn for turn in sketch.rotations]
+        angles = np.angle(np.array(turns, dtype=complex))
+        tail, head, frame, slide = self._ends
+        w, d = self._arms
+        slides = np.zeros(len(self.graph.slides))
+        for k in np.flatnonzero(slide >= 0):
+            along = (nodes[head[k]] - nodes[tail[k]]) * np.exp(-1j * angles[frame[k]]) - w[k] * self.size
+            slides[slide[k]] = (along * d[k].conjugate()).real
+        x = self.pack(nodes, angles, slides)
+        return x + spread * rng.uniform(-1, 1, len(x))
+
+    def _spans(self, x: Vector) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]:
+        nodes, angles, slides = self.unpack(x)
+        tail, head, frame, slide = self._ends
+        w, d = self._arms
+        turn = np.exp(1j * angles[frame])
+        reach = np.append(slides, 0.0)[slide]
+        spans = (w + reach * d) * turn
+        return nodes[tail] + spans - nodes[head], spans, d * turn
+
+    def gaps(self, x: Vector) -> NDArray[np.complex128]:
+        """By how much each edge misses its head, in the study's lengths."""
+        return self._spans(x)[0] * self.size
+
+    def jacobian(self, x: Vector, held: Sequence[Coordinate] = ()) -> Vector:
+        """Derivatives of the equations (x and y of each edge, then the held coordinates) by the unknowns."""
+        _, spans, directions = self._spans(x)
+        return np.vstack([self._edge_rows(spans, directions), *(self._row(x, coordinate) for coordinate in held)])
+
+    def generic(self, held: Sequence[Coordinate] = ()) -> Vector:
+        """The Jacobian for dimensions without any special relation (but the directions of slides)."""
+        rng = np.random.default_rng(1)
+        x = rng.uniform(-1, 1, self.inner + 2 * (len(self.graph.nodes) - 1))
+        tail, head, *_ = self._ends
+        nodes = self.unpack(x)[0]
+        rows = self._edge_rows(nodes[head] - nodes[tail], self._spans(x)[2])
+        return np.vstack([rows, *(self._row(x, coordinate) for coordinate in held)])
+
+    def _edge_rows(self, spans: NDArray[np.complex128], directions: NDArray[np.complex128]) -> Vector:
+        tail, head, frame, slide = self._ends
+        count, nodes = len(tail), len(self.graph.nodes)
+        turning = np.zeros((count, self.graph.classes), dtype=complex)
+        rows = np.arange(count)
+        turning[rows, frame] = 1j * spans
+        sliding = np.zeros((count, len(self.graph.slides) + 1), dtype=complex)
+        sliding[rows, slide] = directions
+        placing = np.zeros((count, nodes))
+        placing[rows, tail] += 1
+        placing[rows, head] -= 1
+        inner = np.hstack([turning[:, 1:], sliding[:, :-1]])
+        none = np.zeros((count, nodes - 1))
+        both = [np.hstack([inner.real, placing[:, 1:], none]), np.hstack([inner.imag, none, placing[:, 1:]])]
+        return np.stack(both, axis=1).reshape(2 * count, -1)
+
+    def _configuration(self, x: Vector) -> Configuration:
+        nodes, angles, slides = self.unpack(x)
+        return Configuration(
+            self.graph, self.geometry.nominal, (), list(nodes * self.size), list(np.exp(1j * angles)),
+            list(slides * self.size), [], np.zeros((), dtype=np.int8), {},
+        )  # fmt: skip
+
+    def _row(self, x: Vector, coordinate: Coordinate) -> Vector:
+        every = [self.unpack(unit) for unit in np.eye(len(x))]
+        nodes, angles, slides = (np.array(part).T for part in zip(*every, strict=True))
+        # A length's derivative is that of its fraction of the size.
+        rates = Rates(list(nodes * self.size), list(angles), list(slides * self.size), {})
+        scale = self.size if coordinate.quantity == "length" else 1.0
+        return np.asarray(first(self._configuration(x), coordinate, rates)) / scale
+
+    def solve(self, x: Vector, held: Sequence[tuple[Coordinate, float]] = ()) -> tuple[Vector, float]:
+        """Least squares from `x`, some coordinates held (angles in radians): the unknowns and the largest gap."""
+        from scipy.optimize import least_squares
+
+        coordinates = [coordinate for coordinate, _ in held]
+
+        def residual(x: Vector) -> Vector:
+            gaps = self._spans(x)[0]
+            misses = [self._miss(x, coordinate, value) for coordinate, value in held]
+            return np.concatenate([gaps.view(float), misses])
+
+        found = least_squares(
+            residual, x, lambda x: self.jacobian(x, coordinates), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200
+        )
+        return found.x, float(np.abs(found.fun).max(initial=0.0))
+
+    def _miss(self, x: Vector, coordinate: Coordinate, value: float) -> float:
+        miss = float(self._configuration(x).value(coordinate)) - value
+        if coordinate.quantity == "angle":
+            return float(wrap(miss))
+        return miss / self.size if coordinate.quantity == "length" else miss
+
+    def assemble(self, sketch: Sketch, held: Sequence[tuple[Coordinate, float]] = ()) -> Vector | None:
+        """An assembled configuration near the sketch; None where there is none."""
+        for attempt in range(TRIES):
+            x, gap = self.solve(self.from_sketch(sketch, 0.1 * attempt, attempt), held)
+            if gap < CLOSED:
+                return x
+        return None
+
+    def mobility(self, x: Vector) -> tuple[int, Vector]:
+        """Degrees of freedom of the finite motion from an assembled configuration, and a second one on its way."""
+        motions = null_space(self.jacobian(x))
+        best = (0, x)
+        if motions.shape[1]:
+            rng = np.random.default_rng(2)
+            for _ in range(TRIES):
+                step = motions @ rng.uniform(-1, 1, motions.shape[1])
+                step *= STEP / np.abs(step).max()
+                y, gap = self.solve(x + step)
+                if gap < CLOSED and np.linalg.norm(y - x) > KEPT * np.linalg.norm(step):
+                    best = max(best, (null_space(self.jacobian(y)).shape[1], y), key=lambda found: found[0])
+        return best
+
+    def freedom_without(self, jacobian: Vector, edges: Collection[int], classes: Collection[int]) -> int:
+        """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place."""
+        left = [k for k in range(len(self.graph.edges)) if k not in edges]
+        tail, head, _, slide = self._ends
+        placed = {int(node) for k in left for node in (tail[k], head[k])}
+        lonely = {int(node) for k in edges for node in (tail[k], head[k])} - placed - {0}
+        nodes = len(self.graph.nodes) - 1
+        gone = {frame - 1 for frame in classes} | {self.angles + int(slide[k]) for k in edges if slide[k] >= 0}
+        gone |= {self.inner + part + node - 1 for node in lonely for part in (0, nodes)}
+        kept = [column for column in range(jacobian.shape[1]) if column not in gone]
+        rows = [2 * k + part for k in left for part in (0, 1)]
+        return null_space(jacobian[np.ix_(rows, kept)]).shape[1]
+
+
+def null_space(matrix: Vector) -> Vector:
+    """Basis of the right null space, shape (columns, dimension)."""
+    if matrix.shape[0] == 0 or matrix.shape[1] == 0:
+        return np.eye(matrix.shape[1])
+    sizes = np.linalg.norm(matrix, axis=0)
+    scale = np.where(sizes > 0, 1 / np.where(sizes > 0, sizes, 1.0), 1.0)
+    _, values, rows = np.linalg.svd(matrix * scale, full_matrices=True)
+    rank = int((values > RANK * values[0]).sum())
+    return np.asarray(rows[rank:].T * scale[:, None])
+
+
+def separated(basis: Vector, pivots: int) -> list[Vector]:
+    """Basis vectors reduced against each other, so that independent motions come one by one.
+
+    Pivots are taken among the first `pivots` entries while these say anything. Entries within rounding are zero.
+    """
+    rows = basis.T.copy()
+    for index in range(len(rows)):
+        part = np.abs(rows[index:, :pivots])
+        if part.size == 0 or part.max() < RANK * np.abs(rows[index:]).max():
+            part = np.abs(rows[index:])
+        row, column = np.unravel_index(int(part.argmax()), part.shape)
+        rows[[index, index + row]] = rows[[index + row, index]]
+        rows[index] /= rows[index, column]
+        others = np.arange(len(rows)) != index
+        rows[others] -= rows[others, column][:, None] * rows[index]
+    sizes = np.abs(rows).max(axis=1, initial=0.0)
+    return [np.where(np.abs(row) > 10 * RANK * size, row, 0.0) for row, size in zip(rows, sizes, strict=True)]
