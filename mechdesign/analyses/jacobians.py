@@ -76,4 +76,5 @@ def inverse_condition(jacobian: Array) -> Array:
     safe = np.where(finite[..., None, None], jacobian, 0.0)
     values = np.linalg.svd(safe, compute_uv=False)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(finite, values[..., -1] / values[..., 0], np.nan)
+        ratio = np.where(values[..., 0] > 0, values[..., -1] / values[..., 0], 0.0)
+    return np.where(finite, ratio, np.nan)

@@ -154,8 +154,8 @@ def _stalled(motion: Motion) -> list[str]:
         lie = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
         warnings.append(
             f"{lie} at a dead centre or change point, where the drives do not move the mechanism in one way "
-            f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean nothing there; "
-            f"the first: {pose_in_words(study, poses, rows[0])}"
+            f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
+            f"nothing there; the first: {pose_in_words(study, poses, rows[0])}"
         )
     if motion.asked.of_given:
         rates = motion.arrays[f"{study.mechanism.drives[0]}_velocity"]

@@ -89,7 +89,7 @@ def _panels(study: Study, columns: list[Column], swept: str | None, x: Array) ->
     rank = ranks(study.mechanism, tuple(asked))
     panels: dict[tuple[str, str], list[_Curve]] = {}
     for column in columns:
-        if column.values.dtype.kind != "f" or not np.isfinite(column.values).any():
+        if column.values.dtype.kind != "f" or column.name == "conditioning" or not np.isfinite(column.values).any():
             continue
         order = next((order for order in _ORDERS if column.name.endswith(f"_{order}")), "position")
         of = column.name.removesuffix(f"_{order}")
