@@ -66,7 +66,9 @@ def test_every_assembly_of_a_group_without_a_closed_form_solves_its_loops() -> N
     found = assemblies(mechanism, mechanism.drives)
     assert len(found) > 1
     assert found[0].drawn
-    lengths = {name: float(mechanism.sketch_configuration.value(mechanism.coordinate(name))) for name in mechanism.drives}
+    lengths = {
+        name: float(mechanism.sketch_configuration.value(mechanism.coordinate(name))) for name in mechanism.drives
+    }
     places = []
     for assembly in found:
         pose = assembly.mechanism.solve(lengths)
