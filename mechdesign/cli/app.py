@@ -62,8 +62,32 @@ def _add_question(name: str, question_asked: str, content: str) -> None:
             raise typer.Exit(ask(study, name, options))
 
 
+@app.command("kinematics", short_help=COMMANDS["kinematics"][0], help=" ".join(COMMANDS["kinematics"]))
+def kinematics(
+    study: given.StudyArgument = None,
+    out: given.Out = None,
+    overrides: given.Overrides = None,
+    seed: given.Seed = None,
+    jobs: given.Jobs = None,
+    json: given.Json = False,
+    quiet: given.Quiet = False,
+    no_plots: given.NoPlots = False,
+    animate: given.Animate = False,
+    all_modes: given.AllModes = False,
+) -> None:
+    """The question of motion, with the options that only it has."""
+    with guard():
+        from mechdesign.cli.execution import ask
+
+        options = Options(
+            out, tuple(overrides or ()), seed, jobs, json, quiet, not no_plots, animate=animate, all_modes=all_modes
+        )
+        raise typer.Exit(ask(study, "kinematics", options))
+
+
 for _name, _words in COMMANDS.items():
-    _add_question(_name, *_words)
+    if _name != "kinematics":
+        _add_question(_name, *_words)
 
 
 @app.command("run", short_help="Answer every question that each study asks.")
@@ -76,6 +100,7 @@ def run(
     json: given.Json = False,
     quiet: given.Quiet = False,
     no_plots: given.NoPlots = False,
+    animate: given.Animate = False,
     junit: given.Junit = None,
     fail_fast: given.FailFast = False,
     resume: given.Resume = False,
@@ -84,21 +109,27 @@ def run(
     with guard():
         from mechdesign.cli import batch
 
-        options = Options(out, tuple(overrides or ()), seed, jobs, json, quiet, not no_plots, fail_fast, resume)
+        options = Options(
+            out, tuple(overrides or ()), seed, jobs, json, quiet, not no_plots,
+            animate=animate, fail_fast=fail_fast, resume=resume,
+        )  # fmt: skip
         raise typer.Exit(batch.run(studies or [], options, junit))
 
 
 @app.command("check", short_help="Validate only: joints, mobility, plan of solution.")
 def check(
     studies: given.StudiesArgument = None,
+    out: given.OutDrawings = None,
     overrides: given.Overrides = None,
     quiet: given.Quiet = False,
+    no_plots: given.NoPlots = False,
 ) -> None:
-    """Validate only: say the joints, the mobility and how the mechanism is solved."""
+    """Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch."""
     with guard():
         from mechdesign.cli.checking import check_studies
 
-        raise typer.Exit(check_studies(studies or [None], Options(overrides=tuple(overrides or ()), quiet=quiet)))
+        options = Options(out, tuple(overrides or ()), quiet=quiet, plots=not no_plots)
+        raise typer.Exit(check_studies(studies or [None], options))
 
 
 @app.command("new")

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import COMMANDS, Answer, answer, load_study, study_label, tell
+from mechdesign.cli.execution import COMMANDS, Answer, Owners, answer, load_study, study_label, tell
 from mechdesign.cli.failure import INTERRUPTED, explain
 from mechdesign.cli.options import Options
+from mechdesign.errors import StudyError
 
 if TYPE_CHECKING:
     from mechdesign.results import Table
@@ -66,13 +67,13 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Answer]
             studies.append(load_study(path, options))
         except Exception as error:
             yield _failure(path.stem if path else "study", "check", Path(), error)
-    owners: dict[str, str] = {}
+    owners = Owners()
     for study in studies:
         label = study_label(study)
-        source = str(study.path)
-        if owners.setdefault(label, source) != source:
-            terminal.say(f"{source}: its results would overwrite those of {owners[label]}; rename one of the files")
-            yield Answer(label, "check", Path(), 2, 0, failed=f"same name as {owners[label]}")
+        try:
+            owners.claim(study)
+        except StudyError as error:
+            yield _failure(label, "check", Path(), error)
             continue
         root = options.out or Path("results") / label
         if options.out is not None and len(paths) > 1:
@@ -103,7 +104,8 @@ def _finished(study: Study, command: str, directory: Path, options: Options) -> 
     from mechdesign.report import manifest
     from mechdesign.report.requirements import Verdict, command_of
 
-    content = manifest.is_current(directory, study, command, plots=options.plots)
+    asked = manifest.Asked(options.plots, options.animate and command == "kinematics")
+    content = manifest.is_current(directory, study, command, asked)
     if content is None:
         return None
     verdicts = [

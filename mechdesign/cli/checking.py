@@ -6,22 +6,32 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import load_study, study_label
+from mechdesign.cli.execution import Owners, load_study, study_label
 from mechdesign.cli.failure import explain
 from mechdesign.cli.options import Options
 
 
 def check_studies(paths: Sequence[Path | None], options: Options) -> int:
-    """Validate studies and describe their mechanisms on stdout; returns the highest exit code."""
+    """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     worst = 0
+    owners = Owners()
     for path in paths:
         try:
             study = load_study(path, options)
+            label = study_label(study)
+            if not options.quiet:
+                terminal.emit(f"{label}: {study.name}\n{study.mechanism.describe()}\n")
+            if options.plots:
+                from mechdesign.report.writer import write_sketch
+
+                owners.claim(study)
+                directory = options.out or Path("results") / label / "check"
+                if options.out is not None and len(paths) > 1:
+                    directory /= label
+                drawing = write_sketch(directory, study)
+                terminal.say(f"{label}: the sketch as understood is in {drawing}", quiet=options.quiet)
         except Exception as error:
             code, message = explain(error)
             terminal.say(message)
             worst = max(worst, code)
-            continue
-        if not options.quiet:
-            terminal.emit(f"{study_label(study)}: {study.name}\n{study.mechanism.describe()}\n")
     return worst

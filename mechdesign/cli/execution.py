@@ -77,6 +77,28 @@ def study_label(study: Study) -> str:
     return study.path.stem if study.path is not None else study.name
 
 
+class Owners:
+    """Which study each folder of results belongs to."""
+
+    def __init__(self) -> None:
+        self._sources: dict[str, str] = {}
+
+    def claim(self, study: Study) -> None:
+        """Take the folder of a study's name.
+
+        Raises
+        ------
+        StudyError
+            If another file of that name has it.
+        """
+        from mechdesign.errors import StudyError
+
+        source = str(study.path)
+        owner = self._sources.setdefault(study_label(study), source)
+        if owner != source:
+            raise StudyError(f"{source}: its results would overwrite those of {owner}; rename one of the files")
+
+
 def answer(study: Study, command: str, directory: Path, options: Options) -> Answer:
     """Compute one command's result, judge it by the study's requirements and write it.
 
@@ -87,21 +109,26 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
     """
     import mechdesign
     from mechdesign.errors import StudyError
-    from mechdesign.report import requirements, writer
+    from mechdesign.report import manifest, requirements, writer
 
     begun = time.perf_counter()
     writer.check_writable(directory)
+    more = {"all_modes": True} if options.all_modes else {}
     with terminal.Bar(quiet=options.quiet) as bar:
-        result: Result = getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar)
+        result: Result = getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar, **more)
+    asked = manifest.Asked(options.plots, options.animate and command == "kinematics", options.all_modes)
     try:
         verdicts = requirements.judge(
             result, study.requirements, file=str(study.path or ""), freedom=study.mechanism.mobility
         )
     except StudyError:
         # A misspelt requirement should not cost the computation.
-        writer.write(directory, study, result, plots=options.plots)
+        writer.write(directory, study, result, (), asked)
         raise
-    writer.write(directory, study, result, verdicts, plots=options.plots)
+    files = writer.write(directory, study, result, verdicts, asked)
+    warnings = list(result.warnings)
+    if asked.animate and writer.ANIMATION not in files:
+        warnings.append("no animation: it needs a sweep of one coordinate or a path")
     code = 3 if result.failed else 0 if all(verdict.met for verdict in verdicts) else 1
     return Answer(
         study=study_label(study),
@@ -109,7 +136,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         directory=directory,
         exit_code=code,
         rows=len(result.main),
-        warnings=result.warnings,
+        warnings=warnings,
         failed=result.failed,
         verdicts=verdicts,
         seconds=time.perf_counter() - begun,

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from mechdesign.errors import StudyError
+
 StudyArgument = Annotated[
     Path | None,
     typer.Argument(
@@ -39,6 +41,15 @@ OutAll = Annotated[
         "--out",
         metavar="DIR",
         help="Folder that gets one folder a command (several studies: <study>/<command>). Default: results/<study>.",
+        show_default=False,
+    ),
+]
+OutDrawings = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.",
         show_default=False,
     ),
 ]
@@ -74,6 +85,10 @@ Jobs = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print the main table to stdout as JSON.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the results and what went wrong.")]
 NoPlots = Annotated[bool, typer.Option("--no-plots", help="Draw no pictures.")]
+Animate = Annotated[bool, typer.Option("--animate", help="Also draw the motion of a sweep or path: motion.gif.")]
+AllModes = Annotated[
+    bool, typer.Option("--all-modes", help="Follow every way in which the mechanism can be assembled: modes.csv.")
+]
 Junit = Annotated[
     Path | None,
     typer.Option("--junit", metavar="FILE", help="Also write the outcome as JUnit XML, for CI.", show_default=False),
@@ -92,6 +107,11 @@ class Options:
     ----------
     out : Path or None
         Folder for the results; None is ``results/<study>/<command>``.
+
+    Raises
+    ------
+    StudyError
+        If two options contradict each other.
     """
 
     out: Path | None = None
@@ -101,5 +121,11 @@ class Options:
     json: bool = False
     quiet: bool = False
     plots: bool = True
+    animate: bool = False
+    all_modes: bool = False
     fail_fast: bool = False
     resume: bool = False
+
+    def __post_init__(self) -> None:
+        if self.animate and not self.plots:
+            raise StudyError("--animate and --no-plots contradict each other")

@@ -6,7 +6,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,8 +22,17 @@ NAME = "manifest.json"
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pydantic", "pint", "pyyaml")
 
 
-def origin(study: Study, command: str, *, plots: bool) -> dict[str, Any]:
-    """Everything that decides the bytes of the results: versions, study, overrides, seed."""
+@dataclass(frozen=True)
+class Asked:
+    """What else than tables is wanted of a command: pictures, the animation, every assembly mode."""
+
+    plots: bool = True
+    animate: bool = False
+    all_modes: bool = False
+
+
+def origin(study: Study, command: str, asked: Asked) -> dict[str, Any]:
+    """Everything that decides the bytes of the results: versions, study, overrides, seed, what was asked."""
     return {
         "tool": {"name": "mechdesign", "version": version("mechdesign")},
         "libraries": {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES},
@@ -31,15 +40,15 @@ def origin(study: Study, command: str, *, plots: bool) -> dict[str, Any]:
         "study": {"name": study.name, "sha256": study.text_sha256, "resolved": plain(study.resolved)},
         "overrides": list(study.overrides),
         "seed": study.seed,
-        "plots": plots,
+        **asdict(asked),
     }
 
 
 def compose(
-    study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, bytes], *, plots: bool
+    study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, bytes], asked: Asked
 ) -> bytes:
     """The manifest of a result whose files have these contents."""
-    content = origin(study, result.command, plots=plots) | {
+    content = origin(study, result.command, asked) | {
         "counts": plain(dict(result.counts)),
         "warnings": list(result.warnings),
         "failed": result.failed,
@@ -76,14 +85,15 @@ def recorded_files(content: Mapping[str, Any]) -> dict[str, str]:
     return {name: str(digest) for name, digest in files.items() if Path(name).name == name}
 
 
-def is_current(directory: Path, study: Study, command: str, *, plots: bool) -> dict[str, Any] | None:
-    """The manifest of a folder if it holds, whole, what this study would give again; else None."""
+def is_current(directory: Path, study: Study, command: str, asked: Asked) -> dict[str, Any] | None:
+    """The manifest of a folder if it holds, whole, what this study would give again or more pictures; else None."""
     content = read(directory)
     if content is None:
         return None
-    expected = origin(study, command, plots=plots)
-    if not plots:
-        expected["plots"] = content.get("plots")
+    expected = origin(study, command, asked)
+    for pictures in ("plots", "animate"):
+        if not expected[pictures]:
+            expected[pictures] = content.get(pictures)
     files = recorded_files(content)
     if not files or any(content.get(key) != value for key, value in expected.items()):
         return None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError
 from mechdesign.report import manifest
+from mechdesign.report.manifest import Asked
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import to_csv
 from mechdesign.results import Result
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mechdesign.study import Study
+
+MECHANISM = "mechanism.png"
+ANIMATION = "motion.gif"
 
 
 def check_writable(directory: Path) -> None:
@@ -41,9 +45,7 @@ def check_writable(directory: Path) -> None:
         )
 
 
-def write(
-    directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict] = (), *, plots: bool = True
-) -> tuple[str, ...]:
+def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Asked) -> tuple[str, ...]:
     """Write a result into a directory and return the names of the files.
 
     Each file appears whole or not at all. The manifest comes last; files of an older result that the new one does not
@@ -55,8 +57,8 @@ def write(
         If the directory or a file cannot be written.
     """
     files = {f"{table.name}.csv": to_csv(table).encode() for table in result.tables.values()}
-    if plots:
-        files |= pictures(study, result)
+    if asked.plots:
+        files |= pictures(study, result, animate=asked.animate)
     stale = manifest.recorded_files(manifest.read(directory) or {}).keys() - files.keys()
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -64,7 +66,7 @@ def write(
             _replace(directory / name, data)
         for name in stale:
             (directory / name).unlink(missing_ok=True)
-        _replace(directory / manifest.NAME, manifest.compose(study, result, verdicts, files, plots=plots))
+        _replace(directory / manifest.NAME, manifest.compose(study, result, verdicts, files, asked))
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
     return (*files, manifest.NAME)
@@ -78,15 +80,30 @@ def write_text(path: Path, text: str) -> None:
     OutputError
         If it cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _replace(path, text.encode())
-    except OSError as error:
-        raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
+    _write(path, text.encode())
 
 
-def pictures(study: Study, result: Result) -> dict[str, bytes]:
-    """PNG files of a result: those of its command, then the mechanism."""
+def write_sketch(directory: Path, study: Study) -> Path:
+    """Draw the sketch as it is understood into a directory, as `MECHANISM`; returns the file.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    from mechdesign.report.figures import style
+    from mechdesign.report.figures.mechanism import sketch_figure
+
+    check_writable(directory)
+    with style.context():
+        data = style.to_png(sketch_figure(study))
+    path = directory / MECHANISM
+    _write(path, data)
+    return path
+
+
+def pictures(study: Study, result: Result, *, animate: bool = False) -> dict[str, bytes]:
+    """Pictures of a result: those of its command, the mechanism, and the motion as a GIF if it is one."""
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
     from mechdesign.report.figures.rendering import Drawing, render
@@ -96,8 +113,21 @@ def pictures(study: Study, result: Result) -> dict[str, bytes]:
         drawings: dict[str, Drawing] = {
             f"{name}.png": partial(style.to_png, figure) for name, figure in figures.items()
         }
-        drawings["mechanism.png"] = lambda: style.to_png(mechanism_figure(study))
-        return render(drawings)
+        drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study))
+        if animate:
+            from mechdesign.report.figures.animation import animation
+
+            drawings[ANIMATION] = lambda: animation(study)
+        # What cannot be animated gives no bytes.
+        return {name: data for name, data in render(drawings).items() if data}
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _replace(path, data)
+    except OSError as error:
+        raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
 
 
 def _replace(path: Path, data: bytes) -> None:

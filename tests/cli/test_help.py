@@ -32,6 +32,13 @@ def test_options_that_stand_everywhere(name):
     known = {option for parameter in GROUP.commands[name].params for option in parameter.opts}
     assert known >= set(EVERY)
     assert (name == "run") == ({"--junit", "--fail-fast", "--resume"} <= known)
+    assert (name in ("kinematics", "run")) == ("--animate" in known)
+    assert (name == "kinematics") == ("--all-modes" in known)
+
+
+def test_options_of_check():
+    known = {option for parameter in GROUP.commands["check"].params for option in parameter.opts}
+    assert known >= {"--out", "--set", "--quiet", "--no-plots"}
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["reliability", "--help"], ["--version"]])

@@ -152,11 +152,11 @@ def test_resume_keeps_the_verdict(studies, analysis, invoke):
 
 
 def test_check_says_joints_mobility_and_every_mistake(studies, invoke):
-    done = invoke("check", "slider.yaml")
+    done = invoke("check", "slider.yaml", "--no-plots")
     assert done.exit_code == 0
     assert "mobility: 1" in done.stdout
     assert "revolute" in done.stdout
-    done = invoke("check", "slider.yaml", "wrong.yaml")
+    done = invoke("check", "slider.yaml", "wrong.yaml", "--no-plots")
     assert done.exit_code == 2
     assert "mobility: 1" in done.stdout
     assert "wrong.yaml:6:19: mechanism.links.crank" in done.stderr

@@ -19,13 +19,22 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.paths import TALLEST, draw_paths
-from mechdesign.report.figures.sweep import Sweep
+from mechdesign.report.figures.sweep import Sweep, is_motion, solve_sweep
+from mechdesign.study import Study
 
 FRAMES = 72
 _COLORS, _WHITE = 48, 244
 _TITLE = 0.36  # inches above the drawing, for the pose in words
 _CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and of a frame
 _DPI = 100  # 800 pixels wide
+
+
+def animation(study: Study) -> bytes:
+    """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
+    if not is_motion(study.poses("kinematics")):
+        return b""
+    sweep = solve_sweep(study)
+    return gif(sweep) if len(sweep.valid) else b""
 
 
 def gif(sweep: Sweep) -> bytes:

@@ -1,0 +1,85 @@
+"""`check`: what it says, and the drawing of the sketch as understood."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from .conftest import SLIDER
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def test_the_sketch_is_drawn_and_the_file_named(folder, invoke):
+    done = invoke("check", "slider.yaml")
+    assert done.exit_code == 0
+    assert "mobility: 1" in done.stdout
+    drawing = Path("results/slider/check/mechanism.png")
+    assert str(drawing) in done.stderr
+    assert (folder / drawing).read_bytes().startswith(PNG)
+
+
+def test_where_the_drawing_goes(folder, invoke):
+    (folder / "other.yaml").write_text(SLIDER)
+    invoke("check", "slider.yaml", "--out", "one")
+    assert (folder / "one/mechanism.png").exists()
+    invoke("check", "slider.yaml", "other.yaml", "--out", "several")
+    assert {path.parent.name for path in (folder / "several").rglob("*.png")} == {"slider", "other"}
+    assert not (folder / "results").exists()
+
+
+def test_without_drawing_nothing_is_written(folder, invoke):
+    done = invoke("check", "slider.yaml", "--no-plots")
+    assert done.exit_code == 0
+    assert "mobility: 1" in done.stdout
+    assert done.stderr == ""
+    assert not (folder / "results").exists()
+
+
+def test_quiet_says_nothing_and_draws(folder, invoke):
+    done = invoke("check", "slider.yaml", "--quiet")
+    assert (done.stdout, done.stderr) == ("", "")
+    assert (folder / "results/slider/check/mechanism.png").exists()
+
+
+def test_a_folder_that_cannot_be_written(folder, invoke):
+    (folder / "file").write_text("")
+    done = invoke("check", "slider.yaml", "--out", "file/deep")
+    assert done.exit_code == 4
+    assert "mobility: 1" in done.stdout
+    assert "file is a file" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_two_studies_of_one_name_do_not_overwrite_each_other(folder, invoke):
+    (folder / "deep").mkdir()
+    (folder / "deep/slider.yaml").write_text(SLIDER.replace("120", "130"))
+    invoke("check", "slider.yaml")
+    before = (folder / "results/slider/check/mechanism.png").read_bytes()
+    done = invoke("check", "slider.yaml", "deep/slider.yaml")
+    assert done.exit_code == 2
+    assert "would overwrite" in done.stderr
+    assert (folder / "results/slider/check/mechanism.png").read_bytes() == before
+
+
+def test_a_wrong_study_has_no_drawing(folder, invoke):
+    (folder / "slider.yaml").write_text(SLIDER.replace("[O, A, r]", "[O, A, q]"))
+    assert invoke("check", "slider.yaml").exit_code == 2
+    assert not (folder / "results").exists()
+
+
+@pytest.mark.parametrize("arguments", [["--no-plots"], []])
+def test_checking_imports_no_solver_of_scipy(folder, arguments):
+    code = (
+        "import sys\nfrom mechdesign.cli.app import main\n"
+        f"sys.argv = ['mechdesign', 'check', 'slider.yaml', *{arguments!r}]\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
+        "import json\njson.dump([name for name in sys.modules if '.' not in name], open('modules.json', 'w'))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    modules = set(json.loads((folder / "modules.json").read_text()))
+    assert ("matplotlib" in modules) == (not arguments)
+    assert not modules & {"scipy", "rich", "pint"}
