@@ -8,23 +8,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, cross, quiet
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.rigidity import Equations
-from mechdesign.mechanism.sketch import Sketch
+from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.redundancy import owners_of
+from mechdesign.mechanism.rigidity import CLOSED, Vector
+from mechdesign.mechanism.sketch import KEY
 from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Group
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.mechanism import Mechanism
 
-# Slides whose directions differ by less (radians) are parallel.
-PARALLEL = 1e-9
 # Poses of a sweep for the range in which a mechanism closes, and halvings of its ends.
 SWEEP, HALVINGS = 721, 40
 
 
-def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Coordinate, float]]) -> str:
+def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
     """Why a mechanism's sketch cannot be assembled at its own drive values, and what would mend it.
 
     Parameters
@@ -34,35 +36,65 @@ def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Co
     given : sequence of (Coordinate, float)
         The drives and their values (radians or lengths).
     """
-    plan, unit = mechanism.forward, mechanism.description.angle_unit
+    plan, unit, equations = mechanism.forward, mechanism.description.angle_unit, mechanism.equations
     values = ", ".join(f"{c.name} = {v / (unit if c.quantity == 'angle' else 1.0):.6g}" for c, v in given)
-    where = open_group(state, mechanism.equations, mechanism.sketch, given)
-    elsewhere = []
-    for k, (coordinate, _) in enumerate(given if not plan.iterative else ()):
+    start = f"the sketch cannot be assembled at its own drive values{f' ({values})' if given else ''}"
+    x, gap = equations.solve(equations.from_sketch(mechanism.sketch), given)
+    if gap < CLOSED and plan.iterative:
+        return _closed_elsewhere(mechanism, x, start, [coordinate for coordinate, _ in given])
+    where, mend = open_group(state, equations.gaps(x))
+    if not plan.iterative:
+        for k, (coordinate, _) in enumerate(given):
 
-        def valid(sweep: NDArray[np.float64], k: int = k) -> Value:
-            return plan.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
+            def valid(sweep: NDArray[np.float64], k: int = k) -> Value:
+                return plan.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
 
-        found = closing_range(valid, coordinate, mechanism.size, unit)
-        if found:
-            elsewhere.append(found)
-    mend = f"{elsewhere[0]}; draw it there, or check" if elsewhere else "check"
-    at = f" ({values})" if given else ""
-    return f"the sketch cannot be assembled at its own drive values{at}: {where}; {mend} the lengths"
+            found = closing_range(valid, coordinate, mechanism.size, unit)
+            if found:
+                mend = f"{found}; draw it there, or {mend}"
+                break
+    return MechanismError(f"{start}: {where}; {mend}", KEY)
 
 
-def open_group(state: State, equations: Equations, sketch: Sketch, given: Sequence[tuple[Coordinate, float]]) -> str:
-    """What the first group that does not close lacks, in a designer's words."""
+def _closed_elsewhere(mechanism: Mechanism, x: Vector, start: str, drives: Sequence[Coordinate]) -> MechanismError:
+    """A group that closes, but not where Newton's method gets to from the sketch, or not in one place only."""
+    equations, graph = mechanism.equations, mechanism.graph
+    real, middle = equations.mobility(x)
+    if real > len(drives):
+        return over_constrained(mechanism.description, equations, middle, len(drives), real, len(drives))
+    free = motions_in_words(equations, equations.jacobian(x, drives))
+    if free:
+        return MechanismError(f"the sketch is at a singular position: with its drives held, {free}; draw another", KEY)
+    places = equations.unpack(x)[0] * equations.size
+    moving = [
+        f"{point}: [{place.real:.6g}, {place.imag:.6g}]"
+        for point, place in zip(graph.nodes, places, strict=True)
+        if ":" not in point and (GROUND, point) not in graph.points
+    ]
+    return MechanismError(f"{start} from where it is drawn; it closes at {{{', '.join(moving)}}}", KEY)
+
+
+def open_group(state: State, gaps: NDArray[np.complex128]) -> tuple[str, str]:
+    """What the first group that does not close lacks, in a designer's words, and what would mend it.
+
+    Parameters
+    ----------
+    gaps : complex array, shape (edges,)
+        What the edges miss at best.
+    """
+    converged = iter(state.converged)
     for group in state.structure.groups:
-        unknown = [state.rotations[root] for root in group.angles] + [state.slides[slide] for slide in group.slides]
         if group.form == "newton":
-            return _newton(equations, sketch, given, group, state)
+            if not np.all(next(converged)):
+                return _newton(state, group, gaps), "check the lengths"
+            continue
+        unknown = [state.rotations[root] for root in group.angles] + [state.slides[slide] for slide in group.slides]
         if not all(value is not None and np.isfinite(value) for value in unknown):
             return _dyad(state, group)
     for slide in sorted(state.graph.telescopic):
         if not float(np.real(state.slides[slide])) > 0:
-            return f"leg '{state.graph.slides[slide]}' has no positive length"
-    return "a given coordinate cannot have its value"
+            return f"leg '{state.graph.slides[slide]}' has no positive length", "check the lengths"
+    return "a given coordinate cannot have its value", "check the lengths"
 
 
 class _Walk:
@@ -109,54 +141,55 @@ class _Walk:
         return " and ".join(self.names[node] for node in nodes if ":" not in self.names[node])
 
 
-def _dyad(state: State, group: Group) -> str:
+def _dyad(state: State, group: Group) -> tuple[str, str]:
     walk = _Walk(state, group)
-    gap = abs(walk.known)
-    if group.form == "two angles":
-        first, second = group.angles
-        inner = [node for node in walk.ends[first] if node in walk.ends[second]]
-        outer = [node for root in group.angles for node in walk.ends[root] if node not in inner]
-        reach, least = (abs(abs(walk.vector[first]) + s * abs(walk.vector[second])) for s in (1, -1))
-        at = f" at {walk.points(inner)}" if len(inner) == 1 else ""
-        apart = f"{walk.points(outer)} are {gap:.5g} apart" if len(outer) == 2 else f"they have to span {gap:.5g}"
-        limit = f"reach only {reach:.5g}" if gap > reach else f"span no less than {least:.5g}"
-        if min(abs(z) for z in walk.vector.values()) == 0.0:
-            short = next(root for root, z in walk.vector.items() if z == 0)
-            return f"the joints on link {'-'.join(dict.fromkeys(walk.links[short]))} are at one place"
-        return f"links {walk.link(first)} and {walk.link(second)} cannot meet{at}: {apart}, the links {limit}"
-    slides = [state.graph.slides[slide] for slide in group.slides]
     if group.form == "two slides":
-        one, two = (walk.direction[slide] for slide in group.slides)
-        if abs(cross(one, two)) < PARALLEL:
-            return f"the slides '{slides[0]}' and '{slides[1]}' are parallel: their displacements are not determined"
-        return f"the slides '{slides[0]}' and '{slides[1]}' do not meet"
+        one, two = (f"'{state.graph.slides[slide]}'" for slide in group.slides)
+        return f"the slides {one} and {two} are parallel, which holds nothing along them", "change a direction"
+    for root, z in walk.vector.items():
+        if z == 0 and group.form != "angle and turning slide":
+            return f"the joints on link {walk.link(root)} are at one place", "put them apart"
+    tell = {"two angles": _two_links, "angle and fixed slide": _link_and_slide}.get(group.form, _turning_slide)
+    return tell(state, group, walk), "check the lengths"
+
+
+def _two_links(state: State, group: Group, walk: _Walk) -> str:
+    first, second = group.angles
+    inner = [node for node in walk.ends[first] if node in walk.ends[second]]
+    outer = [node for root in group.angles for node in walk.ends[root] if node not in inner]
+    gap, long, short = abs(walk.known), *sorted((abs(z) for z in walk.vector.values()), reverse=True)
+    at = f" at {walk.points(inner)}" if len(inner) == 1 else ""
+    apart = f"{walk.points(outer)} are {gap:.5g} apart" if len(outer) == 2 else f"they have to span {gap:.5g}"
+    limit = f"reach only {long + short:.5g}" if gap > long else f"span no less than {long - short:.5g}"
+    return f"links {walk.link(first)} and {walk.link(second)} cannot meet{at}: {apart}, the links {limit}"
+
+
+def _link_and_slide(state: State, group: Group, walk: _Walk) -> str:
     (root,), (slide,) = group.angles, group.slides
-    direction = walk.direction[slide]
-    if group.form == "angle and fixed slide":
-        off = abs(cross(direction, walk.known))
-        pins = [node for node in walk.ends[root] if node not in walk.slide_ends[slide]] or walk.ends[root]
-        from_ = f"of '{slides[0]}' passes {walk.points(pins[:1])} at a distance of {off:.5g}"
-        return f"link {walk.link(root)} is too short to reach its slide: the line {from_}"
-    off = abs(cross(direction, walk.vector[root]))
+    off = abs(cross(walk.direction[slide], walk.known))
+    pins = [node for node in walk.ends[root] if node not in walk.slide_ends[slide]] or walk.ends[root]
+    line = f"the line of '{state.graph.slides[slide]}' passes {walk.points(pins[:1])} at a distance of {off:.5g}"
+    return f"link {walk.link(root)} is too short to reach its slide: {line}"
+
+
+def _turning_slide(state: State, group: Group, walk: _Walk) -> str:
+    (root,), (slide,) = group.angles, group.slides
+    off = abs(cross(walk.direction[slide], walk.vector[root]))
     joints = walk.points(list(dict.fromkeys((group.loops[0].start, group.loops[0].end))))
-    return (
-        f"slide '{slides[0]}' cannot close: its joints{f' {joints}' if joints else ''} are {gap:.5g} apart, nearer "
-        f"than the {off:.5g} that its links hold them off the line"
-    )
+    apart = f"its joints{f' {joints}' if joints else ''} are {abs(walk.known):.5g} apart"
+    held = f"nearer than the {off:.5g} that its links hold them off the line"
+    return f"slide '{state.graph.slides[slide]}' cannot close: {apart}, {held}"
 
 
-def _newton(
-    equations: Equations, sketch: Sketch, given: Sequence[tuple[Coordinate, float]], group: Group, state: State
-) -> str:
+def _newton(state: State, group: Group, gaps: NDArray[np.complex128]) -> str:
     graph, edges = state.graph, state.structure.edges
-    used = {k for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)}
-    bodies = [edges[k].locals[0][1].removesuffix(":rod") for k in sorted(used) if edges[k].locals]
+    used = sorted({k for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)})
     nodes = {node for k in used for node in (edges[k].tail, edges[k].head)}
     joints = ", ".join(sorted(graph.nodes[node] for node in nodes if ":" not in graph.nodes[node]))
-    x, _ = equations.solve(equations.from_sketch(sketch), given)
-    gaps = np.abs(equations.gaps(x))
-    missing = f"; at best a gap of {gaps.max():.5g} stays" if gaps.size else ""
-    return f"links {', '.join(dict.fromkeys(bodies))} do not meet (joints {joints}){missing}"
+    worst = max(used, key=lambda k: abs(gaps[k]))
+    at = f"'{owners_of(graph, [worst])[0]}'" if owners_of(graph, [worst]) else "one of them"
+    best = f"at best {at} stays {abs(gaps[worst]):.5g} too short or too long"
+    return f"links {', '.join(owners_of(graph, used))} do not meet (joints {joints}), {best}"
 
 
 def closing_range(

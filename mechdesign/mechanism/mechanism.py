@@ -136,10 +136,9 @@ class Mechanism:
                 structure = compile_structure(self.graph, coordinates)
                 diagnosis.check_independent(self.equations, structure)
             except Undetermined as error:
-                what = "drives" if key == tuple(self.description.drives) else ", ".join(key)
-                where = "mechanism.drives" if what == "drives" else "poses"
-                told = diagnosis.undetermined(self.equations, coordinates, str(error))
-                raise MechanismError(f"{what} do not determine the mechanism: {told}", where) from None
+                raise diagnosis.undetermined(
+                    self.description, self.equations, self.sketch, coordinates, str(error)
+                ) from None
             modes = assembly_modes(self.graph, self.geometry, structure, self.sketch)
             self._plans[key] = Plan(self, structure, modes)
         return self._plans[key]
@@ -198,8 +197,7 @@ class Mechanism:
         configuration = plan.configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
         if not configuration.valid:
             pose = list(zip(plan.structure.given, given, strict=True))
-            told = closing.cannot_assemble(self, state, pose)
-            raise MechanismError(told, "mechanism.sketch")
+            raise closing.cannot_assemble(self, state, pose)
         return configuration
 
     def solve(self, pose: Mapping[str, ArrayLike], places: Mapping[str, ArrayLike] | None = None) -> Pose:

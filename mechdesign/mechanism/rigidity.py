@@ -55,7 +55,7 @@ class Equations:
     @cached_property
     def _arms(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         vectors = self.geometry.nominal
-        return np.array(vectors.w, dtype=complex) / self.size, np.array(vectors.d, dtype=complex)
+        return np.array(vectors.w, dtype=np.complex128) / self.size, np.array(vectors.d, dtype=np.complex128)
 
     @property
     def angles(self) -> int:
@@ -165,9 +165,10 @@ class Equations:
             misses = [self._miss(x, coordinate, value) for coordinate, value in held]
             return np.concatenate([gaps.view(float), misses])
 
-        found = least_squares(
-            residual, x, lambda x: self.jacobian(x, coordinates), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200
-        )
+        def slope(x: Vector) -> Vector:
+            return self.jacobian(x, coordinates)
+
+        found = least_squares(residual, x, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
         return found.x, float(np.abs(found.fun).max(initial=0.0))
 
     def _miss(self, x: Vector, coordinate: Coordinate, value: float) -> float:
@@ -209,7 +210,7 @@ class Equations:
         gone |= {self.inner + part + node - 1 for node in lonely for part in (0, nodes)}
         kept = [column for column in range(jacobian.shape[1]) if column not in gone]
         rows = [2 * k + part for k in left for part in (0, 1)]
-        return null_space(jacobian[np.ix_(rows, kept)]).shape[1]
+        return int(null_space(jacobian[np.ix_(rows, kept)]).shape[1])
 
 
 def null_space(matrix: Vector) -> Vector:
@@ -233,7 +234,7 @@ def separated(basis: Vector, pivots: int) -> list[Vector]:
         part = np.abs(rows[index:, :pivots])
         if part.size == 0 or part.max() < RANK * np.abs(rows[index:]).max():
             part = np.abs(rows[index:])
-        row, column = np.unravel_index(int(part.argmax()), part.shape)
+        row, column = divmod(int(part.argmax()), part.shape[1])
         rows[[index, index + row]] = rows[[index + row, index]]
         rows[index] /= rows[index, column]
         others = np.arange(len(rows)) != index

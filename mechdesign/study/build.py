@@ -44,6 +44,7 @@ class Builder:
         self._build_links()
         joints = joint_rules.build(self)
         joint_rules.check_connected(self)
+        joint_rules.check_pins(self)
         drives = quantities.drives(self)
         measures = quantities.measures(self)
         limits = quantities.limits(self)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mechdesign.mechanism.model import Fixed, Line, Prismatic, Slot
 from mechdesign.mechanism.model import Joint as JointModel
+from mechdesign.mechanism.model import Link as LinkModel
 from mechdesign.study import models
 from mechdesign.study.document import Path
 from mechdesign.study.names import GROUND
@@ -128,6 +129,41 @@ def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, 
         return None
     angle = (directions[1] - directions[0]) / builder.units.angle_factor
     return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle"))
+
+
+def check_pins(builder: Builder) -> None:
+    """Note links that share two points, and slides between links that a shared point pins together."""
+    section, names = builder.section, builder.names
+    for index, (name, link) in enumerate(builder.links.items()):
+        for other in list(builder.links.values())[:index]:
+            shared = [point for point in link.points if point in other.points]
+            if len(shared) > 1:
+                builder.report(("links", name), _shared_twice(builder, link, other, shared), at_key=True)
+    for name, joint in section.joints.items():
+        pair = joint.prismatic or ((joint.slot, joint.point) if joint.slot and joint.point else None)
+        if pair is None:
+            continue
+        points = names.points_of(pair[0])
+        pinned = [point for point in points if point in (names.points_of(pair[1]) if joint.prismatic else [pair[1]])]
+        if pinned and (joint.prismatic or names.owners[pinned[0]] != [pair[0]]):
+            what = (
+                "a point that two links name pins them together" if joint.prismatic else "a pin holds it to that link"
+            )
+            mend = "give the slider's point a name of its own" if joint.prismatic else "leave it out there"
+            message = f"point {pinned[0]!r} is on link {pair[0]!r} too, so that it cannot slide: {what}; {mend}"
+            builder.report(("joints", name), message)
+
+
+def _shared_twice(builder: Builder, link: LinkModel, other: LinkModel, shared: list[str]) -> str:
+    places = [[complex(*map(builder.nominal, body.points[point])) for point in shared[:2]] for body in (link, other)]
+    one, two = (abs(b - a) for a, b in places)
+    pins = f"{shared[0]!r} and {shared[1]!r}"
+    if abs(one - two) > 1e-9 * max(one, two):
+        return (
+            f"{pins} are on link {other.name!r} too, but {two:.9g} apart there and {one:.9g} here; keep one of the two"
+        )
+    mend = "leave it out" if other.name == GROUND else "make the two one link that has all their points"
+    return f"{pins} are on link {other.name!r} too: the two are one rigid body; {mend}"
 
 
 def check_connected(builder: Builder) -> None:
