@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
+from mechdesign.memory import keep_freed_memory
 from mechdesign.parallel import map_chunks
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.plan import Plan
 
 # Poses of a chunk: the fastest of 4,096 to 65,536 for closed forms, measured on one and on two threads.
-CHUNK = 16384
+CHUNK = 8192
 
 
 def too_large(shape: tuple[int, ...]) -> bool:
@@ -34,6 +35,7 @@ def solve(
     jobs: int | None,
 ) -> Configuration:
     """`Plan.solve` chunk by chunk; the same result, whatever `jobs`."""
+    keep_freed_memory()
     count = int(np.prod(shape, dtype=np.int64))
 
     def flat(value: Value) -> Value:

@@ -42,8 +42,8 @@ def two_angles(k: Value, z1: Value, z2: Value, mode: Value) -> Solution:
     product = 2 * np.sqrt(n1 * n2)
     outer, inner = (n1 + n2 + product) - reach, reach - (n1 + n2 - product)
     height = _root(outer * inner, n1 + n2, reach)
-    along = (0.5 / reach) * vector(reach + (n1 - n2), mode * height)
-    first = k * along
+    half = 0.5 / reach
+    first = k * vector((reach + (n1 - n2)) * half, height * (mode * half))
     u1 = first * (np.conj(z1) * (-1 / n1))
     u2 = (first - k) * (np.conj(z2) * (1 / n2))
     return u1, u2, (outer, inner)
