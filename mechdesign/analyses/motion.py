@@ -13,7 +13,7 @@ from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_cond
 from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, radians, solve_poses
 from mechdesign.analyses.rates import STALLED, DriveRates, inverse_rates
 from mechdesign.analyses.targets import Error, errors, needed
-from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization, regularity
 from mechdesign.mechanism.graph import GROUND
@@ -152,7 +152,8 @@ class Motion:
                 value = configuration.value(coordinate) if value is None else value
                 self.put(coordinate.name, rows, in_study_units(study, coordinate, value))
         linear = study.mechanism.linearize(configuration)
-        conditioning = np.broadcast_to(regularity(linear), rows.shape)
+        assembled = configuration.valid | np.equal(configuration.reason, int(Reason.LIMIT))
+        conditioning = np.where(assembled, regularity(linear), np.nan)
         self.put("conditioning", rows, conditioning)
         regular = conditioning >= STALLED
         if self.asked.section.rates or self.asked.section.accelerations:
