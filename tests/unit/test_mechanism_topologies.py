@@ -149,7 +149,6 @@ def test_acceleration_of_an_expression_does_not_depend_on_poses_that_fail() -> N
     [
         (("rocker: [D, B, 3]", "rocker: [D, B, 3], x: [Q, R, 1], y: [R, S, 1]"), "links.x: nothing joins it to the gr"),
         (("drives: [crank]", "joints: {s: {slot: ground, through: [O, O2], point: B}}\n  drives: [crank]"), "'O2'"),
-        (("[crank]", "[crank]\n  branch: follow"), "'follow' is not available in this version"),
     ],
 )
 def test_mistakes_of_the_whole_are_named(change: tuple[str, str], message: str) -> None:
