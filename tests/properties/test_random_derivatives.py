@@ -1,0 +1,149 @@
+"""Velocities, accelerations, Jacobians and sensitivities of random mechanisms against differences.
+
+Differences are taken at two steps and extrapolated; how far the two are apart bounds what a difference can tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from helpers.random_mechanisms import Made, mechanisms
+from hypothesis import assume, given, settings
+from numpy.typing import NDArray
+
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import wrap
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
+
+BEND = 0.7
+STEPS = (-2, -1, 0, 1, 2)
+Array = NDArray[np.float64]
+
+
+def slopes(values: list[Array], h: float) -> tuple[Array, Array]:
+    """First derivative from values at -2h ... 2h, and what it may be wrong by."""
+    near, far = (values[3] - values[1]) / (2 * h), (values[4] - values[0]) / (4 * h)
+    return (4 * near - far) / 3, np.abs(near - far)
+
+
+def bends(values: list[Array], h: float) -> tuple[Array, Array]:
+    """Second derivative from values at -2h ... 2h, and what it may be wrong by."""
+    near = (values[3] - 2 * values[2] + values[1]) / h**2
+    far = (values[4] - 2 * values[2] + values[0]) / (4 * h**2)
+    return (4 * near - far) / 3, np.abs(near - far)
+
+
+def agree(exact: object, difference: tuple[Array, Array], rounding: float, what: str) -> None:
+    """An exact derivative equals a difference as far as that can tell."""
+    value, error = difference
+    exact = np.broadcast_to(np.asarray(exact, dtype=float), value.shape)
+    # Where the two steps differ by more than this, higher derivatives are so large that a difference tells nothing.
+    told = error < 1e-2 * (1 + np.abs(exact))
+    miss = np.abs(exact - value) - 0.3 * error - rounding * (1 + np.abs(exact))
+    assert np.all(miss[told] <= 0), (what, exact, value, error)
+
+
+def along(configurations: list[Configuration], coordinate: Coordinate) -> list[Array]:
+    """A coordinate in neighbouring configurations, an angle continued from the middle one."""
+    values = [np.broadcast_to(np.asarray(c.value(coordinate), dtype=float), c.shape) for c in configurations]
+    if coordinate.quantity == "angle":
+        return [values[2] + wrap(value - values[2]) for value in values]
+    return values
+
+
+@settings(max_examples=100)
+@given(mechanisms())
+def test_velocities_in_the_pose_drawn_are_those_of_its_own_equations(made: Made) -> None:
+    mechanism, layout = made.mechanism, made.layout
+    rates = [made.rates[drive] for drive in mechanism.drives]
+    known = made.known()
+    expected = layout.velocities([layout.drives[d] for d in mechanism.drives], rates, list(known.values()))
+    configuration = mechanism.sketch_configuration
+    velocity = mechanism.linearize(configuration).velocity(rates)
+    for name, value in zip(known, expected, strict=True):
+        got = float(first(configuration, mechanism.coordinate(name), velocity))
+        assert got == pytest.approx(value, rel=1e-8, abs=1e-8), name
+
+
+@settings(max_examples=100)
+@given(mechanisms())
+def test_velocities_and_accelerations_are_derivatives(made: Made) -> None:
+    mechanism, h = made.mechanism, 1e-3
+    time = np.linspace(-0.1, 0.1, 5)
+    near = [made.at(time + k * h, BEND) for k in STEPS]
+    ok = np.flatnonzero(np.all([c.valid for c in near], axis=0))
+    assert 2 in ok
+    near = [c.take(ok) for c in near]
+    rates = [made.rates[drive] * (1 + BEND * time[ok]) for drive in mechanism.drives]
+    linear = mechanism.linearize(near[2])
+    velocity = linear.velocity(rates)
+    acceleration = linear.acceleration(velocity, [made.rates[drive] * BEND for drive in mechanism.drives])
+    for name in mechanism.coordinates:
+        coordinate = mechanism.coordinate(name)
+        values = along(near, coordinate)
+        agree(first(near[2], coordinate, velocity), slopes(values, h), 1e-9, f"{name} velocity")
+        agree(second(near[2], coordinate, velocity, acceleration), bends(values, h), 1e-6, f"{name} acceleration")
+
+
+@settings(max_examples=60)
+@given(mechanisms())
+def test_a_jacobian_holds_the_derivatives_by_each_drive(made: Made) -> None:
+    mechanism, h = made.mechanism, 1e-3
+    names = made.rng.sample(mechanism.coordinates, 6)
+    coordinates = [mechanism.coordinate(name) for name in names]
+    configuration = mechanism.sketch_configuration
+    jacobian = mechanism.jacobian(configuration, coordinates)
+    start = made.drives(np.array(0.0))
+    assert jacobian.shape == (6, len(start))
+    for column in range(len(start)):
+        given_values = [value + h * np.array(STEPS) * (k == column) for k, value in enumerate(start)]
+        batch = mechanism.forward.solve(given_values)
+        assume(batch.valid.all())
+        near = [batch.take(k) for k in range(5)]
+        for row, coordinate in enumerate(coordinates):
+            agree(jacobian[row, column], slopes(along(near, coordinate), h), 1e-9, f"{names[row]} by drive {column}")
+
+
+def _state(made: Made, time: Array, changes: dict[str, Array]) -> tuple[Configuration, object, object, object]:
+    mechanism = made.mechanism
+    configuration = mechanism.forward.solve(made.drives(time), changes)
+    linear = mechanism.linearize(configuration)
+    velocity = linear.velocity([made.rates[drive] for drive in mechanism.drives])
+    bent = [BEND * made.rates[drive] for drive in mechanism.drives]
+    return configuration, linear, velocity, linear.acceleration(velocity, bent)
+
+
+@settings(max_examples=40)
+@given(mechanisms())
+def test_sensitivities_of_every_order_are_derivatives(made: Made) -> None:
+    mechanism, h = made.mechanism, 1e-4
+    time = np.array([-0.02, 0.0, 0.03])
+    every = [name for name in mechanism.nominal if not name.startswith("limits")]
+    places = made.rng.sample(every, min(4, len(every))) + made.rng.sample(sorted(mechanism.geometry.pin_offsets), 2)
+    configuration, linear, velocity, acceleration = _state(made, time, {})
+    assume(configuration.valid.all())
+    position = linear.sensitivity(places)
+    velocity_z, acceleration_z = linear.rate_sensitivity(places, position, velocity, acceleration)
+    motion = Motion(velocity, acceleration, position, velocity_z, acceleration_z)
+    orders: list[Callable[[Coordinate], object]] = [
+        lambda c: first(configuration, c, position),
+        lambda c: velocity_sensitivity(configuration, c, motion),
+        lambda c: acceleration_sensitivity(configuration, c, motion),
+    ]
+    names = made.rng.sample([n for n in mechanism.coordinates if n not in mechanism.drives], 5)
+    for row, place in enumerate(places):
+        states = [_state(made, time, {place: np.array(mechanism.nominal.get(place, 0.0) + k * h)}) for k in STEPS]
+        assume(all(state[0].valid.all() for state in states))
+        for name in names:
+            c = mechanism.coordinate(name)
+            shown = [
+                along([state[0] for state in states], c),
+                [np.broadcast_to(first(state[0], c, state[2]), time.shape) for state in states],
+                [np.broadcast_to(second(state[0], c, state[2], state[3]), time.shape) for state in states],
+            ]
+            for order, (values, exact) in enumerate(zip(shown, orders, strict=True)):
+                derivative = np.broadcast_to(np.asarray(exact(c)), (len(places), len(time)))[row]
+                agree(derivative, slopes(values, h), 1e-7, f"order {order} of {name} by {place}")

@@ -1,0 +1,197 @@
+"""Laws of position that hold for every mechanism, over random ones of any topology."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.layouts import GROUND, Coordinate
+from helpers.random_mechanisms import Made, mechanisms
+from helpers.studies import study_of
+from hypothesis import assume, event, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mechdesign.errors import MechanismError, StudyError
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import wrap
+from mechdesign.mechanism.plan import Plan
+
+
+def gaps(made: Made, configuration: Configuration) -> dict[str, NDArray]:
+    """How far every link is from rigid and every joint from closed, by the drawing's own dimensions."""
+    layout, found, turns = made.layout, {}, {}
+    for body in layout.bodies.values():
+        turn = turns[body.name] = configuration.rotation(body.name)
+        found[f"{body.name} turned"] = np.abs(turn) - 1
+        first = configuration.point(body.points[0])
+        for point in body.points[1:]:
+            local = (layout.places[point] - layout.places[body.points[0]]) / body.turn
+            found[f"{point} on {body.name}"] = np.abs(configuration.point(point) - first - local * turn)
+        if body.to:
+            found[f"{body.name} straight"] = ((configuration.point(body.to) - first) / turn).imag
+    for guide in layout.guides.values():
+        line, slider = layout.bodies[guide.guide], layout.bodies[guide.slider]
+        along = guide.along / line.turn * turns[line.name]
+        base = guide.through or line.points[0]
+        at = configuration.point(base) + (guide.base - layout.places[base]) / line.turn * turns[line.name]
+        span = configuration.point(guide.point) - at
+        slide = configuration.value(made.mechanism.coordinate(f"{guide.name}.slide"))
+        found[f"{guide.name} on its line"] = np.abs(span - slide * along)
+        if guide.kind == "prismatic":
+            kept = slider.turn / guide.along
+            found[f"{guide.name} not turned"] = np.abs(turns[slider.name] - kept * along)
+    for clamp in layout.clamps.values():
+        kept = layout.bodies[clamp.second].turn / layout.bodies[clamp.first].turn
+        found[f"{clamp.name} not turned"] = np.abs(turns[clamp.second] - kept * turns[clamp.first])
+    return found
+
+
+def same(a: Configuration, b: Configuration) -> None:
+    """Two configurations are equal bit for bit."""
+    assert np.array_equal(a.reason, b.reason)
+    for one, two in zip((*a.nodes, *a.rotations, *a.slides), (*b.nodes, *b.rotations, *b.slides), strict=True):
+        one, two = (np.broadcast_to(np.asarray(v), a.shape) for v in (one, two))
+        assert np.array_equal(one, two, equal_nan=True)
+
+
+@settings(max_examples=150)
+@given(mechanisms())
+def test_a_sketch_is_assembled_in_the_pose_it_was_drawn_in(made: Made) -> None:
+    mechanism = made.mechanism
+    assert mechanism.mobility == len(made.layout.drives)
+    pose = made.layout.pose(made.layout.drives)
+    for configuration in (mechanism.sketch_configuration, mechanism.solve(pose).configuration):
+        for point, place in made.layout.places.items():
+            assert complex(configuration.point(point)) == pytest.approx(place, abs=1e-9)
+        for name, coordinate in made.known().items():
+            shown = float(configuration.value(mechanism.coordinate(name)))
+            miss = shown - made.layout.value(coordinate)
+            assert (wrap(miss) if coordinate[0] == "angle" else miss) == pytest.approx(0, abs=1e-9), name
+
+
+@settings(max_examples=150)
+@given(mechanisms(), st.sampled_from([0.2, 1.0, 4.0]))
+def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
+    time = np.linspace(-reach, reach, 41)
+    configuration = made.at(time)
+    ok = np.flatnonzero(configuration.valid)
+    assert 20 in ok
+    event(f"{10 * (len(ok) // 5)} % valid")
+    closed = configuration.take(ok)
+    bound = 1e-12 * max(1.0, made.size)
+    for what, gap in gaps(made, closed).items():
+        assert np.abs(gap).max() < bound, what
+    for drive, value in zip(made.mechanism.drives, made.drives(time[ok]), strict=True):
+        off = closed.value(made.mechanism.coordinate(drive)) - value
+        assert np.abs(wrap(off) if made.mechanism.quantity(drive) == "angle" else off).max() < bound, drive
+
+
+@settings(max_examples=100)
+@given(
+    mechanisms(),
+    st.floats(-3, 4),
+    st.floats(-math.pi, math.pi),
+    st.complex_numbers(max_magnitude=10),
+    st.booleans(),
+)
+def test_a_drawing_moved_scaled_mirrored_renamed_and_reordered_is_the_same_mechanism(
+    made: Made, power: float, turn: float, shift: complex, mirror: bool
+) -> None:
+    scale, names = 10**power, {}
+    for old in [*made.layout.places, *made.layout.bodies, *made.layout.guides, *made.layout.clamps]:
+        if old != GROUND:
+            names[old] = f"n{made.rng.getrandbits(60)}"
+    moved = made.layout.moved(cmath.rect(scale, turn), scale * shift, mirror=mirror)
+    other = study_of(moved.text(made.rng, names)).mechanism
+    time = np.linspace(-0.2, 0.2, 9)
+    before = made.at(time)
+    values = []
+    for drive in other.drives:
+        coordinate = moved.drives[drive]
+        sense = (-1.0 if mirror else 1.0) if coordinate[0] == "angle" else scale
+        values.append(moved.value(coordinate) + sense * made.rates[drive] * time)
+    after = other.forward.solve(values)
+    both = before.valid & after.valid
+    assert before.valid[4]
+    # What is at the very limit of motion may fall on either side of it.
+    assert (before.valid != after.valid).sum() <= 1
+    bound = 1e-9 * (1 + abs(shift)) * made.size
+    for point in made.layout.places:
+        z = before.point(point)
+        expected = cmath.rect(1, turn) * (z.conj() if mirror else z) + shift
+        got = after.point(names[point]) / scale
+        assert np.abs(got - expected)[both].max() < bound, point
+
+
+@settings(max_examples=80)
+@given(mechanisms())
+def test_a_rough_drawing_chooses_the_same_assembly(made: Made) -> None:
+    try:
+        mechanism = study_of(made.layout.text(made.rng, rough=0.01)).mechanism
+    except StudyError as error:
+        # The line that divides the assemblies of a long dyad may be near in degrees, though not in lengths.
+        assume("1 %" not in str(error))
+        raise
+    pose = mechanism.solve(made.layout.pose(made.layout.drives)).configuration
+    for point, place in made.layout.places.items():
+        assert complex(pose.point(point)) == pytest.approx(place, abs=1e-9)
+
+
+@settings(max_examples=100)
+@given(mechanisms(), st.sampled_from([0.3, 2.0]), st.integers(1, 12))
+def test_the_order_and_the_chunks_of_a_sweep_change_no_bit(made: Made, reach: float, chunk: int) -> None:
+    time = np.linspace(-reach, reach, 13)
+    whole = made.at(time)
+    mixed = np.array(made.rng.sample(range(13), 13))
+    same(made.at(time[::-1]), whole.take(np.arange(13)[::-1]))
+    same(made.at(time[mixed]), whole.take(mixed))
+    for begin in range(0, 13, chunk):
+        part = slice(begin, begin + chunk)
+        same(made.at(time[part]), whole.take(np.arange(13)[part]))
+    k = made.rng.randrange(13)
+    same(made.at(time[k : k + 1]), whole.take(np.array([k])))
+
+
+@settings(max_examples=100)
+@given(mechanisms(), st.floats(-0.05, 0.05))
+def test_other_coordinates_given_lead_back_to_the_drives(made: Made, time: float) -> None:
+    """Forward to a pose; its points, angles, slides or measures, given in turn, bring the whole of it back."""
+    mechanism, layout = made.mechanism, made.layout
+    others: dict[Coordinate, str] = {c: name for name, c in made.known().items() if c[0] not in ("x", "y")}
+    moving = [c for c in layout.coordinates() if c[0] in ("x", "y")]
+    others |= {c: f"{c[1]}.{c[0]}" for c in moving}
+    chosen = made.maker.regular(list(others))
+    assume(chosen is not None)
+    given_names = tuple(others[c] for c in chosen or ())
+    try:
+        plan = mechanism.plan(given_names)
+    except MechanismError as error:
+        # A part that only single x and y of its points tie to the ground is refused.
+        assume("1 %" not in str(error) and "not connected to the ground" not in str(error))
+        raise
+    event("newton" if plan.iterative else "closed form")
+    for at, forward in ((0.0, mechanism.sketch_configuration), (time, made.at(np.array(time)))):
+        assume(forward.valid)
+        back = plan.solve([forward.value(mechanism.coordinate(name)) for name in given_names])
+        assert back.valid, given_names
+        for point in layout.places:
+            assert complex(back.point(point)) == pytest.approx(complex(forward.point(point)), abs=1e-8), (at, point)
+
+
+@settings(max_examples=60)
+@given(mechanisms(triads=False, anyhow=False))
+def test_dyads_agree_with_newton(made: Made) -> None:
+    """The same groups, once in closed form and once by Newton's method with continuation from the sketch."""
+    closed = made.mechanism.forward
+    groups = tuple(g if g.form == "place" else replace(g, form="newton") for g in closed.structure.groups)
+    newton = Plan(made.mechanism, replace(closed.structure, groups=groups), closed.modes)
+    time = np.linspace(-0.4, 0.4, 9)
+    exact, found = closed.solve(made.drives(time)), newton.solve(made.drives(time))
+    ok = found.valid
+    assert ok[4]
+    for point in made.layout.places:
+        assert np.abs(found.point(point) - exact.point(point))[ok].max() < 1e-9
