@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.analyses import targets
 from mechdesign.analyses.extremes import extremes
 from mechdesign.analyses.motion import Asked, Motion, asked, characteristic_length, entry, move
-from mechdesign.analyses.motion_limits import change_points, limits_of_motion
+from mechdesign.analyses.motion_limits import motion_limits
 from mechdesign.analyses.poses import judge_failures, pose_in_words
 from mechdesign.analyses.rates import STALLED
 from mechdesign.errors import Problem, StudyError
@@ -71,8 +71,9 @@ def kinematics(
     swept = moving[0] if not poses.listed and len(moving) == 1 else None
     tables["extremes"] = extremes(study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason)
     if swept is not None:
-        tables["limits"] = limits_of_motion(study, poses.groups[0], swept, motion.reason)
-        warnings += change_points(study, poses.groups[0], swept, motion.reason)
+        group, reason = poses.groups[0], motion.reason
+        tables["limits"], told = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
+        warnings += told
     if motion.errors:
         tables["targets"] = targets.table(study, motion.errors, poses, swept, motion.valid)
     if question.square:

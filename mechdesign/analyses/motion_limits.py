@@ -1,146 +1,132 @@
-"""Limits of a motion: the values of the drive at which a mechanism stops moving."""
+"""Limits of a motion: the values of the drive at which a mechanism stops moving, and its change points."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.poses import CHUNK, in_study_units, radians
-from mechdesign.mechanism import Configuration, Mechanism, Reason
-from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.structure import Group
+from mechdesign.analyses.boundaries import Boundary, ChangePoint, boundaries
+from mechdesign.analyses.margins import Margins
+from mechdesign.analyses.poses import in_study_units
+from mechdesign.mechanism import Reason
+from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup
 
-# Halvings of a step of the sweep: enough to reach the last bit of any drive's value.
-HALVINGS = 60
-GOLDEN = (math.sqrt(5) - 1) / 2
-# A closure (a difference of squared lengths) that falls below this part of its largest value touches zero.
-TOUCHING = 1e-10
+# A limit this near to a pose, as a part of its value, is at the value that the study gives.
+AT_POSE = 1e-12
+# A change point this near to zero, as a part of the sweep, is there.
+SMALL = 1e-7
 
 
-def limits_of_motion(study: Study, group: PoseGroup, swept: str, reason: NDArray[np.int8]) -> Table:
-    """Values of the swept coordinate where the mechanism ceases to be valid, by bisection between poses.
+def motion_limits(
+    study: Study,
+    group: PoseGroup,
+    swept: str,
+    reason: NDArray[np.int8],
+    outputs: Sequence[Coordinate],
+    arrays: Mapping[str, NDArray[np.float64]],
+) -> tuple[Table, list[str]]:
+    """Every value of the swept coordinate at which the motion ends, with the pose there, and change points as warnings.
 
-    `kind` is ``dead centre`` (a group of links is stretched or folded), ``limit`` (one that the study states) or
-    ``other assembly``; `joint` names the joints of the group, or the limit.
+    `kind` is ``dead centre`` (a group of links is stretched or folded), ``singularity`` (links that are solved
+    together turn back, or the motion goes to infinity), ``leg at zero length`` or ``limit`` (one that the study
+    states); `joint` names the joints of the group, the leg or the limit.
+
+    Parameters
+    ----------
+    swept : str
+        The one coordinate of the group that moves.
+    reason : int8 array
+        See `mechdesign.mechanism.Reason`, over all poses.
+    outputs : sequence of Coordinate
+        Whose values at the limits are told.
+    arrays : mapping of str to ndarray, shape (poses,)
+        Their values over all poses, in the study's units.
     """
     mechanism = study.mechanism
-    plan = mechanism.plan(group.names)
-    coordinates = plan.structure.given
-    columns = [radians(study, c, v) for c, v in zip(coordinates, group.columns(), strict=True)]
-    k = group.names.index(swept)
-    valid = reason[group.rows] == Reason.OK
-    steps = np.flatnonzero(valid[1:] != valid[:-1])
-    inner = np.where(valid[steps], steps, steps + 1)
-    outer = np.where(valid[steps], steps + 1, steps)
-    good, bad = columns[k][inner].astype(float), columns[k][outer].astype(float)
-    configuration: Configuration | None = None
-    for _ in range(HALVINGS if len(steps) else 0):
-        middle = (good + bad) / 2
-        given = [c[inner] for c in columns]
-        given[k] = middle
-        configuration = plan.solve(given)
-        inside = configuration.valid
-        good, bad = np.where(inside, middle, good), np.where(inside, bad, middle)
-    kinds, joints = [], []
-    if configuration is not None:
-        given = [c[inner] for c in columns]
-        given[k] = bad
-        configuration = plan.solve(given)
-        for row in range(len(steps)):
-            kind, joint = _why(mechanism, plan, configuration, row)
-            kinds.append(kind)
-            joints.append(joint)
+    margins = Margins(study, group, swept)
+    ends, changes = boundaries(margins, reason[group.rows] == Reason.OK)
     unit = study.units.label(mechanism.quantity(swept))
-    return Table(
-        "limits",
-        (
-            Column(
-                swept, np.asarray(in_study_units(study, coordinates[k], good)), unit, "value at the limit of motion"
-            ),
-            Column("kind", np.array(kinds, dtype=str), "", "what ends the motion"),
-            Column("joint", np.array(joints, dtype=str), "", "where"),
-        ),
-        "limits of motion found along the sweep",
-    )
+    places = [_as_given(study, margins, group.values[swept], end) for end in ends]
+    columns = [
+        Column(swept, np.array(places, dtype=float), unit, "value at the limit of motion"),
+        Column("kind", np.array([end.cause.kind for end in ends], dtype=str), "", "what ends the motion"),
+        Column("joint", np.array([end.cause.joint for end in ends], dtype=str), "", "where"),
+    ]
+    rows = [int(group.rows[end.row]) for end in ends]
+    columns += [
+        Column(
+            output.name,
+            _values(study, output, arrays[output.name], ends, rows),
+            study.units.label(output.quantity),
+            f"{output.name} at the limit",
+        )
+        for output in outputs
+        if output.name != swept
+    ]
+    table = Table("limits", tuple(columns), "limits of motion found along the sweep")
+    follows = mechanism.description.branch == "follow"
+    warnings = _hidden(swept, unit, places, ends, margins, reason[group.rows] == Reason.OK)
+    return table, warnings if follows else warnings + _warnings(study, margins, swept, changes)
 
 
-def _why(mechanism: Mechanism, plan: Plan, configuration: Configuration, row: int) -> tuple[str, str]:
-    reason = Reason(int(configuration.reason[row]))
-    if reason == Reason.LIMIT:
-        margins = [
-            (float(np.broadcast_to(m, configuration.shape)[row]), name) for name, m in mechanism.margins(configuration)
-        ]
-        return "limit", min(margins)[1]
-    if reason == Reason.OTHER_ASSEMBLY:
-        return "other assembly", ""
-    for group, closure in zip(_closing_groups(plan), configuration.closures, strict=True):
-        if not np.broadcast_to(closure, configuration.shape)[row] >= 0:
-            return "dead centre", _joints(mechanism, group)
-    return "dead centre", ""
+def _as_given(study: Study, margins: Margins, given: NDArray[np.float64], end: Boundary) -> float:
+    """A limit in the study's unit; not there and back through radians where it is at a pose."""
+    value = float(in_study_units(study, margins.coordinate, end.place))
+    if abs(value) <= AT_POSE * np.ptp(given):
+        return 0.0
+    for row in (end.row, end.row + 1):
+        if row < len(given) and abs(value - given[row]) <= AT_POSE * max(1.0, abs(value)):
+            return float(given[row])
+    return value
 
 
-def _closing_groups(plan: Plan) -> list[Group]:
-    """The group of each closure of a configuration."""
-    counts = {"two angles": 2, "angle and fixed slide": 1, "angle and turning slide": 1}
-    return [group for group in plan.structure.groups for _ in range(counts.get(group.form, 0))]
+def _values(
+    study: Study, output: Coordinate, motion: NDArray[np.float64], ends: list[Boundary], rows: list[int]
+) -> NDArray[np.float64]:
+    """An output at the limits; angles continuous with the pose beside it."""
+    turn = 2 * np.pi / study.units.angle_factor
+    found = []
+    for end, row in zip(ends, rows, strict=True):
+        value = np.nan
+        if end.configuration is not None:
+            value = float(in_study_units(study, output, end.configuration.value(output)))
+        if output.quantity == "angle" and np.isfinite(motion[row]) and np.isfinite(value):
+            value += turn * round((motion[row] - value) / turn)
+        found.append(value)
+    return np.array(found, dtype=float)
 
 
-def _joints(mechanism: Mechanism, group: Group) -> str:
-    graph = mechanism.graph
-    edges = [graph.edges[k] for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)]
-    return " ".join(dict.fromkeys(graph.nodes[n] for e in edges for n in (e.tail, e.head) if ":" not in graph.nodes[n]))
-
-
-def change_points(study: Study, group: PoseGroup, swept: str, reason: NDArray[np.int8]) -> list[str]:
-    """Warnings for values of the swept coordinate at which a group's two assemblies meet and the motion goes on.
-
-    There a closure touches zero without crossing it; its smallest values between poses are found by golden section.
-    """
-    mechanism = study.mechanism
-    plan = mechanism.plan(group.names)
-    coordinates = plan.structure.given
-    columns = [radians(study, c, v) for c, v in zip(coordinates, group.columns(), strict=True)]
-    k = group.names.index(swept)
-    closing = _closing_groups(plan)
-    valid = reason[group.rows] == Reason.OK
-    lanes: list[tuple[int, int, float]] = []
-    for first in range(0, len(valid) - 2 if closing else 0, CHUNK):
-        some = slice(first, first + CHUNK + 2)
-        held = valid[some]
-        closures = plan.solve([c[some] for c in columns]).closures
-        margins = np.stack([np.broadcast_to(c, held.shape) for c in closures])
-        low = held[:-2] & held[1:-1] & held[2:]
-        low = low & (margins[:, 1:-1] <= margins[:, :-2]) & (margins[:, 1:-1] < margins[:, 2:])
-        lanes += [(j, first + i, margins[j].max()) for j, i in np.argwhere(low).tolist()]
-    if not lanes:
+def _hidden(
+    swept: str, unit: str, places: list[float], ends: list[Boundary], margins: Margins, valid: NDArray[np.bool_]
+) -> list[str]:
+    """A warning where the motion ends between neighbouring poses that are both valid: their rows do not tell."""
+    steps = [int(end.position) for end in ends]
+    hidden = [
+        f"{swept} = {place:.6g} {unit}".rstrip()
+        for place, step, end in zip(places, steps, ends, strict=True)
+        if step + 1 < len(valid) and end.position > step and valid[step] and valid[step + 1]
+    ]
+    if not hidden:
         return []
-    which, row, scale = (np.array(part) for part in zip(*lanes, strict=True))
-    begin, end = columns[k][row], columns[k][row + 2]
+    more = f" and {len(hidden) - 4} more" if len(hidden) > 4 else ""
+    return [f"the motion ends between poses that are both valid, at {', '.join(hidden[:4])}{more}: see the limits"]
 
-    def closure(place: NDArray[np.float64]) -> NDArray[np.float64]:
-        given = [c[row] for c in columns]
-        given[k] = place
-        closures = plan.solve(given).closures
-        every = np.stack([np.broadcast_to(c, row.shape) for c in closures])
-        own: NDArray[np.float64] = every[which, np.arange(len(row))]
-        return own
 
-    for _ in range(HALVINGS):
-        left, right = end - GOLDEN * (end - begin), begin + GOLDEN * (end - begin)
-        lower = closure(left) < closure(right)
-        begin, end = np.where(lower, begin, left), np.where(lower, right, end)
-    unit = study.units.label(mechanism.quantity(swept))
-    found: dict[tuple[str, str], None] = {}
-    for lane in np.flatnonzero(np.abs(closure(begin)) <= TOUCHING * scale).tolist():
-        place = f"{in_study_units(study, coordinates[k], begin[lane]):.6g} {unit}".rstrip()
-        found[place, _joints(mechanism, closing[which[lane]])] = None
+def _warnings(study: Study, margins: Margins, swept: str, changes: list[ChangePoint]) -> list[str]:
+    unit = study.units.label(study.mechanism.quantity(swept))
+    places: dict[str, dict[str, None]] = {}
+    for change in sorted(changes, key=lambda change: change.place):
+        # The smallest value of a smooth function is found to the root of rounding.
+        at = change.place if abs(change.place) > SMALL * np.ptp(margins.at) else 0.0
+        place = f"{in_study_units(study, margins.coordinate, at):.6g} {unit}".rstrip()
+        places.setdefault(place, {})[change.cause.joint] = None
     return [
-        f"change point at {swept} = {place} (joints {joints}): two assemblies meet there, and branch 'side' keeps each "
-        "joint on its side of the line, where a made mechanism may cross it"
-        for place, joints in found
+        f"change point at {swept} = {place} (joints {'; '.join(joints)}): two assemblies meet there, and branch 'side' "
+        "keeps each joint on its side of the line, where a made mechanism may cross it"
+        for place, joints in places.items()
     ]

@@ -1,0 +1,158 @@
+"""Where smooth functions of one variable change their sign, also where they do so twice within an interval.
+
+All intervals are worked at once. The functions come in an order: one is nan where another before it is negative, so
+that the roots of the first divide the interval within which the second is looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+# Values of all functions in intervals `lane` at `x`: shape (functions, n).
+Evaluate = Callable[[Indices, Floats], Floats]
+# Values of one function in parts of intervals at `x`.
+One = Callable[[Indices, Floats], Floats]
+
+GOLDEN = (math.sqrt(5) - 1) / 2
+# Golden sections that find the smallest value of a smooth function to rounding.
+SECTIONS = 50
+# Where each part of an interval is looked at; near its ends too, so that the slope there is seen.
+LOOKS = np.array([0.0, 1e-4, *(np.arange(1, 8) / 8), 1 - 1e-4, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Places within intervals: the interval, the place, and the function it belongs to with its value there."""
+
+    lane: Indices
+    place: Floats
+    function: Indices
+    value: Floats
+
+    @staticmethod
+    def joined(parts: list[Found]) -> Found:
+        """All of several; none of an empty list."""
+        none = np.zeros(0, dtype=np.intp)
+        parts = [Found(none, np.zeros(0), none, np.zeros(0)), *parts]
+        return Found(
+            np.concatenate([p.lane for p in parts]), np.concatenate([p.place for p in parts]),
+            np.concatenate([p.function for p in parts]), np.concatenate([p.value for p in parts]),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Probes:
+    """Intervals divided at all roots.
+
+    Parameters
+    ----------
+    lane, place : ndarray
+        Interval and middle of each part between two roots, in order.
+    roots, lows : Found
+        Changes of sign, and smallest values inside the intervals.
+    """
+
+    lane: Indices
+    place: Floats
+    roots: Found
+    lows: Found
+
+
+def probe(evaluate: Evaluate, begin: Floats, end: Floats, halvings: Indices) -> Probes:
+    """Divide intervals from `begin` to `end` at the roots of all functions, one function after another.
+
+    Parameters
+    ----------
+    halvings : int array, shape (functions,)
+        By which each function's roots are parted.
+    """
+    lane = np.arange(len(begin))
+    low, high = begin.astype(float), end.astype(float)
+    roots: list[Found] = []
+    lows: list[Found] = []
+    grid, values = _look(evaluate, lane, low, high)
+    for j in range(len(values)):
+
+        def one(part: Indices, x: Floats, j: int = j, lane: Indices = lane) -> Floats:
+            found: Floats = evaluate(lane[part], x)[j]
+            return found
+
+        bottoms = _bottoms(one, grid, values[j], 1)
+        tops = _bottoms(one, grid, values[j], -1)
+        lows.append(Found(lane[bottoms[0]], bottoms[1], np.full(len(bottoms[0]), j), bottoms[2]))
+        part, root = _roots(
+            one, int(halvings[j]), grid, values[j], *(np.concatenate(pair) for pair in zip(bottoms, tops, strict=True))
+        )
+        if len(root):
+            roots.append(Found(lane[part], root, np.full(len(root), j), np.zeros(len(root))))
+            lane, low, high = _divided(lane, low, high, part, root)
+            grid, values = _look(evaluate, lane, low, high)
+    return Probes(lane, low + (high - low) / 2, Found.joined(roots), Found.joined(lows))
+
+
+def _look(evaluate: Evaluate, lane: Indices, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """Places at which the parts are looked at, shape (looks, parts), and the functions there."""
+    grid = low + (high - low) * LOOKS[:, None]
+    grid[-1] = high
+    values = evaluate(np.tile(lane, len(LOOKS)), grid.ravel())
+    return grid, values.reshape(len(values), *grid.shape)
+
+
+def _bottoms(one: One, grid: Floats, values: Floats, sign: int) -> tuple[Indices, Floats, Floats]:
+    """Part, place and value of each smallest positive value (`sign` 1) or largest negative one (-1) between looks."""
+    v = sign * values
+    inner = v[1:-1]
+    seen = (inner > 0) & (inner <= v[:-2]) & (inner <= v[2:]) & ((inner < v[:-2]) | (inner < v[2:]))
+    look, part = np.nonzero(seen)
+    a, b = grid[look, part], grid[look + 2, part]
+    if not len(part):
+        return part, a, a
+    both = np.concatenate([part, part])
+    for _ in range(SECTIONS):
+        left, right = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+        value = sign * one(both, np.concatenate([left, right]))
+        # What is not a number lies beyond a root.
+        value = np.where(np.isnan(value), -np.inf, value)
+        lower = value[: len(part)] < value[len(part) :]
+        a, b = np.where(lower, a, left), np.where(lower, right, b)
+    place = a + (b - a) / 2
+    return part, place, one(part, place)
+
+
+def _roots(
+    one: One, halvings: int, grid: Floats, values: Floats, part: Indices, place: Floats, value: Floats
+) -> tuple[Indices, Floats]:
+    """Part and place of each change of sign between the looks and the places added to them."""
+    parts = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)), part])
+    places = np.concatenate([grid.ravel(), place])
+    height = np.concatenate([values.ravel(), value])
+    forward = np.where(grid[-1] >= grid[0], 1.0, -1.0)[parts]
+    order = np.lexsort((places * forward, parts))
+    parts, places, height = parts[order], places[order], height[order]
+    positive, known = height >= 0, np.isfinite(height)
+    change = np.flatnonzero((parts[1:] == parts[:-1]) & (positive[1:] != positive[:-1]) & known[1:] & known[:-1])
+    which, a, b, above = parts[change], places[change], places[change + 1], positive[change]
+    for _ in range(halvings if len(change) else 0):
+        middle = a + (b - a) / 2
+        same = (one(which, middle) >= 0) == above
+        a, b = np.where(same, middle, a), np.where(same, b, middle)
+    return which, a + (b - a) / 2
+
+
+def _divided(lane: Indices, low: Floats, high: Floats, part: Indices, root: Floats) -> tuple[Indices, Floats, Floats]:
+    """The parts divided at further roots, in order."""
+    owner = np.concatenate([np.arange(len(lane)), part])
+    begin = np.concatenate([low, root])
+    forward = np.where(high >= low, 1.0, -1.0)
+    order = np.lexsort((begin * forward[owner], owner))
+    owner, begin = owner[order], begin[order]
+    last = np.append(owner[1:] != owner[:-1], True)
+    end = np.where(last, high[owner], np.append(begin[1:], 0.0))
+    return lane[owner], begin, end
