@@ -10,6 +10,7 @@ from __future__ import annotations
 import cmath
 import copy
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from random import Random
 
@@ -22,6 +23,7 @@ GROUND = "ground"
 DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 # ("x" | "y", point), ("angle", body, reference), ("slide" | "length", joint or leg), ("distance", point, point)
 Coordinate = tuple[str, ...]
+Renaming = Callable[[str], str]
 
 
 @dataclass
@@ -272,7 +274,7 @@ class Layout:
             point: displaced(at)
             for point, at in self.places.items()
             if point not in self.undrawn
-            and (GROUND not in self.owners(point) or self.bodies[GROUND].style == "measured" and not rough)
+            and (GROUND not in self.owners(point) or (self.bodies[GROUND].style == "measured" and not rough))
         }
         joints: dict[str, object] = {g.name: self._guide(g, name) for g in self.guides.values()}
         for clamp in self.clamps.values():
@@ -297,7 +299,7 @@ class Layout:
         study = {"units": {"angle": self.unit}, "mechanism": section}
         return yaml.dump(study, Dumper=DUMPER, sort_keys=False, default_flow_style=None, width=110)
 
-    def _link(self, body: Body, name, rough: bool) -> object:  # noqa: ANN001
+    def _link(self, body: Body, name: Renaming, rough: bool) -> object:
         local = {point: (self.places[point] - body.origin) / body.turn for point in body.points}
         told = {name(point): [z.real, z.imag] for point, z in local.items()}
         measured = not rough and body.style.startswith("measured")
@@ -314,7 +316,7 @@ class Layout:
             link = {"from": ends[0], "to": ends[1]} | ({} if measured else {"length": length})
         return link | ({"points": others} if others else {})
 
-    def _guide(self, guide: Guide, name) -> dict[str, object]:  # noqa: ANN001
+    def _guide(self, guide: Guide, name: Renaming) -> dict[str, object]:
         line, slider = self.bodies[guide.guide], self.bodies[guide.slider]
         joint: dict[str, object] = {"slot": name(line.name)}
         if guide.kind == "prismatic":
@@ -333,7 +335,7 @@ class Layout:
         return joint
 
 
-def _told(coordinate: Coordinate, name) -> dict[str, str]:  # noqa: ANN001
+def _told(coordinate: Coordinate, name: Renaming) -> dict[str, str]:
     kind, target = coordinate[:2]
     drive = {kind: name(target)}
     if kind == "angle" and coordinate[2] != GROUND:

@@ -72,9 +72,7 @@ class Made:
 
 
 @st.composite
-def mechanisms(
-    draw: st.DrawFn, *, triads: bool | None = None, anyhow: bool | None = None, most: int = 4
-) -> Made:
+def mechanisms(draw: st.DrawFn, *, triads: bool | None = None, anyhow: bool | None = None, most: int = 4) -> Made:
     """Random mechanisms: one to three driven links, then dyads; with `triads` also a group that is none.
 
     With `anyhow` the drives are drawn from all angles, absolute and relative, slides and legs, which seldom leaves

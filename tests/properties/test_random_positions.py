@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
+from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.plan import Plan
 
 
@@ -139,6 +140,45 @@ def test_a_rough_drawing_chooses_the_same_assembly(made: Made) -> None:
     pose = mechanism.solve(made.layout.pose(made.layout.drives)).configuration
     for point, place in made.layout.places.items():
         assert complex(pose.point(point)) == pytest.approx(place, abs=1e-9)
+
+
+@settings(max_examples=60)
+@given(mechanisms(), st.sampled_from([0.5, 3.0]))
+def test_an_assembly_is_kept_along_a_sweep(made: Made, reach: float) -> None:
+    """From pose to pose nothing moves farther than its speed allows: another assembly would be a leap."""
+    time = np.linspace(-reach, reach, 201)
+    sweep = made.at(time)
+    velocity = made.mechanism.linearize(sweep).velocity([made.rates[drive] for drive in made.mechanism.drives])
+    both = sweep.valid[1:] & sweep.valid[:-1]
+    for name in made.mechanism.points:
+        leap = np.abs(np.diff(sweep.point(name)))
+        speed = np.abs(np.broadcast_to(velocity.nodes[made.mechanism.graph.node(name)], time.shape))
+        allowed = 5 * (time[1] - time[0]) * np.maximum(speed[1:], speed[:-1]) + 1e-9
+        assert np.all(leap[both] <= allowed[both]), name
+
+
+@settings(max_examples=40)
+@given(mechanisms(most=2))
+def test_every_assembly_closes_and_only_the_first_is_drawn(made: Made) -> None:
+    mechanism = made.mechanism
+    try:
+        found = assemblies(mechanism, mechanism.drives)
+    except MechanismError as error:
+        assume("256 " not in str(error))
+        raise
+    drawn = [assembly.drawn for assembly in found]
+    assert drawn == [True] + [False] * (len(found) - 1)
+    assert len({assembly.label for assembly in found}) == len(found)
+    poses = [assembly.mechanism.plan(mechanism.drives).solve(made.drives(np.zeros(1))) for assembly in found]
+    assert poses[0].valid.all()
+    points = list(made.layout.places)
+    for pose in poses:
+        if pose.valid.all():
+            for what, gap in gaps(made, pose).items():
+                assert np.abs(gap).max() < 1e-9, what
+    # Assemblies differ in a point, but for those of links that carry none besides their joints.
+    places = [tuple(np.round(complex(pose.point(p)[0]), 6) for p in points) for pose in poses if pose.valid.all()]
+    assert len(set(places)) == len(places)
 
 
 @settings(max_examples=100)
