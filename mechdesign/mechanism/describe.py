@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
+from mechdesign.errors import MechanismError
+from mechdesign.mechanism import assemblies
+from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import Description, Fixed
-from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.structure import Form, Group
+from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Term
+from mechdesign.mechanism.naming import group_in_words, placed_before
 
-DYADS: dict[Form, str] = {
-    "two angles": "RRR dyad",
-    "angle and fixed slide": "RRP dyad",
-    "angle and turning slide": "RPR dyad",
-    "two slides": "dyad of two slides (PRP or RPP)",
-    "newton": "group without a closed form, by Newton's method",
-}
+if TYPE_CHECKING:
+    from mechdesign.mechanism.mechanism import Mechanism
+
+# Below this regularity (the sine of the angle between two links that meet) rounding shows in all rates.
+SINGULAR = 1e-6
 
 
 def joints_in_words(description: Description, graph: Graph) -> list[str]:
@@ -39,45 +39,64 @@ def joints_in_words(description: Description, graph: Graph) -> list[str]:
     return found
 
 
-def groups_in_words(graph: Graph, plan: Plan) -> list[str]:
-    """The groups of a plan in the order of their solution; places of points on known links are left out."""
+def groups_in_words(mechanism: Mechanism) -> list[str]:
+    """What the drives place at once, and the groups in the order of their solution."""
+    description, graph, plan = mechanism.description, mechanism.graph, mechanism.forward
+    placed = placed_before(graph, plan.structure)
+    solved = [k for k, group in enumerate(plan.structure.groups) if group.form != "place"]
+    at_once = placed[solved[0]] if solved else placed[-1]
     lines = []
-    for group, mode in zip(plan.structure.groups, plan.modes, strict=True):
-        if group.form == "place":
-            continue
-        unknowns = [f"{name}.angle" for name in _links(graph, plan, group.angles)]
-        unknowns += [f"{graph.slides[slide]} slide" for slide in group.slides]
-        assembly = f", assembly {mode:+d}" if mode else ""
-        lines.append(f"{DYADS[group.form]}{_joints(graph, group)}: {', '.join(unknowns)}{assembly}")
+    links = [body for body in graph.bodies if body in at_once and body != GROUND and not body.endswith(":rod")]
+    if links:
+        lines.append(f"placed by the drives: {', '.join(links)}")
+    if solved:
+        lines.append("solved in this order:")
+    for number, k in enumerate(solved, 1):
+        lines.append(f"  {number}. {group_in_words(description, graph, plan, k, placed[k])}")
     return lines
 
 
-def _links(graph: Graph, plan: Plan, roots: Sequence[int]) -> list[str]:
-    ties = plan.structure.ties
-    return [
-        body
-        for body, (frame, _) in graph.bodies.items()
-        if ties[frame].root in roots and body != GROUND and not body.endswith(":rod")
-    ]
-
-
-def _joints(graph: Graph, group: Group) -> str:
-    nodes = {node for loop in group.loops for k, _ in loop.edges for node in (graph.edges[k].tail, graph.edges[k].head)}
-    names = [graph.nodes[node] for node in sorted(nodes) if ":" not in graph.nodes[node]]
-    return f" at {', '.join(names)}" if names else ""
-
-
-def report(description: Description, graph: Graph, mobility: int, plan: Plan) -> str:
-    """Links, joints, mobility, drives and the order of solution."""
+def report(mechanism: Mechanism) -> str:
+    """Links, joints, mobility, the order of solution, assembly modes, measures, limits, and what is odd."""
+    description, graph = mechanism.description, mechanism.graph
     loops = len(graph.edges) - len(graph.nodes) + 1
     lines = [
         f"links: {', '.join(description.links)}",
         *(f"joint: {joint}" for joint in joints_in_words(description, graph)),
-        f"mobility: {mobility}, loops: {loops}, drives: {', '.join(description.drives) or 'none'}",
+        f"mobility: {mechanism.mobility}, loops: {loops}, drives: {', '.join(description.drives) or 'none'}",
+        *groups_in_words(mechanism),
     ]
-    groups = groups_in_words(graph, plan)
-    if groups:
-        lines += ["solved in this order:", *(f"  {k}. {group}" for k, group in enumerate(groups, 1))]
-    else:
-        lines.append("solved directly: the drives place every link")
+    try:
+        lines += assemblies.in_words(mechanism)
+    except MechanismError as error:
+        lines.append(f"assembly modes: {error}")
+    lines.append(f"branch: {description.branch}")
+    lines += [f"measure: {_measure(measure)}" for measure in description.measures.values()]
+    lines += [f"limit: {_limit(mechanism, limit)}" for limit in description.limits]
+    near = float(regularity(mechanism.linearize(mechanism.sketch_configuration)))
+    if near < SINGULAR:
+        lines.append(
+            f"warning: the sketch is at a singular position (regularity {near:.1g} of 1): its drives hold the links "
+            "hardly or not at all there, and rates there mean nothing"
+        )
     return "\n".join(lines)
+
+
+def _measure(measure: Measure) -> str:
+    if measure.expression is not None:
+        return f"{measure.name} = {measure.expression.text}"
+    first, second = measure.items or ("", "")
+    between = f"from {first} to {second}" if measure.kind == "angle" else f"of {first} and {second}"
+    return f"{measure.name}, {measure.kind} {between}"
+
+
+def _limit(mechanism: Mechanism, limit: Limit) -> str:
+    def value(term: Term) -> float:
+        if not isinstance(term, str):
+            return term
+        place = mechanism.description.places[term]
+        return place.nominal / (mechanism.description.angle_unit if place.quantity == "angle" else 1.0)
+
+    ends = (("from", limit.minimum), ("to", limit.maximum))
+    bounds = [f"{word} {value(term):.6g}" for word, term in ends if term is not None]
+    return f"{limit.kind} {'-'.join(limit.items)} {' '.join(bounds)}"

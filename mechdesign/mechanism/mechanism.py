@@ -92,7 +92,7 @@ class Mechanism:
 
     def describe(self) -> str:
         """Links, joints, mobility and the order of solution, in words."""
-        return report(self.description, self.graph, self.mobility, self.forward)
+        return report(self)
 
     def _check_ties(self) -> None:
         offsets = self.geometry.nominal.offsets

@@ -140,9 +140,12 @@ def _mode(graph: Graph, geometry: Geometry, structure: Structure, group: Group, 
     if group.form == "two angles":
         first, second = (_span(graph, sketch, path, structure) for path in parts.values())
         side, size = cross(first + second, first), abs(first + second) * min(abs(first), abs(second))
-        return _decide(graph, structure, group, side, size, parts[group.angles[0]])
+        ends = [graph.nodes[node] for node in (group.loops[0].start, group.loops[0].end)]
+        line = f"the line {'-'.join(ends)}" if ends[0] != ends[1] and ":" not in "".join(ends) else "the line"
+        return _decide(graph, structure, group, side, size, parts[group.angles[0]], line)
     assert slide is not None
     k, sign = slide
+    name = graph.slides[structure.edges[k].slide or 0]
     turn = sketch.rotations[structure.edges[k].frame]
     along = _span(graph, sketch, [slide], structure)
     # Unknown only where the whole link is drawn at one place, which decides nothing whatever the direction.
@@ -150,21 +153,29 @@ def _mode(graph: Graph, geometry: Geometry, structure: Structure, group: Group, 
     if group.form == "angle and fixed slide":
         radius = _span(graph, sketch, parts[group.angles[0]], structure)
         side = -dot(radius, sign * direction)
-        return _decide(graph, structure, group, side, abs(radius), parts[group.angles[0]])
+        line = f"the perpendicular to slide '{name}'"
+        return _decide(graph, structure, group, side, abs(radius), parts[group.angles[0]], line)
     rest = [(e, s) for e, s in parts[group.angles[0]] if e != k]
     whole = along + _span(graph, sketch, rest, structure)
-    return _decide(graph, structure, group, sign * dot(whole, direction), abs(whole), [slide])
+    line = f"the perpendicular to slide '{name}'"
+    return _decide(graph, structure, group, sign * dot(whole, direction), abs(whole), [slide], line)
 
 
 def _decide(
-    graph: Graph, structure: Structure, group: Group, side: float, size: float, path: Sequence[tuple[int, int]]
+    graph: Graph,
+    structure: Structure,
+    group: Group,
+    side: float,
+    size: float,
+    path: Sequence[tuple[int, int]],
+    line: str,
 ) -> int:
     if abs(side) <= UNDECIDED * size:
         ends = {node for k, _ in path for node in (structure.edges[k].tail, structure.edges[k].head)}
         inner = ends - {group.loops[0].start, group.loops[0].end} or ends
         names = ", ".join(f"'{graph.nodes[node]}'" for node in sorted(inner))
         raise MechanismError(
-            f"{names} lies within 1 % of the line that divides the two assemblies; draw it clearly on one side", KEY
+            f"{names} lies within 1 % of {line} that divides the two assemblies; draw it clearly on one side", KEY
         )
     return 1 if side > 0 else -1
 
