@@ -123,7 +123,7 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
     guess: Guess = {
         index: (
             [random.uniform(-np.pi, np.pi, STARTS) for _ in group.angles],
-            [random.uniform(-2 * size, 2 * size, STARTS) for _ in group.slides],
+            [random.uniform(-2 * size, 2 * size, STARTS) for _ in (*group.slides, *group.bases, *group.bases)],
         )
         for index, group in enumerate(plan.structure.groups)
         if group.form == "newton"

@@ -44,13 +44,17 @@ class Start:
 Solver = Callable[[Sequence[Value], Mapping[str, Value], Guess, int], State]
 
 
-def unknowns_of(structure: Structure, rotations: Sequence[Value], slides: Sequence[Value]) -> Guess:
-    """Angles and slides of the Newton groups in a solved pose."""
-    return {
-        index: ([angle_of(np.asarray(rotations[root])) for root in group.angles], [slides[s] for s in group.slides])
-        for index, group in enumerate(structure.groups)
-        if group.form == "newton"
-    }
+def unknowns_of(
+    structure: Structure, rotations: Sequence[Value], slides: Sequence[Value], nodes: Sequence[Value]
+) -> Guess:
+    """Unknowns of the Newton groups in a solved pose."""
+    found = {}
+    for index, group in enumerate(structure.groups):
+        if group.form == "newton":
+            angles = [angle_of(np.asarray(rotations[root])) for root in group.angles]
+            places = [part for base in group.bases for part in (np.real(nodes[base]), np.imag(nodes[base]))]
+            found[index] = (angles, [*(slides[s] for s in group.slides), *places])
+    return found
 
 
 class _Path:
@@ -63,7 +67,9 @@ class _Path:
         self.structure, self.solver, self.count = structure, solver, count
         self.indices = [index for index, group in enumerate(structure.groups) if group.form == "newton"]
         groups = [structure.groups[index] for index in self.indices]
-        self.is_angle = np.concatenate([[True] * len(g.angles) + [False] * len(g.slides) for g in groups]).astype(bool)
+        self.is_angle = np.concatenate(
+            [[True] * len(g.angles) + [False] * (len(g.slides) + 2 * len(g.bases)) for g in groups]
+        ).astype(bool)
         self.scale = np.where(self.is_angle, 1.0, size)[:, None]
         self.given = [(np.asarray(a, dtype=float), b) for a, b in zip(start.given, given, strict=True)]
         names = set(places) | set(start.places)
@@ -81,9 +87,9 @@ class _Path:
         found, row = {}, 0
         for index in self.indices:
             group = self.structure.groups[index]
-            angles, slides = len(group.angles), len(group.slides)
-            found[index] = (list(table[row : row + angles]), list(table[row + angles : row + angles + slides]))
-            row += angles + slides
+            angles, lengths = len(group.angles), len(group.slides) + 2 * len(group.bases)
+            found[index] = (list(table[row : row + angles]), list(table[row + angles : row + angles + lengths]))
+            row += angles + lengths
         return found
 
     def solve(self, lanes: NDArray[np.intp], at: Value, guess: Array, steps: int = STEPS) -> tuple[Array, State]:

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.mechanism.algebra import Value, plus, rotation
+from mechdesign.mechanism.algebra import Value, plus, rotation, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.outputs import first
@@ -48,7 +48,7 @@ def solve_newton(
     active: NDArray[np.bool_] | None = None
     determinant: Value = 0.0
     for _ in range(steps):
-        _set(state, group, theta, s)
+        set_unknowns(state, group, theta, s)
         rows, right = equations(state, group, given)
         solution, determinant = solve_linear(rows, right)
         largest: Value = 0.0
@@ -63,18 +63,22 @@ def solve_newton(
         active = np.asarray(moving)
         if not active.any():
             break
-    _set(state, group, theta, s)
+    set_unknowns(state, group, theta, s)
     assert active is not None
     state.unknowns[index] = (theta, s)
     state.converged.append(~active)
     state.determinants.append(determinant)
 
 
-def _set(state: State, group: Group, theta: Sequence[Value], s: Sequence[Value]) -> None:
+def set_unknowns(state: State, group: Group, theta: Sequence[Value], s: Sequence[Value]) -> None:
+    """Put a group's angles, slides and, behind the slides, the x and y of its bases into a state."""
     for root, value in zip(group.angles, theta, strict=True):
         state.turn(root, rotation(value))
-    for slide, value in zip(group.slides, s, strict=True):
+    for slide, value in zip(group.slides, s, strict=False):
         state.slides[slide] = value
+    places = s[len(group.slides) :]
+    for base, x, y in zip(group.bases, places[::2], places[1::2], strict=True):
+        state.nodes[base] = vector(x, y)
 
 
 def equations(state: State, group: Group, given: Sequence[Value]) -> tuple[list[list[Value]], list[Value]]:
@@ -83,7 +87,7 @@ def equations(state: State, group: Group, given: Sequence[Value]) -> tuple[list[
     errors: list[Value] = []
     for loop in group.loops:
         total, derivatives = columns(state, group, loop.edges)
-        rows += scalars(derivatives)
+        rows += [[*row, *([0.0] * 2 * len(group.bases))] for row in scalars(derivatives)]
         gap = plus(loop_gap(state, loop.start, loop.end), 1, total)
         errors += [gap.real, gap.imag]
     if group.conditions:
@@ -102,9 +106,10 @@ def equations(state: State, group: Group, given: Sequence[Value]) -> tuple[list[
 def _moves(state: State, group: Group) -> list[Rates]:
     """Derivatives of every position with respect to each of a group's unknowns."""
     structure = state.structure
-    count = len(group.angles) + len(group.slides)
-    nodes: list[list[Value]] = [[0.0j] * len(state.nodes) for _ in range(count)]
+    lengths = len(group.slides) + 2 * len(group.bases)
+    nodes: list[list[Value]] = [[0.0j] * len(state.nodes) for _ in range(len(group.angles) + lengths)]
     into: dict[int, tuple[tuple[int, int], ...]] = {}
+    begun = {base: base for base in group.bases}
     for k, sign in group.tree:
         edge = structure.edges[k]
         tail, head = (edge.tail, edge.head) if sign > 0 else (edge.head, edge.tail)
@@ -112,11 +117,16 @@ def _moves(state: State, group: Group) -> list[Rates]:
         _, derivatives = columns(state, group, into[head])
         for j, value in enumerate(derivatives):
             nodes[j][head] = value
+        if tail in begun:
+            begun[head] = begun[tail]
+    for node, base in begun.items():
+        j = len(group.angles) + len(group.slides) + 2 * group.bases.index(base)
+        nodes[j][node], nodes[j + 1][node] = 1.0 + 0.0j, 1.0j
     angles = [[float(tie.root == root) for tie in structure.ties] for root in group.angles]
     slides = [[float(slide == own) for slide in range(len(state.slides))] for own in group.slides]
     still, held = [0.0] * structure.classes, [0.0] * len(state.slides)
-    turns = [*angles, *([still] * len(group.slides))]
-    shifts = [*([held] * len(group.angles)), *slides]
+    turns = [*angles, *([still] * lengths)]
+    shifts = [*([held] * len(group.angles)), *slides, *([held] * 2 * len(group.bases))]
     return [Rates(*each, {}) for each in zip(nodes, turns, shifts, strict=True)]
 
 

@@ -70,7 +70,7 @@ class Plan:
     def _start(self, at: Configuration | None) -> Start:
         at = self.mechanism.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
-        guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides)
+        guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides, at.nodes)
         state = self.run(given, at.vectors, guess)
         return Start(given, at.places, guess, [np.sign(d) for d in state.determinants])
 
@@ -182,6 +182,8 @@ class Plan:
                     open_ = open_ | ~np.isfinite(np.real(state.rotations[root]))
                 for slide in group.slides[:1]:
                     open_ = open_ | ~np.isfinite(state.slides[slide])
+                for base in group.bases[:1]:
+                    open_ = open_ | ~np.isfinite(np.real(state.nodes[base]))
             for slide in graph.telescopic:
                 open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
             for k, _ in self.structure.spans:

@@ -14,7 +14,7 @@ from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.structure import Group, Structure
 
-# Angles of roots and slides of the groups without a closed form, by group.
+# Angles of roots, and slides with the x and y of bases behind them, of the groups without a closed form, by group.
 Guess = Mapping[int, tuple[Sequence[Value], Sequence[Value]]]
 
 

@@ -56,6 +56,8 @@ class Group:
         Edges, each with its sign, that place the group's nodes in order once angles and slides are known.
     conditions : tuple of int
         Scalar equations: which given coordinates the group's unknowns must meet beside its loops.
+    bases : tuple of int
+        Nodes whose place is unknown too: each begins the tree of a part that only scalar equations hold.
     """
 
     form: Form
@@ -64,6 +66,7 @@ class Group:
     loops: tuple[Loop, ...]
     tree: tuple[tuple[int, int], ...]
     conditions: tuple[int, ...] = ()
+    bases: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -301,7 +304,9 @@ def _group(
     paths: dict[int, tuple[int, tuple[tuple[int, int], ...]]] = {node: (node, ()) for node in reached}
     tree: list[tuple[int, int]] = []
     loops: list[Loop] = []
+    bases: list[int] = []
     pending = list(members)
+    conditions = (*(which for (node, _), which in sorted(node_given.items()) if node in free), *own)
     # Rigid edges first, then slides, so that a loop closes over as few unknowns as it can.
     pending.sort(key=lambda k: (edges[k].slide is not None, k))
     while pending:
@@ -316,11 +321,14 @@ def _group(
                 tree.append((k, sign))
                 break
         else:
-            raise Undetermined("a part of the mechanism is not connected to the ground by given coordinates")
+            if not conditions:
+                raise Undetermined("a part of the mechanism is not connected to the ground by given coordinates")
+            bases.append(edges[pending[0]].tail)
+            paths[bases[-1]] = (bases[-1], ())
+            continue
         pending.remove(k)
-    conditions = (*(which for (node, _), which in sorted(node_given.items()) if node in free), *own)
     form = _form(edges, roots, angles, slides, loops, conditions)
-    return Group(form, angles, slides, tuple(loops), tuple(tree), conditions)
+    return Group(form, angles, slides, tuple(loops), tuple(tree), conditions, tuple(bases))
 
 
 def _loop(paths: dict[int, tuple[int, tuple[tuple[int, int], ...]]], k: int, tail: int, head: int) -> Loop:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.continuation import unknowns_of
-from mechdesign.mechanism.newton import equations
+from mechdesign.mechanism.newton import equations, set_unknowns
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import State, start_state
 
@@ -52,7 +52,7 @@ def turning_point(
     (float, Configuration, int) or None
         The value, the pose there, and the index of the group in the plan; None where no singularity is near.
     """
-    guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides)
+    guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides, near.nodes)
     angles = plan.structure.given[k].quantity == "angle"
     scale = 1.0 if angles else plan.mechanism.size
     found = []
@@ -72,7 +72,7 @@ class _Fold:
     def __init__(self, plan: Plan, given: Sequence[float], k: int, near: Configuration, index: int) -> None:
         self.plan, self.given, self.k, self.near, self.index = plan, list(given), k, near, index
         self.group = plan.structure.groups[index]
-        self.guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides)
+        self.guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides, near.nodes)
         angles, slides = self.guess[index]
         self.start = np.array([*map(float, angles), *map(float, slides)])
         size = plan.mechanism.size
@@ -89,10 +89,7 @@ class _Fold:
         given[self.k] = np.asarray(s)
         state = start_state(plan.mechanism.graph, plan.structure, self.near.vectors, given)
         run(state, plan.modes_at(given)[: self.index], self.guess, given, size)
-        for root, value in zip(self.group.angles, y[:count], strict=True):
-            state.turn(root, np.exp(1j * value))
-        for slide, value in zip(self.group.slides, y[count:], strict=True):
-            state.slides[slide] = value
+        set_unknowns(state, self.group, list(y[:count]), list(y[count:]))
         rows, right = equations(state, self.group, given)
         matrix = np.array([[float(entry) for entry in row] for row in rows]) * self.weights / size
         return matrix, np.array([float(entry) for entry in right]) / size, state

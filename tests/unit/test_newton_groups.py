@@ -141,3 +141,28 @@ mechanism:
         assert back["theta"] == pytest.approx(np.linspace(60, 80, 9), abs=1e-9)
     # Nothing meets a value that is out of reach, and nan is no value.
     assert not mechanism.solve({"sum": np.array([5000.0, np.nan])}).valid.any()
+
+
+def test_given_coordinates_of_different_points_place_a_part_that_no_point_holds() -> None:
+    text = """
+mechanism:
+  links:
+    ground: {G: [0, 0], H: [4, 0], K: [2, 4]}
+    plate: {A: [0, 0], B: [1, 0.1], C: [0.4, 0.9]}
+    one: {from: G, to: A, telescopic: true}
+    two: {from: H, to: B, telescopic: true}
+    three: {from: K, to: C, telescopic: true}
+  drives: [one, two, three]
+  sketch: {A: [1.5, 1.2], B: [2.5, 1.3], C: [1.9, 2.1]}
+"""
+    mechanism = study_of(text).mechanism
+    lengths = [float(mechanism.sketch_configuration.value(mechanism.coordinate(name))) for name in mechanism.drives]
+    forward = mechanism.solve(
+        {name: value + np.linspace(0, 0.3, 7) for name, value in zip(mechanism.drives, lengths, strict=True)}
+    )
+    assert forward.valid.all()
+    for given in (("A.y", "B.x", "C.x"), ("A.y", "B.x", "one"), ("A.x", "B.y", "platform.angle")):
+        names = [name.replace("platform", "plate") for name in given]
+        back = mechanism.solve({name: forward[name] for name in names})
+        for drive in mechanism.drives:
+            assert back[drive] == pytest.approx(forward[drive], rel=1e-12)
