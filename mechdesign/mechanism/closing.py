@@ -40,8 +40,10 @@ def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Co
     values = ", ".join(f"{c.name} = {v / (unit if c.quantity == 'angle' else 1.0):.6g}" for c, v in given)
     start = f"the sketch cannot be assembled at its own drive values{f' ({values})' if given else ''}"
     x, gap = equations.solve(equations.from_sketch(mechanism.sketch), given)
-    if gap < CLOSED and plan.iterative:
-        return _closed_elsewhere(mechanism, x, start, [coordinate for coordinate, _ in given])
+    if gap < CLOSED:
+        told = _closed_otherwise(mechanism, x, start, [coordinate for coordinate, _ in given])
+        if told is not None:
+            return told
     where, mend = open_group(state, equations.gaps(x))
     if not plan.iterative:
         for k, (coordinate, _) in enumerate(given):
@@ -56,7 +58,9 @@ def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Co
     return MechanismError(f"{start}: {where}; {mend}", KEY)
 
 
-def _closed_elsewhere(mechanism: Mechanism, x: Vector, start: str, drives: Sequence[Coordinate]) -> MechanismError:
+def _closed_otherwise(
+    mechanism: Mechanism, x: Vector, start: str, drives: Sequence[Coordinate]
+) -> MechanismError | None:
     """A group that closes, but not where Newton's method gets to from the sketch, or not in one place only."""
     equations, graph = mechanism.equations, mechanism.graph
     real, middle = equations.mobility(x)
@@ -65,7 +69,10 @@ def _closed_elsewhere(mechanism: Mechanism, x: Vector, start: str, drives: Seque
     free = motions_in_words(equations, equations.jacobian(x, drives))
     if free:
         return MechanismError(f"the sketch is at a singular position: with its drives held, {free}; draw another", KEY)
-    places = equations.unpack(x)[0] * equations.size
+    nodes, _, slides = equations.unpack(x)
+    if not mechanism.forward.iterative or any(slides[slide] <= 0 for slide in graph.telescopic):
+        return None
+    places = nodes * equations.size
     moving = [
         f"{point}: [{place.real:.6g}, {place.imag:.6g}]"
         for point, place in zip(graph.nodes, places, strict=True)
@@ -202,28 +209,32 @@ def closing_range(
     valid : callable
         Whether it closes, for an array of the drive's values (radians or lengths).
     size : float
-        A characteristic length: lengths are tried up to four of it.
+        A characteristic length: lengths are tried up to four of it, either way.
     unit : float
         Radians in one of the study's units of angle.
     """
     angle = coordinate.quantity == "angle"
-    low, high = (0.0, 2 * np.pi) if angle else (0.0, 4 * size)
-    values = np.linspace(low, high, SWEEP)
+    values = np.linspace(0.0, 2 * np.pi, SWEEP) if angle else np.linspace(-4 * size, 4 * size, SWEEP)
     closed = np.asarray(valid(values), dtype=bool)
     if not closed.any():
         return ""
-    edges = np.flatnonzero(closed[1:] != closed[:-1])
-    a, b, at_a = values[edges], values[edges + 1], closed[edges]
+    changes = np.flatnonzero(closed[1:] != closed[:-1])
+    a, b, at_a = values[changes], values[changes + 1], closed[changes]
     for _ in range(HALVINGS):
         middle = (a + b) / 2
         same = np.asarray(valid(middle), dtype=bool) == at_a
         a, b = np.where(same, middle, a), np.where(same, b, middle)
-    ends = list((a + b) / 2 / (unit if angle else 1.0))
-    full = 2 * np.pi / unit
-    if closed[0]:
+    ends = [float(end) / (unit if angle else 1.0) for end in (a + b) / 2]
+    first: list[float | None] = [None] if closed[0] else []
+    last: list[float | None] = [None] if closed[-1] else []
+    if angle and closed[0] and closed[-1] and ends:
         # An interval across zero goes on from the one before it.
-        ends = [ends[-1] - full, *ends[:-1]] if angle and len(ends) > 1 else [low, *ends]
-    if len(ends) % 2:
-        ends.append(high)
-    pairs = [f"between {a:.5g} and {b:.5g}" for a, b in zip(ends[::2], ends[1::2], strict=True)]
-    return f"it closes for {coordinate.name} {' and '.join(pairs)}"
+        first, last, ends = [], [], [ends[-1] - 2 * np.pi / unit, *ends[:-1]]
+    bounds = [*first, *ends, *last]
+    return f"it closes for {coordinate.name} {' and '.join(map(_between, bounds[::2], bounds[1::2]))}"
+
+
+def _between(low: float | None, high: float | None) -> str:
+    if low is None or high is None:
+        return f"below {high:.5g}" if high is not None else f"above {low:.5g}" if low is not None else "of any value"
+    return f"between {low:.5g} and {high:.5g}"

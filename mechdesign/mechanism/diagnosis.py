@@ -96,7 +96,8 @@ def _too_free(equations: Equations, jacobian: Vector, drives: Sequence[str], mis
             for body, shared in graph.points
             if mine == link and shared == point and graph.bodies[body][0] != graph.bodies[link][0]
         ]
-        return f"{held}: {add}{hint}, clamp it to {' or '.join(dict.fromkeys(mates))}, or leave it out"
+        clamp = f", clamp it to {' or '.join(dict.fromkeys(mates))}" if mates else ""
+        return f"{held}: {add}{hint}{clamp}, or leave it out"
     return f"{held}: {add}{hint}, or clamp or leave out what need not move"
 
 
