@@ -15,9 +15,9 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import determinants
-from mechdesign.mechanism.rates import Rates
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.rates import Rates
 
 Places = Mapping[str, Value]
 

@@ -148,7 +148,7 @@ def _conditioning(motion: Motion) -> list[str]:
 
 def _stalled(motion: Motion) -> list[str]:
     study, poses = motion.asked.study, motion.asked.poses
-    stalled = motion.valid & ~(motion.arrays["conditioning"] >= STALLED)
+    stalled = motion.valid & ~motion.smooth & ~(motion.arrays["conditioning"] >= STALLED)
     warnings = []
     rows = np.flatnonzero(stalled)
     if len(rows):

@@ -12,6 +12,7 @@ from mechdesign.analyses.continuity import continuous
 from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
 from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, radians, solve_poses
 from mechdesign.analyses.rates import STALLED, DriveRates, inverse_rates
+from mechdesign.analyses.smoothing import through_change_points
 from mechdesign.analyses.targets import Error, errors, needed
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
@@ -120,12 +121,15 @@ class Motion:
         See `mechdesign.mechanism.Reason`.
     errors : list of Error
         Of the targets.
+    smooth : bool array, shape (poses,)
+        Poses at a change point whose values are those of the motion that goes through it.
     """
 
     asked: Asked
     arrays: dict[str, Array] = field(default_factory=dict)
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
+    smooth: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -288,6 +292,7 @@ def move(question: Asked, progress: Progress = NULL) -> Motion:
     for solved in solve_poses(study, poses):
         motion.fill(solved)
         progress.update(len(solved.rows))
+    through_change_points(motion)
     if not poses.listed:
         turning = [c for c in question.watched if c.quantity == "angle" and c.name not in poses.names]
         motion.arrays |= continuous(study, poses, turning, motion.arrays)

@@ -131,3 +131,20 @@ def test_large_batches_come_out_as_small_ones(jobs: int) -> None:
     assert grid.shape == (2000, 40)
     one = mechanism.forward.solve([angles[1234]], {"rod.length": np.linspace(1.8, 2.0, 40)})
     assert np.array_equal(one.point("B"), grid.point("B")[1234], equal_nan=True)
+
+
+def test_rates_go_smoothly_through_the_change_points_that_are_followed() -> None:
+    study = study_of(
+        PARALLELOGRAM + "kinematics:\n  sweep: {theta: {from: -180, to: 360, step: 45}}\n  rates: {theta: 1 rad/s}\n"
+        "  accelerations: {theta: 2 rad/s^2}\n  outputs: [B, F.x, rocker.angle]\n"
+    )
+    result = mechdesign.kinematics(study)
+    motion = result.tables["motion"]
+    turn = np.exp(1j * np.radians(motion["theta"]))
+    expected = {"": 4 + turn, "_velocity": 1j * turn, "_acceleration": (2j - 1) * turn}
+    for order, value in expected.items():
+        assert motion[f"B.x{order}"] + 1j * motion[f"B.y{order}"] == pytest.approx(value, abs=1e-9)
+    assert motion["rocker.angle"] == pytest.approx(motion["theta"], abs=1e-9)
+    assert motion["rocker.angle_velocity"] == pytest.approx(np.full(len(motion), np.degrees(1)), rel=1e-9)
+    assert np.isfinite(motion["F.x_acceleration"]).all()
+    assert not result.warnings
