@@ -42,11 +42,11 @@ def gif(sweep: Sweep) -> bytes:
 
     At most `FRAMES` frames. Poses that are not valid have none; the title says how many.
     """
-    valid, closed = _in_order(sweep), sweep.closed
+    valid, closed = in_order(sweep), sweep.closed
     # A closed motion begins again with its last pose; another shows its inner poses twice.
     most = FRAMES + 1 if closed else FRAMES // 2 + 1
     some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
-    figure, axes = framed(sweep.extent, sweep.study.units.length, height=TALLEST, above=_TITLE)
+    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST, above=_TITLE)
     figure.set_dpi(_DPI)
     draw_paths(axes, sweep)
     pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)
@@ -59,7 +59,7 @@ def gif(sweep: Sweep) -> bytes:
     return stream.getvalue()
 
 
-def _in_order(sweep: Sweep) -> np.ndarray:
+def in_order(sweep: Sweep) -> np.ndarray:
     """Valid poses; a turn that does not close everywhere begins behind the gap, so that its motion is in one piece."""
     valid = sweep.valid
     gaps = np.flatnonzero(np.diff(valid) > 1)

@@ -21,13 +21,15 @@ from mechdesign.study import Study, Units
 
 # More curves than this in one panel cannot be told apart.
 MOST_CURVES = 7
-MOST_PANELS = 9
+MOST_PANELS = 12
 _COLORS = (*style.PALETTE[:6], style.INK)  # yellow is lost on white
 _ORDERS = ("velocity", "acceleration", "error", "effort")
 _RANKS = ("position", "velocity", "acceleration", "error", "effort", "det_J", "inverse_condition")
+_TURN = 180  # degrees from which on ticks stand at parts of a turn
+_MANY = 7  # panels from which on they are lower
 _LETTERS = 26  # longest name in a legend
 _STILL = 1e-9  # part of its size by which a column changes that does not change
-_HIDDEN = 1e-3  # part of its range by which a curve differs from one that covers it
+_HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
 _TAIL, _PEAK = 4, 6  # per cent of the poses left out at both ends, and how many times their range makes a peak
 _LIMITS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
@@ -76,7 +78,7 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
         axes[-1].set_xlabel("pose along the path")
         return figure
     axes[-1].set_xlabel(style.axis_label(swept, study.units.label(study.mechanism.quantity(swept))))
-    if study.mechanism.quantity(swept) == "angle" and study.units.label("angle") == "deg":
+    if study.mechanism.quantity(swept) == "angle" and study.units.label("angle") == "deg" and np.ptp(x) >= _TURN:
         axes[-1].xaxis.set_major_locator(MaxNLocator(9, steps=[1, 1.5, 3, 4.5, 6, 9, 10]))
     return figure
 
@@ -86,34 +88,39 @@ def _panels(study: Study, columns: list[Column], swept: str | None, x: Array) ->
     section = study.kinematics
     asked = section.outputs if section is not None and section.outputs is not None else ()
     values = {column.name: column.values for column in columns}
+    unit_of = {column.name: column.unit for column in columns}
+    units = study.units
+    sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): study.mechanism.size}
     rank = ranks(study.mechanism, tuple(asked))
+    # The condition of a single number is 1, that of each pose is for its table.
+    left_out = {"conditioning"} | ({"inverse_condition"} if len(study.mechanism.drives) == 1 else set())
     panels: dict[tuple[str, str], list[_Curve]] = {}
     for column in columns:
-        if column.values.dtype.kind != "f" or column.name == "conditioning" or not np.isfinite(column.values).any():
+        if column.values.dtype.kind != "f" or column.name in left_out or not np.isfinite(column.values).any():
             continue
         order = next((order for order in _ORDERS if column.name.endswith(f"_{order}")), "position")
         of = column.name.removesuffix(f"_{order}")
         if column.name in _RANKS:
             order = of = column.name
         position = values.get(of, column.values)
-        if order in _RANKS[:3] and swept and _coincide(position - position[0], x - x[0]):
+        if order in _RANKS[:3] and swept and _still(position - x, float(np.ptp(x))):
             continue  # the sweep over itself
-        if (order in _RANKS[-2:] or not (asked or order == "error")) and _still(position):
+        # Of what stands still only the place is told, and only where it is asked for.
+        told = order in ("error", "effort") or (order == "position" and asked and of not in study.mechanism.drives)
+        if not told and _still(position, sizes.get(unit_of.get(of, ""), 1.0)):
             continue
         curve = _Curve(column, of, order)
         panels.setdefault(curve.panel, []).append(curve)
     found = sorted(panels.values(), key=lambda panel: _RANKS.index(panel[0].order))[:MOST_PANELS]
-    return [
-        sorted(panel, key=lambda curve: -rank.get(curve.of.rpartition(".")[0], 1))
-        if len(panel) > MOST_CURVES
-        else panel
-        for panel in found
-    ]
+    for panel in found:
+        if len(panel) > MOST_CURVES:
+            panel.sort(key=lambda curve: -rank.get(curve.of.rpartition(".")[0], 1))
+    return found
 
 
-def _still(values: Array) -> bool:
+def _still(values: Array, size: float) -> bool:
     known = values[np.isfinite(values)]
-    return not len(known) or float(np.ptp(known)) <= _STILL * float(np.abs(known).max())
+    return not len(known) or float(np.ptp(known)) <= _STILL * max(float(np.abs(known).max()), size)
 
 
 def _coincide(one: Array, other: Array) -> bool:
@@ -146,11 +153,11 @@ def _runs(invalid: NDArray[np.bool_], x: Array, limits: Array) -> list[tuple[flo
 def _stack(curves: list[_Curve], count: int, marked: bool) -> tuple[Figure, NDArray[np.object_]]:
     """Panels over one another; margins in inches, for a layout engine would draw everything twice."""
     top = 0.4 if marked else 0.15
-    height = 0.55 + top + 1.75 * count
+    height = 0.55 + top + (1.75 if count <= _MANY else 1.4) * count
     longest = min(max(len(curve.of) for curve in curves), _LETTERS)
     figure = style.new_figure(style.WIDTH, height, layout=None)
     margins = {
-        "left": 0.95 / style.WIDTH, "right": 1 - (0.6 + 0.08 * longest) / style.WIDTH, "bottom": 0.5 / height,
+        "left": 1.0 / style.WIDTH, "right": 1 - (0.6 + 0.08 * longest) / style.WIDTH, "bottom": 0.5 / height,
         "top": 1 - top / height, "hspace": 0.14,
     }  # fmt: skip
     axes = figure.subplots(count, 1, sharex=True, squeeze=False, gridspec_kw=margins)[:, 0]
@@ -174,10 +181,14 @@ def _draw(axis: Axes, panel: list[_Curve], x: Array, units: Units, colors: dict[
         title = kinds.get(first.column.unit, "value")
     title = title.replace("inverse ", "inverse\n")
     axis.set_ylabel(style.axis_label(title, first.column.unit).replace(" [", "\n["))
-    axis.yaxis.set_label_coords(-0.52 / (axis.get_position().width * style.WIDTH), 0.5)
-    axis.ticklabel_format(axis="y", scilimits=(-4, 5))
-    if first.order != "position":
-        known = np.concatenate([values[np.isfinite(values)] for values in shown])
+    axis.yaxis.set_label_coords(-0.57 / (axis.get_position().width * style.WIDTH), 0.5)
+    axis.ticklabel_format(axis="y", scilimits=(-4, 4))
+    known = np.concatenate([values[np.isfinite(values)] for values in shown])
+    if np.ptp(known) <= _STILL * max(float(np.abs(known).max()), 1.0):
+        # What stands still is drawn straight, not by its rounding.
+        middle = float(known.mean())
+        axis.set_ylim(middle - max(0.1 * abs(middle), 0.1), middle + max(0.1 * abs(middle), 0.1))
+    elif first.order != "position":
         low, high = np.percentile(known, (_TAIL, 100 - _TAIL))
         if np.ptp(known) > _PEAK * (high - low) > 0:
             # Near a dead centre rates grow without bound: what they are elsewhere stays legible.

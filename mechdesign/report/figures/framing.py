@@ -15,7 +15,7 @@ from mechdesign.report.figures import style
 PAD = 0.5  # inches around what is drawn, for symbols and names
 LEAST = 1.5  # inches, height of a window
 # Inches left of a window and below it, for axis labels, and above and right of it.
-LEFT, BELOW, ABOVE, RIGHT = 0.68, 0.55, 0.12, 0.15
+LEFT, BELOW, ABOVE, RIGHT = 0.78, 0.55, 0.12, 0.15
 
 
 @dataclass(frozen=True)

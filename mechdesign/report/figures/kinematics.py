@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from mechdesign.report.figures.curves import curves_figure
+from mechdesign.report.figures.modes import modes_figure
 from mechdesign.report.figures.paths import paths_figure
 from mechdesign.report.figures.sweep import is_motion, solve_sweep
 from mechdesign.results import Result
@@ -26,7 +26,5 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
         if len(sweep.valid):
             found["paths"] = paths_figure(sweep)
     if "modes" in result.tables:
-        from mechdesign.report.figures.modes import modes_figure
-
-        found["modes"] = modes_figure(study, [str(label) for label in np.unique(result.tables["modes"]["mode"])])
+        found["modes"] = modes_figure(study)
     return found

@@ -38,7 +38,7 @@ def mechanism_figure(study: Study) -> Figure:
     try:
         sweep = solve_sweep(study, _POSES)
     except MechdesignError:
-        return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.length)
+        return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.label("length"))
     poses = [pose(mechanism, sweep.configuration, k) for k in range(len(sweep.rows))]
     first = next((k for k, scene in enumerate(poses) if scene is not None), None)
     if first is not None:
@@ -48,7 +48,7 @@ def mechanism_figure(study: Study) -> Figure:
             note = f"sketch and {note}"
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
         scenes += poses
-    return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.length)
+    return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.label("length"))
 
 
 def sketch_figure(study: Study) -> Figure:
@@ -58,7 +58,7 @@ def sketch_figure(study: Study) -> Figure:
     assert scene is not None
     places = [*scene.points.values(), *(end for guide in scene.guides for end in guide.ends({}, scene.span))]
     drawn = mechanism.description.sketch
-    figure, axes = framed([*places, *drawn.values()], study.units.length, height=5.4, above=_TITLE)
+    figure, axes = framed([*places, *drawn.values()], study.units.label("length"), height=5.4, above=_TITLE)
     ends = np.array([(place, scene.points[name]) for name, place in drawn.items()], dtype=complex).reshape(-1, 2)
     moves = paper(axes, ends[:, 0]) - paper(axes, ends[:, 1])
     rough = ends[np.hypot(*moves.T) > _ROUGH]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,21 +22,20 @@ _MOST_COLUMNS, _TALLEST, _LOWEST = 4, 4.0, 1.2  # panels beside one another; inc
 _TURNED = 0.6  # size of symbols in the smallest panels, next to 1 for one as wide as the page
 
 
-def modes_figure(study: Study, labels: Sequence[str]) -> Figure:
-    """A panel an assembly, at most `MOST`, on one scale; the sketch's own is named so.
-
-    Parameters
-    ----------
-    labels : sequence of str
-        The assemblies to show, as `mechdesign.mechanism.assemblies.assemblies` names them.
-    """
+def modes_figure(study: Study) -> Figure:
+    """A panel an assembly that has a valid pose, at most `MOST`, on one scale; the sketch's own is named so."""
     names = study.poses("kinematics").groups[0].names
     found: list[tuple[str, Sweep]] = []
     for assembly in assemblies(study.mechanism, names):
-        if assembly.label in labels:
-            title = f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label
-            found.append((title, solve_sweep(replace(study, mechanism=assembly.mechanism))))
-    shown = found[:MOST]
+        title = f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label
+        found.append((title, solve_sweep(replace(study, mechanism=assembly.mechanism))))
+    moving = [(title, sweep) for title, sweep in found if len(sweep.valid)]
+    shown = moving[:MOST]
+    notes = []
+    if len(moving) > len(shown):
+        notes.append(f"{len(shown)} of {len(moving)} assemblies")
+    if len(found) > len(moving):
+        notes.append(f"{len(found) - len(moving)} of {len(found)} assemblies have no valid pose")
     places = np.concatenate([sweep.extent for _, sweep in shown])
     _, wide, tall = extent(places)
     columns = max(
@@ -46,10 +44,10 @@ def modes_figure(study: Study, labels: Sequence[str]) -> Figure:
     )
     rows = math.ceil(len(shown) / columns)
     window = fit(places, *_room(columns, rows), _pad(columns))
-    above = _NOTE if len(found) > len(shown) else 0.0
+    above = _NOTE if notes else 0.0
     outer = BELOW + rows * (window.height + _TITLE) + above
     figure = style.new_figure(style.WIDTH, outer, layout=None)
-    unit = study.units.length
+    unit = study.units.label("length")
     for k, (title, sweep) in enumerate(shown):
         column, row = k % columns, k // columns
         left = LEFT + column * (window.width + _GAP)
@@ -62,17 +60,13 @@ def modes_figure(study: Study, labels: Sequence[str]) -> Figure:
         axes.tick_params(labelleft=column == 0, labelbottom=lowest)
         axes.set_xlabel(style.axis_label("x", unit) if lowest else "")
         axes.set_ylabel(style.axis_label("y", unit) if column == 0 else "")
-        if not len(sweep.valid):
-            axes.set_title(f"{title}: no valid pose", loc="left", fontsize=10)
-            continue
         axes.set_title(title, loc="left", fontsize=10)
         draw_paths(axes, sweep, width=0.8)
         draw_mechanism(
             axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=columns == 1, drives=False,
             travel=sweep.travel, size=_TURNED if columns > 1 else 1.0,
         )  # fmt: skip
-    if above:
-        figure.text(LEFT / style.WIDTH, 1 - 0.22 / outer, f"{MOST} of {len(found)} assemblies", fontsize=10)
+    figure.text(LEFT / style.WIDTH, 1 - 0.22 / outer, "; ".join(notes), fontsize=10)
     return figure
 
 

@@ -23,7 +23,7 @@ _MARKS = 240  # places of a path that names keep off
 
 def paths_figure(sweep: Sweep) -> Figure:
     """The first valid pose with its names, ghosts of later ones, and the path of every moving point."""
-    figure, axes = framed(sweep.extent, sweep.study.units.length, height=TALLEST)
+    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST)
     count = len(sweep.mechanism.description.links) - 1
     _, ghosts, share = next(entry for entry in _GHOSTS if count <= entry[0])
     # A closed motion ends where it begins: its last ghost would hide the first.

@@ -67,7 +67,7 @@ def _springs(study: Study) -> Figure | None:
     if scene is None or not coils:
         return None
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
-    figure, axes = _canvas(places, study.units.length)
+    figure, axes = _canvas(places, study.units.label("length"))
     axes.set_title(f"equivalent springs at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
     draw_mechanism(axes, study.mechanism, configuration, labels=False, drives=False)
     draw_coils(axes, coils)
@@ -122,7 +122,7 @@ def _deflections(study: Study, result: Result) -> Figure | None:
         moves.append(np.array([shift + 1j * turn * (place - at) for place in body]))
     scales = [round_down(_MOVED * scene.span / max(abs(move).max(), 1e-300)) for move in moves]
     places = np.concatenate([[*scene.points.values()], *(body + s * m for s, m in zip(scales, moves, strict=True))])
-    figure, axes = _canvas(places, study.units.length)
+    figure, axes = _canvas(places, study.units.label("length"))
     draw_mechanism(axes, study.mechanism, configuration, faint=True)
     for color, load, scale, move in zip(style.PALETTE, loads, scales, moves, strict=False):
         moved = np.array(body) + scale * move

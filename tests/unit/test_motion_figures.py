@@ -1,0 +1,173 @@
+"""Pictures of motions: what they show of a sweep, its limits and its assemblies."""
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.report.figures import style
+from mechdesign.report.figures.animation import in_order
+from mechdesign.report.figures.curves import curves_figure
+from mechdesign.report.figures.kinematics import figures
+from mechdesign.report.figures.mechanism import sketch_figure
+from mechdesign.report.figures.sweep import ranks, solve_sweep
+
+FOUR_BAR = """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 0]}
+    crank: [O, A, 30]
+    rod: {from: A, to: B, length: 90, points: {C: [45, 40]}}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+kinematics:
+  sweep: {theta: {from: 0, to: 360, step: 5}}
+"""
+ROCKER = """
+mechanism:
+  links: {ground: {O: [0, 0], D: [60, 0]}, crank: [O, A, 50], rod: [A, B, 90], rocker: [D, B, 60]}
+  drives: [crank]
+  sketch: {A: [20, 45], B: [110, 34]}
+kinematics:
+  sweep: {crank: {from: -180, to: 180, step: 5}}
+  rates: {crank: 60 rpm}
+"""
+
+
+def drawn(study, **options):
+    with style.context():
+        found = figures(study, mechdesign.kinematics(study, **options))
+        for figure in found.values():
+            figure.canvas.draw()
+        return found
+
+
+def boxes(axes):
+    return [text.get_window_extent() for text in axes.texts if text.get_text()]
+
+
+def test_paths_and_their_mechanism_lie_within_the_picture_and_names_apart():
+    figure = drawn(study_of(FOUR_BAR))["paths"]
+    (axes,) = figure.axes
+    window = axes.get_window_extent()
+    for line in axes.lines:
+        places = axes.transData.transform(line.get_xydata())
+        places = places[np.isfinite(places).all(axis=1)]
+        assert (places >= window.min).all()
+        assert (places <= window.max).all()
+    names = boxes(axes)
+    assert len(names) >= 8
+    for k, box in enumerate(names):
+        assert not any(box.overlaps(other) for other in names[:k])
+
+
+def test_the_coupler_point_tells_most():
+    assert ranks(study_of(FOUR_BAR).mechanism) == {"A": 0, "B": 0, "C": 2}
+    assert ranks(study_of(FOUR_BAR).mechanism, ("B.x",))["B"] == 2
+    figure = drawn(study_of(FOUR_BAR))["paths"]
+    study = study_of(FOUR_BAR)
+    path = np.asarray(solve_sweep(study).places["C"])
+    bold = max(
+        (line for line in figure.axes[0].lines if len(line.get_xdata()) == 73), key=lambda line: line.get_linewidth()
+    )
+    np.testing.assert_array_equal(bold.get_xdata(), path.real)
+
+
+def test_curves_of_what_moves_only():
+    study = study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 10}\n  sweep:"))
+    figure = drawn(study)["motion"]
+    names = {text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()}
+    assert names == {"C.x", "C.y", "A.x", "A.y", "B.x", "B.y", "rod.angle", "rocker.angle"}
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == [
+        "position\n[mm]", "angle\n[deg]", "velocity\n[mm/s]", "velocity\n[deg/s]", "acceleration\n[mm/s²]",
+        "acceleration\n[deg/s²]",
+    ]  # fmt: skip
+    assert figure.axes[-1].get_xlabel() == "theta [deg]"
+
+
+def test_what_stands_still_is_drawn_straight_and_only_where_it_is_asked_for():
+    parallelogram = FOUR_BAR.replace("length: 90", "length: 100").replace("[D, B, 60]", "[D, B, 30]")
+    study = study_of(
+        parallelogram.replace("B: [75, 55]", "B: [100, 30]").replace("from: 0, to: 360", "from: 10, to: 170"),
+        "kinematics.outputs=[rod.angle]", "kinematics.rates={theta: 10}",
+    )  # fmt: skip
+    (axes,) = drawn(study)["motion"].axes
+    low, high = axes.get_ylim()
+    assert high - low > 0.1
+    assert np.ptp(axes.lines[0].get_ydata()) < 1e-6
+    assert axes.get_ylabel() == "angle\n[deg]"
+
+
+def test_limits_of_motion_and_what_is_not_valid_are_marked():
+    study = study_of(ROCKER)
+    result = mechdesign.kinematics(study)
+    limits = sorted(result.tables["limits"]["crank"])
+    assert len(limits) == 2
+    with style.context():
+        figure = curves_figure(study, result)
+    for axes in figure.axes:
+        marks = sorted(line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2)
+        assert marks == pytest.approx(limits)
+        (shade,) = axes.patches
+        assert shade.get_extents().transformed(axes.transData.inverted()).intervalx == pytest.approx(limits, abs=1e-6)
+    words = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert words == {"dead centre", "not valid"}
+
+
+def test_a_rate_without_bound_does_not_flatten_the_rest():
+    limit = max(mechdesign.kinematics(study_of(ROCKER)).tables["limits"]["crank"])
+    study = study_of(ROCKER, f"kinematics.sweep={{crank: {{from: {limit + 1e-4}, to: 180, step: 2}}}}")
+    result = mechdesign.kinematics(study)
+    with style.context():
+        figure = curves_figure(study, result)
+    rates = result.tables["motion"]["rocker.angle_velocity"]
+    usual = np.nanpercentile(np.abs(rates), 90)
+    axes = next(axes for axes in figure.axes if axes.get_ylabel() == "velocity\n[deg/s]")
+    assert np.nanmax(np.abs(rates)) > 10 * usual
+    assert max(map(abs, axes.get_ylim())) < 5 * usual
+
+
+def test_an_animation_of_a_turn_with_a_gap_has_no_jump():
+    sweep = solve_sweep(study_of(ROCKER))
+    assert not sweep.closed
+    path = np.asarray(sweep.places["B"])
+    order = in_order(sweep)
+    assert set(order) | {0} == set(sweep.valid)
+    assert max(abs(np.diff(path[order]))) < 0.5 * max(abs(np.diff(path[sweep.valid])))
+
+
+def test_a_long_sweep_is_drawn_at_a_bounded_number_of_poses():
+    sweep = solve_sweep(study_of(FOUR_BAR, "kinematics.sweep={theta: {from: 0, to: 360, step: 0.01}}"))
+    assert len(sweep.rows) == 2001
+    assert (sweep.rows[0], sweep.rows[-1]) == (0, 36000)
+    assert sweep.closed
+
+
+def test_lists_and_grids_have_no_curves():
+    assert drawn(study_of(FOUR_BAR, "kinematics={poses: [{theta: 0}, {theta: 30}]}")) == {}
+
+
+def test_every_assembly_has_a_panel_on_one_scale():
+    figure = drawn(study_of(FOUR_BAR), all_modes=True)["modes"]
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert len(titles) == 2
+    assert [title.endswith("(as drawn)") for title in titles] == [True, False]
+    limits = {(*axes.get_xlim(), *axes.get_ylim()) for axes in figure.axes}
+    assert len(limits) == 1
+    above, below = (max(np.max(line.get_ydata()) for line in axes.lines) for axes in figure.axes)
+    assert above > below
+
+
+@pytest.mark.parametrize(("place", "crosses"), [("[85, 58]", 0), ("[90, 75]", 1)])
+def test_a_rough_sketch_is_shown_beside_the_assembled_one(place, crosses):
+    study = study_of(FOUR_BAR.replace("[75, 55]", place))
+    with style.context():
+        figure = sketch_figure(study)
+    (axes,) = figure.axes
+    marks = [line for line in axes.lines if line.get_marker() == "x"]
+    assert sum(len(line.get_xdata()) for line in marks) == crosses
+    assert ("crosses" in axes.get_title(loc="left")) == bool(crosses)
+    if crosses:
+        assert (marks[0].get_xdata()[0], marks[0].get_ydata()[0]) == (90, 75)
