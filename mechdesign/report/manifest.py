@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mechdesign.study import Study
 
 NAME = "manifest.json"
-_LIBRARIES = ("numpy", "scipy", "matplotlib", "pydantic", "pint", "pyyaml")
+_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "pydantic", "pint", "pyyaml")
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from mechdesign.study import load, template_path, templates
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").rglob("*.yaml"))
 PNG = b"\x89PNG\r\n\x1a\n"
+GIF = b"GIF89a"
 
 
 def named(path: Path) -> str:
@@ -60,7 +61,7 @@ def test_pages_show_pictures_that_exist() -> None:
         pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text())
         assert pictures
         for picture in pictures:
-            assert (page.parent / picture).read_bytes().startswith(PNG), picture
+            assert (page.parent / picture).read_bytes().startswith((PNG, GIF)), picture
 
 
 def test_readme_shows_the_test_command_that_ci_runs_and_every_command() -> None:
