@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, cross, quiet
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.redundancy import owners_of
-from mechdesign.mechanism.rigidity import CLOSED, Vector
+from mechdesign.mechanism.rigidity import CLOSED, SINGULAR, Vector
 from mechdesign.mechanism.sketch import KEY
 from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Group
@@ -56,6 +58,25 @@ def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Co
                 mend = f"{found}; draw it there, or {mend}"
                 break
     return MechanismError(f"{start}: {where}; {mend}", KEY)
+
+
+def check_regular(mechanism: Mechanism, configuration: Configuration) -> None:
+    """Check that the sketch, assembled by Newton's method, is not one of a chain that its drives do not hold at all.
+
+    Raises
+    ------
+    MechanismError
+        If the mechanism is over-constrained and has more freedom than drives.
+    """
+    if not mechanism.forward.iterative or regularity(mechanism.linearize(configuration)) > SINGULAR:
+        return
+    equations, count = mechanism.equations, len(mechanism.drives)
+    nodes = np.array([complex(node) for node in configuration.nodes])
+    angles = np.array([np.angle(turn) for turn in configuration.rotations])
+    slides = np.array([float(slide) for slide in configuration.slides])
+    real, middle = equations.mobility(equations.pack(nodes, angles, slides))
+    if real > count:
+        raise over_constrained(mechanism.description, equations, middle, count, real, count)
 
 
 def _closed_otherwise(

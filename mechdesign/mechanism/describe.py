@@ -10,12 +10,10 @@ from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Term
 from mechdesign.mechanism.naming import group_in_words, placed_before
+from mechdesign.mechanism.rigidity import SINGULAR
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.mechanism import Mechanism
-
-# Below this regularity (the sine of the angle between two links that meet) rounding shows in all rates.
-SINGULAR = 1e-6
 
 
 def joints_in_words(description: Description, graph: Graph) -> list[str]:

@@ -198,6 +198,7 @@ class Mechanism:
         if not configuration.valid:
             pose = list(zip(plan.structure.given, given, strict=True))
             raise closing.cannot_assemble(self, state, pose)
+        closing.check_regular(self, configuration)
         return configuration
 
     def solve(self, pose: Mapping[str, ArrayLike], places: Mapping[str, ArrayLike] | None = None) -> Pose:

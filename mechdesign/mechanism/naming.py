@@ -85,12 +85,33 @@ def chain_of(description: Description, graph: Graph, structure: Structure, group
     if letters == "PP":
         # The third joint is the pin at which a link, turned by the slides alone, was placed before.
         letters = "RPP"
+        outer = _pinned(description, graph, joints[0][1], joints[1][1], links)
+        if outer is not None:
+            links.insert(0, outer[0])
+            joints.insert(0, ("R", outer[1]))
+            if outer[2] == joints[2][1]:
+                joints[1:] = joints[:0:-1]
     return Chain(
         tuple(link for link in dict.fromkeys(links) if not link.startswith("pin in ")),
         letters,
         tuple(dict.fromkeys(name for letter, name in joints if letter == "R" and ":" not in name)),
         tuple(dict.fromkeys(name for letter, name in joints if letter == "P")),
     )
+
+
+def _pinned(
+    description: Description, graph: Graph, one: str, other: str, middle: list[str]
+) -> tuple[str, str, str] | None:
+    """The link beyond one of two slides that is neither driven nor ground, its pin, and that slide."""
+    driven = {name for drive in description.drives.values() for name in (drive.target, drive.reference)} | {GROUND}
+    for slide in (one, other):
+        for body in _slide_bodies(description, slide):
+            if body is None or body in driven or body in middle:
+                continue
+            for owner, point in graph.points:
+                if owner == body and any(point == shared and mate != body for mate, shared in graph.points):
+                    return body, point, slide
+    return None
 
 
 def _slide_bodies(description: Description, name: str) -> tuple[str, str | None]:
