@@ -171,3 +171,10 @@ def test_a_rough_sketch_is_shown_beside_the_assembled_one(place, crosses):
     assert ("crosses" in axes.get_title(loc="left")) == bool(crosses)
     if crosses:
         assert (marks[0].get_xdata()[0], marks[0].get_ydata()[0]) == (90, 75)
+
+
+def test_the_path_that_a_point_should_take_is_drawn_beside_its_own():
+    wanted = [[10, 60], [30, 80], [50, 70]]
+    study = study_of(FOUR_BAR.replace("  drives:", f"  targets: {{C: {wanted}}}\n  drives:"))
+    (axes,) = drawn(study)["paths"].axes
+    assert any(np.array_equal(line.get_xydata(), wanted) for line in axes.lines)

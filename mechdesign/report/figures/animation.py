@@ -23,7 +23,7 @@ from mechdesign.report.figures.sweep import Sweep, is_motion, solve_sweep
 from mechdesign.study import Study
 
 FRAMES = 72
-_COLORS, _WHITE = 48, 244
+_COLORS, _WHITE = 128, 244
 _TITLE = 0.36  # inches above the drawing, for the pose in words
 _CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and of a frame
 _DPI = 100  # 800 pixels wide

@@ -63,9 +63,11 @@ def sketch_figure(study: Study) -> Figure:
     moves = paper(axes, ends[:, 0]) - paper(axes, ends[:, 1])
     rough = ends[np.hypot(*moves.T) > _ROUGH]
     for line in rough:
-        axes.plot(line.real, line.imag, color=style.FAINT, linewidth=0.9, linestyle=":", zorder=2.4)
+        axes.plot(line.real, line.imag, color=style.INK, linewidth=0.9, linestyle=":", alpha=0.5, zorder=4.4)
     crosses = rough[:, 0]
-    axes.plot(crosses.real, crosses.imag, "x", color=style.FAINT, markersize=7, markeredgewidth=1.5)
+    axes.plot(
+        crosses.real, crosses.imag, "x", color=style.INK, alpha=0.5, markersize=7, markeredgewidth=1.6, zorder=4.5
+    )  # fmt: skip
     axes.set_title("the sketch, assembled" + ("; crosses: where it is drawn" if len(rough) else ""), loc="left")
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=crosses)
     return figure

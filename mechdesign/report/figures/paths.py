@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
 from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.scene import link_points
@@ -23,7 +24,14 @@ _MARKS = 240  # places of a path that names keep off
 
 def paths_figure(sweep: Sweep) -> Figure:
     """The first valid pose with its names, ghosts of later ones, and the path of every moving point."""
-    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST)
+    wanted = _wanted(sweep)
+    places = np.concatenate([sweep.extent, *wanted])
+    figure, axes = framed(places, sweep.study.units.label("length"), height=TALLEST)
+    for path in wanted:
+        axes.plot(
+            path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,
+            zorder=3.7,
+        )  # fmt: skip
     count = len(sweep.mechanism.description.links) - 1
     _, ghosts, share = next(entry for entry in _GHOSTS if count <= entry[0])
     # A closed motion ends where it begins: its last ghost would hide the first.
@@ -56,6 +64,15 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
             path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,
             zorder=2.5 + 0.1 * ranked[point], solid_joinstyle="round",
         )  # fmt: skip
+
+
+def _wanted(sweep: Sweep) -> list[NDArray[np.complex128]]:
+    """Places that points should pass through, where the study says so by a table."""
+    return [
+        target.table[:, -2] + 1j * target.table[:, -1]
+        for target in sweep.study.targets.values()
+        if target.table is not None and len(target.coordinates) == 2
+    ]
 
 
 def _thinned(path: NDArray[np.complex128]) -> NDArray[np.complex128]:
