@@ -101,7 +101,8 @@ class Mechanism:
             if abs(gap) > TIE_ROUNDING:
                 raise MechanismError(
                     f"the angles of the slides and clamps contradict each other: those between '{a}' and '{b}' are "
-                    f"{abs(gap) / self.description.angle_unit:.6g} apart on the two ways round",
+                    f"{abs(gap) / self.description.angle_unit:.6g} apart on the two ways round; change one, or leave a "
+                    "joint out",
                     "mechanism.joints",
                 )
 
