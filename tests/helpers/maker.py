@@ -19,11 +19,11 @@ Joint = tuple[str, int, int]
 Recipe = tuple[tuple[str, ...], tuple[Joint, ...], tuple[tuple[str, int], ...]]
 
 
-def _chain(kinds: str) -> Recipe:
+def _chain(kinds: str, *drives: tuple[str, int]) -> Recipe:
     """Links from base to base, joined by joints of these kinds."""
     count = len(kinds) - 1
     ends = [*range(count), -1]
-    return ("link",) * count, tuple((kind, k - 1, ends[k]) for k, kind in enumerate(kinds)), ()
+    return ("link",) * count, tuple((kind, k - 1, ends[k]) for k, kind in enumerate(kinds)), drives
 
 
 def _star(inner: str, outer: str, legs: bool = False) -> Recipe:
@@ -40,7 +40,13 @@ DRIVEN: dict[str, Recipe] = {
     "boom": (("leg",), (("R", -1, 0),), (("angle", 0), ("length", 0))),
     "jack": (("leg", "link"), (("R", -1, 0), ("R", 0, 1), ("R", 1, -1)), (("length", 0),)),
     "sleeve": (("leg", "link"), (("R", -1, 0), ("P", 0, 1), ("R", 1, -1)), (("length", 0),)),
+    "lift": (("leg", "link"), (("R", -1, 0), ("R", 0, 1), ("P", 1, -1)), (("length", 0),)),
+    "ram": _chain("RPRR", ("slide", 0)),
+    "stroke": _chain("RPRP", ("slide", 0)),
+    "press": _chain("PPRR", ("slide", 1)),
+    "elbow": _chain("RRRP", ("angle", 1)),
     "trammel": (("link",), (("S", -1, 0), ("S", 0, -1)), (("angle", 0),)),
+    "slotted": (("link",), (("S", -1, 0), ("S", 0, -1)), (("slide", 0),)),
 }
 DYADS: dict[str, Recipe] = {kinds: _chain(kinds) for kinds in ("RRR", "RRP", "PRR", "RPR", "PRP", "RPP", "PPR")} | {
     "RS": (("link",), (("R", -1, 0), ("S", 0, -1)), ()),
@@ -108,7 +114,8 @@ class Maker:
             others = [name for name in self.layout.bodies if name != body]
             return ("angle", body, self.rng.choice([GROUND, *others]))
         if kind == "slide":
-            return ("slide", next(g.name for g in self.layout.guides.values() if body in (g.guide, g.slider)))
+            slides = [g.name for g in self.layout.guides.values() if body in (g.guide, g.slider)]
+            return ("slide", self.rng.choice(slides))
         return ("length", body)
 
     def _lay(self, recipe: Recipe) -> list[str] | None:
