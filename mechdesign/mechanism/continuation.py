@@ -39,6 +39,15 @@ class Start:
     unknowns: Guess
     signs: Sequence[Value]
 
+    def map(self, function: Callable[[Value], Value]) -> Start:
+        """The start with a function applied to each of its arrays."""
+        return Start(
+            [function(v) for v in self.given],
+            {name: function(v) for name, v in self.places.items()},
+            {k: ([function(v) for v in a], [function(v) for v in s]) for k, (a, s) in self.unknowns.items()},
+            [function(v) for v in self.signs],
+        )
+
 
 # Solves all groups for given values, dimensions and a guess, with a bound of Newton's steps.
 Solver = Callable[[Sequence[Value], Mapping[str, Value], Guess, int], State]

@@ -143,24 +143,43 @@ class Plan:
             value = np.asarray(value)
             return value if value.ndim == 0 else np.broadcast_to(value, shape).reshape(-1)
 
-        begin = Start(
-            [flat(v) for v in begin.given],
-            {name: flat(v) for name, v in begin.places.items()},
-            {k: ([flat(v) for v in a], [flat(v) for v in s]) for k, (a, s) in begin.unknowns.items()},
-            [flat(v) for v in begin.signs],
-        )
-        found, reached = follow(
-            self.structure,
-            lambda given, places, guess, steps: self.run(
-                given, geometry.vectors(places), guess, self.modes_at(given), steps
-            ),
-            begin,
-            [flat(v) for v in values],
-            {name: flat(v) for name, v in dims.items()},
-            self.mechanism.nominal,
-            self.mechanism.size,
-            int(np.prod(shape)),
-        )
+        count = int(np.prod(shape))
+        begin = begin.map(flat)
+        places = {name: flat(v) for name, v in dims.items()}
+
+        def solve(given: Sequence[Value], rows: NDArray[np.intp] | None) -> tuple[Guess, NDArray[np.bool_]]:
+            def some(value: Value) -> Value:
+                return value if rows is None or np.ndim(value) == 0 else value[rows]
+
+            return follow(
+                self.structure,
+                lambda at, sizes, guess, steps: self.run(at, geometry.vectors(sizes), guess, self.modes_at(at), steps),
+                begin.map(some),
+                [some(v) for v in given],
+                {name: some(v) for name, v in places.items()},
+                self.mechanism.nominal,
+                self.mechanism.size,
+                count if rows is None else len(rows),
+            )
+
+        given = [flat(v) for v in values]
+        found, reached = solve(given, None)
+        # The way as it was given comes first; but a pose is the same whatever turn its angles are told in.
+        nearest = [
+            v - 2 * np.pi * np.round((v - at) / (2 * np.pi)) if c.quantity == "angle" else v
+            for c, v, at in zip(self.structure.given, given, begin.given, strict=True)
+        ]
+        turned = np.zeros(count, dtype=bool)
+        for one, other in zip(given, nearest, strict=True):
+            turned |= one != other
+        rows = np.flatnonzero(turned & ~reached)
+        if len(rows):
+            better, there = solve(nearest, rows)
+            for k, kinds in better.items():
+                for kind, kept in zip(kinds, found[k], strict=True):
+                    for new, old in zip(kind, kept, strict=True):
+                        old[rows[there]] = new[there]
+            reached[rows] = there
         guess = {k: ([v.reshape(shape) for v in a], [v.reshape(shape) for v in s]) for k, (a, s) in found.items()}
         return guess, reached.reshape(shape)
 
