@@ -114,6 +114,11 @@ def _table(
         what = "[x, y] or [drive, x, y]" if count == 2 else "[value] or [drive, value]"
         checker.reporter.report(path, f"a row of the target of {owner!r} is {what}, not {columns} numbers")
         return None
+    quantity = "length" if count == 2 else checker.names.coordinates[owner]
+    if value.rows is not None and quantity != "none":
+        for index, row in enumerate(value.rows):
+            for place in range(len(row) - count, len(row)):
+                checker.kind((*path, index, place) if columns > 1 else (*path, index), quantity)
     if columns == count:
         return table
     table = table[np.argsort(table[:, 0], kind="stable")]

@@ -8,6 +8,8 @@ from helpers.studies import study_of
 
 from mechdesign.analyses.kinematics import kinematics
 from mechdesign.analyses.reliability import reliability
+from mechdesign.analyses.stiffness import stiffness
+from mechdesign.analyses.workspace import workspace
 from mechdesign.report.requirements import judge
 
 ARM = """
@@ -103,3 +105,29 @@ reliability:
     result = reliability(study_of(FOUR_BAR + question))
     assert set(result.tables["moments"]["output"]) == {"half", "lower", "reach"}
     assert np.isfinite(result.tables["reliability"]["reliability"]).all()
+
+
+def test_measures_place_what_is_stiff() -> None:
+    study = study_of(
+        ARM.replace("t2: {angle: fore}", "t2: {angle: fore, from: upper}")
+        + "stiffness: {at: P, actuators: {t1: 1e5, t2: 1e5}, poses: [{twice: 90, t1: 30}, {bend: 45, t1: 30}]}"
+    )
+    table = stiffness(study).tables["stiffness"]
+    assert np.isfinite(table["k_x"]).all()
+    assert table["k_x"][0] == pytest.approx(table["k_x"][1], rel=1e-12)
+
+
+def test_a_measure_is_held_in_a_workspace() -> None:
+    study = study_of(
+        """
+mechanism:
+  links: {ground: {O: [0, 0]}, a: [O, E, 10], b: [E, F, 8], c: [F, P, 3]}
+  drives: [a, b, c]
+  sketch: {E: [8, 5], F: [13, 11], P: [16, 11]}
+  measures: {reach: {distance: [O, F]}}
+workspace: {point: P, at: {reach: 12}, characteristic_length: 5, scan: {rays: 40}}
+"""
+    )
+    indices = workspace(study).tables["indices"]
+    # The wrist F on a circle of 12, P 3 from it.
+    assert indices["area"] == pytest.approx(np.pi * (15**2 - 9**2), rel=1e-4)

@@ -108,7 +108,7 @@ def test_nothing_is_assumed_without_reason(poses, text, message):
     ("section", "message"),
     [
         ("{poses: [{crank: 1}, {crank: 1, B.x: 3}]}", "study.yaml:6:34: kinematics.poses.1: a pose gives 1 coordinate"),
-        ("{poses: [{O.x: 1}]}", "study.yaml:6:22: kinematics.poses.0: O.x do not determine"),
+        ("{poses: [{O.x: 1}]}", "study.yaml:6:22: kinematics.poses.0: 'O.x' never changes: point 'O'"),
         ("{poses: []}", "kinematics.poses: an empty list"),
         ("{sweep: {}}", "kinematics.sweep: a pose gives 1 coordinate"),
         ("{sweep: {crank: {from: 0, to: 360, step: 1e-9}}}", "more than 10000000 poses"),
