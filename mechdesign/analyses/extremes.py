@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses import targets
 from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.targets import Error
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.coordinates import Coordinate
@@ -19,8 +20,8 @@ from mechdesign.study.poses import Poses
 
 Array = NDArray[np.float64]
 
-# Halvings of a step of the sweep, which reach the last bit of the drive's value.
-HALVINGS = 52
+# How far from its place an extreme may be found, as a part of a step of the sweep.
+PRECISION = 1e-13
 # An error's extreme is flat: its value is exact when its place is known to the root of rounding.
 SECTIONS = 40
 GOLDEN = (5**0.5 - 1) / 2
@@ -113,7 +114,7 @@ def _refined(
     study: Study, outputs: Sequence[Coordinate], poses: Poses, swept: str, index: NDArray[np.intp], sign: int,
     full_turn: bool, sampled: Array,
 ) -> Array:  # fmt: skip
-    """Extremes where the derivative by the swept drive is zero, by halving about the pose that is the best of all.
+    """Extremes where the derivative by the swept drive is zero, beside the pose that is the best of all.
 
     `sampled` and the answer hold a value and a place a row. Where the derivative does not change its sign beside the
     pose (an extreme at the end of the sweep, or beside a pose that fails) the row stays. `sign` is 1 for the smallest
@@ -138,35 +139,41 @@ def _refined(
     ]
     start = plan.solve(given)
 
-    def solve(place: Array) -> tuple[Array, Array]:
-        """Value of each lane's output and its derivative by the swept drive, times `sign`."""
-        given[group.names.index(swept)] = place
-        configuration = plan.solve(given, start=start)
+    def solve(lane: NDArray[np.intp], place: Array) -> tuple[Array, Array]:
+        """Value of some lanes' output and its derivative by the swept drive, times `sign`."""
+        some = [values[lane] for values in given]
+        some[group.names.index(swept)] = place
+        configuration = plan.solve(some, start=start.take(lane))
         rates = mechanism.linearize(configuration).drives()
-        full = (len(mechanism.drives), len(lanes))
-        value = [np.broadcast_to(configuration.value(o), lanes.shape)[k] for k, o in enumerate(outputs)]
-        slope = [np.broadcast_to(first(configuration, o, rates), full)[which, k] for k, o in enumerate(outputs)]
+        full = (len(mechanism.drives), len(lane))
+        asked = [outputs[k] for k in lane.tolist()]
+        value = [np.broadcast_to(configuration.value(o), lane.shape)[k] for k, o in enumerate(asked)]
+        slope = [np.broadcast_to(first(configuration, o, rates), full)[which, k] for k, o in enumerate(asked)]
         valid = configuration.valid
         return np.where(valid, value, np.nan), sign * np.where(valid, slope, np.nan)
 
-    turns = (solve(low)[1] < 0) & (solve(high)[1] > 0)
+    slopes = [solve(lanes, end)[1] for end in (low, high)]
+    turns = (slopes[0] < 0) & (slopes[1] > 0)
     if not turns.any():
         return sampled
     step = high - low
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        rising = solve(middle)[1] > 0
-        low, high = np.where(rising, low, middle), np.where(rising, middle, high)
-    value, _ = solve(high)
+    moving = np.flatnonzero(turns)
+    none = np.full(len(moving), np.nan)
+    place, value = low.copy(), np.full(len(lanes), np.nan)
+    place[moving] = bracketed_roots(
+        lambda lane, at: solve(moving[lane], at)[1],
+        low[moving], slopes[0][moving], high[moving], slopes[1][moving], none, none, PRECISION * step[moving],
+    )  # fmt: skip
+    value[moving] = solve(moving, place[moving])[0]
     # Where the pose itself is the extreme, its place is kept as the study gives it.
-    turns &= np.isfinite(value) & (np.abs(high - at[index]) > 1e-9 * step)
+    turns &= np.isfinite(value) & (np.abs(place - at[index]) > 1e-9 * step)
     if full_turn:
         begin, end = min(at[0], at[-1]), max(at[0], at[-1])
-        high = np.where(high < begin, high + 2 * np.pi, np.where(high > end, high - 2 * np.pi, high))
+        place = np.where(place < begin, place + 2 * np.pi, np.where(place > end, place - 2 * np.pi, place))
     answer = sampled.copy()
     turn = 2 * np.pi / study.units.angle_factor
     for k in np.flatnonzero(turns).tolist():
-        answer[k] = in_study_units(study, outputs[k], value[k]), in_study_units(study, drive, high[k])
+        answer[k] = in_study_units(study, outputs[k], value[k]), in_study_units(study, drive, place[k])
         if outputs[k].quantity == "angle":
             # Continuous with the poses beside it.
             answer[k, 0] += turn * round((sampled[k, 0] - answer[k, 0]) / turn)
