@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, angle_of, wrap
+from mechdesign.mechanism.newton import STEPS
 from mechdesign.mechanism.state import Guess, State
 from mechdesign.mechanism.structure import Structure
 
@@ -25,8 +26,6 @@ SMALLEST_STEP = 2e-4
 MAX_ROUNDS = 400
 # Part of the path over which the first direction is taken.
 BEGINNING = 1e-6
-# Corrections that a step may need: what does not converge soon is better tried with a shorter step.
-CORRECTIONS = 6
 
 Array = NDArray[np.float64]
 
@@ -102,7 +101,7 @@ class _Path:
             row += angles + lengths
         return found
 
-    def solve(self, lanes: NDArray[np.intp], at: Value, guess: Array, steps: int = CORRECTIONS) -> tuple[Array, State]:
+    def solve(self, lanes: NDArray[np.intp], at: Value, guess: Array, steps: int = STEPS) -> tuple[Array, State]:
         """Unknowns and state of some poses at parts `at` of their paths."""
 
         def between(ends: tuple[Value, Value]) -> Value:
