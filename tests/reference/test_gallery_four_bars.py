@@ -73,16 +73,18 @@ def test_parallelogram_carries_its_rod_without_turning_it() -> None:
     assert motion["rod.angle"] == pytest.approx(np.zeros(len(motion)), abs=1e-9)
     assert motion["wheel_2.angle"] == pytest.approx(motion["wheel_1"], abs=1e-9)
     assert point(motion, "M") == pytest.approx(750 + 300 * unit(motion["wheel_1"]), abs=1e-9)
-    speed, between = 2 * np.pi * 2, motion["wheel_1"] % 180 != 0
+    speed = 2 * np.pi * 2
     expected = 300 * speed * np.cos(np.radians(motion["wheel_1"]))
-    assert motion["M.y_velocity"][between] == pytest.approx(expected[between], abs=1e-6)
+    assert motion["M.y_velocity"] == pytest.approx(expected, abs=1e-6)
 
 
 def test_pumpjack_has_the_published_torque_factor() -> None:
     """Unit C-114D-133-54 of B. Guo, W. C. Lyons and A. Ghalambor, Petroleum Production Engineering (2007), Table 12.1.
 
-    The table's torque factor, 26.45 in, is that of a level crank whose pin points towards the well; the designation's
-    stroke, 54 in, is the horsehead's vertical travel.
+    The table does not say at which crank position its torque factor holds. A level crank whose pin points towards the
+    well gives the printed 26.45 in; that the table means it is read off from this agreement (four of six units tried so
+    come out to about 0.01, two are off by up to 0.06). The largest factor over the turn is 28.98 in. The designation's
+    stroke, 54 in, is compared with the horsehead's vertical travel.
     """
     result = result_of("pumpjack")
     motion = result.tables["motion"]
