@@ -46,7 +46,8 @@ def wrong_count(
     found = joints_in_words(description, equations.graph)
     more = f"; and {len(found) - MANY} more" if len(found) > MANY else ""
     joints = f". Joints found: {'; '.join(found[:MANY]) or 'none'}{more}"
-    jacobian = equations.generic(drives) if x is None else equations.jacobian(x, drives)
+    # From here on special dimensions are not at fault: those of the sketch might only feign motions (a dead centre).
+    jacobian = equations.generic(drives)
     if given < count:
         mend = _too_free(equations, jacobian, [c.name for c in drives], count - given) + _loose_ends(equations.graph)
     elif count > 0:
@@ -54,7 +55,7 @@ def wrong_count(
         which = f" (one of {listed(doubles, 'or')}: each of them follows from the others)" if len(doubles) > 1 else ""
         mend = f"remove {given - count} drive{'s' if given - count > 1 else ''}{which}"
     else:
-        mend = f"it is rigid, nothing can move. {_rigid(equations, x, count, given)}"
+        mend = f"it is rigid, nothing can move. {_rigid(equations, count, given)}"
     return MechanismError(f"{start}: {mend}{joints}", DRIVES)
 
 
@@ -145,7 +146,8 @@ def over_constrained(
             mend += " (points that other links need stay with those)"
     else:
         edges, _ = doubled(equations, equations.jacobian(x))
-        mend = f"links {listed(owners_of(equations.graph, edges))} are joined to each other more often than they need"
+        parts = _parts(equations.graph, owners_of(equations.graph, edges))
+        mend = f"{parts} hold each other more often than it takes"
     if given != real:
         mend += f"; then give {real} drive{'s' if real > 1 else ''} instead of {given}"
     return MechanismError(f"{start}; {mend}", where)
@@ -199,9 +201,9 @@ def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: b
             links.append(coordinate.body)
     parts = []
     if names:
-        parts.append(f"{listed(names)} fix{'es' if len(names) == 1 else ''} {_links(links)} twice over")
+        parts.append(f"{listed(names)} fix{'es' if len(names) == 1 else ''} {_parts(graph, links)} twice over")
     elif links:
-        parts.append(f"{_links(links)} are joined to each other more often than they need")
+        parts.append(f"{_parts(graph, links)} hold each other more often than it takes")
     free = motions_in_words(equations, jacobian)
     if free:
         parts.append(f"with {'the drives' if driven else 'them' if len(given) > 1 else 'it'} held, {free}")
@@ -209,10 +211,18 @@ def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: b
 
 
 def _links(names: Sequence[str]) -> str:
-    return f"link{'s' if len(names) > 1 else ''} {listed(names)}" if names else "the same part"
+    return f"link{'s' if len(names) > 1 else ''} {listed(names)}"
 
 
-def _rigid(equations: Equations, x: Vector | None, count: int, drives: int) -> str:
+def _parts(graph: Graph, names: Sequence[str]) -> str:
+    """Links and joints, each called what it is."""
+    links, joints = ([name for name in names if (name in graph.bodies) == body] for body in (True, False))
+    told = [_links(links)] if links else []
+    told += [f"joint{'s' if len(joints) > 1 else ''} {listed(joints)}"] if joints else []
+    return " and ".join(told) or "the same part"
+
+
+def _rigid(equations: Equations, count: int, drives: int) -> str:
     """Which links hold each other, in a mechanism that does not move."""
     graph = equations.graph
     if count == 0:
@@ -223,14 +233,14 @@ def _rigid(equations: Equations, x: Vector | None, count: int, drives: int) -> s
         for group in groups:
             if group.form != "place":
                 edges = [k for loop in group.loops for k, _ in loop.edges]
-                loop = dict.fromkeys([GROUND, *owners_of(graph, edges)])
-                return f"Links {listed(loop)} form a rigid loop: leave one of them out, or divide one by a joint"
-    edges, _ = doubled(equations, equations.generic() if x is None else equations.jacobian(x))
+                loop = _parts(graph, [GROUND, *owners_of(graph, edges)])
+                return f"A rigid loop: {loop}; leave one of them out, or divide one by a joint"
+    edges, _ = doubled(equations, equations.generic())
     links = owners_of(graph, edges)
     if links:
         return (
-            f"Links {listed(links)} hold each other more often than it takes: leave out {drives - count} such links, "
-            "or free a joint"
+            f"What holds each other more often than it takes: {_parts(graph, links)}; leave out {drives - count} such "
+            "links, or free a joint"
         )
     return "Free a joint or a link"
 

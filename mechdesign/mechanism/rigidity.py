@@ -32,7 +32,7 @@ RANK = 1e-7
 CLOSED = 1e-9
 # Below this regularity (for two links that meet, the sine of the angle between them) rounding shows in all rates.
 SINGULAR = 1e-6
-# A step along the null space (radians, or fractions of the size), and the part of it that a real motion keeps.
+# A step along the null space (radians, or fractions of the size), and the part of it by which a real motion is told.
 STEP, KEPT = 0.05, 0.3
 # Directions and starts that are tried: deterministic, and enough that chance leaves none out.
 TRIES = 6
@@ -156,21 +156,29 @@ class Equations:
         scale = self.size if coordinate.quantity == "length" else 1.0
         return np.asarray(first(self._configuration(x), coordinate, rates)) / scale
 
-    def solve(self, x: Vector, held: Sequence[tuple[Coordinate, float]] = ()) -> tuple[Vector, float]:
-        """Least squares from `x`, some coordinates held (angles in radians): the unknowns and the largest gap."""
+    def solve(
+        self, x: Vector, held: Sequence[tuple[Coordinate, float]] = (), step: Vector | None = None
+    ) -> tuple[Vector, float]:
+        """Least squares from `x`, some coordinates held (angles in radians): the unknowns and the largest gap.
+
+        With a `step` the solution must lie that far from `x` in its direction: a point where two motions cross, or
+        where one ends, draws all others to itself.
+        """
         from scipy.optimize import least_squares
 
         coordinates = [coordinate for coordinate, _ in held]
+        ahead = np.zeros((0, len(x))) if step is None else step[None] / np.linalg.norm(step)
+        start = x if step is None else x + step
 
-        def residual(x: Vector) -> Vector:
-            gaps = self._spans(x)[0]
-            misses = [self._miss(x, coordinate, value) for coordinate, value in held]
-            return np.concatenate([gaps.view(float), misses])
+        def residual(y: Vector) -> Vector:
+            gaps = self._spans(y)[0]
+            misses = [self._miss(y, coordinate, value) for coordinate, value in held]
+            return np.concatenate([gaps.view(float), misses, ahead @ (y - start)])
 
-        def slope(x: Vector) -> Vector:
-            return self.jacobian(x, coordinates)
+        def slope(y: Vector) -> Vector:
+            return np.vstack([self.jacobian(y, coordinates), ahead])
 
-        found = least_squares(residual, x, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
+        found = least_squares(residual, start, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
         return found.x, float(np.abs(found.fun).max(initial=0.0))
 
     def _miss(self, x: Vector, coordinate: Coordinate, value: float) -> float:
@@ -190,16 +198,31 @@ class Equations:
     def mobility(self, x: Vector) -> tuple[int, Vector]:
         """Degrees of freedom of the finite motion from an assembled configuration, and a second one on its way."""
         motions = null_space(self.jacobian(x))
+        ordinary = null_space(self.generic()).shape[1]
+        if motions.shape[1] == ordinary:
+            return ordinary, x
         best = (0, x)
-        if motions.shape[1]:
-            rng = np.random.default_rng(2)
-            for _ in range(TRIES):
-                step = motions @ rng.uniform(-1, 1, motions.shape[1])
-                step *= STEP / np.abs(step).max()
-                y, gap = self.solve(x + step)
-                if gap < CLOSED and np.linalg.norm(y - x) > KEPT * np.linalg.norm(step):
-                    best = max(best, (null_space(self.jacobian(y)).shape[1], y), key=lambda found: found[0])
+        rng = np.random.default_rng(2)
+        for _ in range(TRIES):
+            step = motions @ rng.uniform(-1, 1, motions.shape[1])
+            step *= STEP / np.abs(step).max()
+            y, gap = self.solve(x, step=step)
+            if gap < CLOSED:
+                best = max(best, (self._realised(y, ordinary), y), key=lambda found: found[0])
         return best
+
+    def _realised(self, x: Vector, ordinary: int) -> int:
+        """How many of the motions at a configuration go on beyond the first order."""
+        motions = np.linalg.qr(null_space(self.jacobian(x)))[0]
+        if motions.shape[1] == ordinary:
+            return ordinary
+        kept = np.zeros((motions.shape[1], motions.shape[1]))
+        for k, motion in enumerate(motions.T):
+            step = motion * (STEP / np.abs(motion).max())
+            y, gap = self.solve(x, step=step)
+            if gap < CLOSED:
+                kept[:, k] = motions.T @ (y - x) / np.linalg.norm(step)
+        return int((np.linalg.svd(kept, compute_uv=False) > KEPT).sum())
 
     def freedom_without(self, jacobian: Vector, edges: Collection[int], classes: Collection[int]) -> int:
         """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place."""

@@ -173,7 +173,8 @@ def _decide(
     if abs(side) <= UNDECIDED * size:
         ends = {node for k, _ in path for node in (structure.edges[k].tail, structure.edges[k].head)}
         inner = ends - {group.loops[0].start, group.loops[0].end} or ends
-        names = ", ".join(f"'{graph.nodes[node]}'" for node in sorted(inner))
+        joints = [graph.nodes[node] for node in sorted(inner) if ":" not in graph.nodes[node]]
+        names = " or ".join(f"'{name}'" for name in joints or [graph.slides[slide] for slide in group.slides])
         raise MechanismError(
             f"{names} lies within 1 % of {line} that divides the two assemblies; draw it clearly on one side", KEY
         )

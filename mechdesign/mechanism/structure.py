@@ -354,6 +354,9 @@ def _form(
         return "place"
     if len(loops) != 1 or conditions or len(angles) + len(slides) != 2:
         return "newton"
+    around = [edges[k] for k, _ in loops[0].edges]
+    if not {*angles} <= {roots[edge.frame] for edge in around} or not {*slides} <= {edge.slide for edge in around}:
+        raise Undetermined("the given coordinates fix one part of the mechanism twice and leave another free")
     if len(angles) == 2:
         return "two angles"
     if len(slides) == 2:

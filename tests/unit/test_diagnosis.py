@@ -74,6 +74,21 @@ def test_a_motion_that_is_only_infinitesimal_is_none() -> None:
     assert "it is rigid" in message
 
 
+def test_a_stretched_part_beside_one_that_moves_stays_rigid() -> None:
+    # a and b, measured from the sketch, lie on one line; the leg moves truly.
+    message = told(
+        "a: [O, A], b: [A, N], leg: {from: N, to: P, telescopic: true}", "[]", "{A: [10, 20], P: [10, 10]}",
+        ground="ground: {O: [0, 30], N: [30, 0]}",
+    )  # fmt: skip
+    assert "the mobility is 2 but 0 drives are given: add 2 drives, for example {angle: leg}, 'leg'" in message
+
+
+def test_a_change_point_hides_no_motion() -> None:
+    # The cranks lie on the line of their pivots, where the parallelogram could go over into its other form.
+    message = told(CRANKS % 30, "[crank]", "{A: [30, 0], B: [130, 0], C: [80, 0]}")
+    assert "the count gives mobility 0, yet with these dimensions it moves with 1 degree of freedom" in message
+
+
 def test_a_second_guide_is_a_joint_too_many() -> None:
     message = told(
         "block: {A: [0, 0], B: [0, 10]}", "[g]", "{A: [5, 0], B: [5, 10]}",
@@ -99,13 +114,13 @@ def test_a_part_that_floats_and_holds_itself_too_often() -> None:
         FULL, "[crank]", FULL_SKETCH.replace(", F: [40, 100]", "")
     )
     message = told(FULL.replace("q: [C, E]", "q: [C, E, 80]") + ", r: [C, F, 10]", "[crank]", FULL_SKETCH)
-    assert "links 'l', 'm', 'n', 'o', 'p' and 'q' are joined to each other more often than they need" in message
+    assert "links 'l', 'm', 'n', 'o', 'p' and 'q' hold each other more often than it takes" in message
     assert "link 'r' turns freely about 'C'" in message
 
 
 def test_a_brace_makes_a_rigid_loop_of_three() -> None:
     message = told(FOUR_BAR + ", brace: {from: A, to: D}")
-    assert "Links 'ground', 'crank' and 'brace' form a rigid loop" in message
+    assert "A rigid loop: links 'ground', 'crank' and 'brace'; leave one" in message
 
 
 def test_a_truss_without_drives_is_a_structure_and_stays() -> None:
@@ -137,6 +152,17 @@ def test_one_part_fixed_twice_and_another_free() -> None:
     message = told(f"{FOUR_BAR}, arm: [B, Q, 20]", "[crank, rocker]")
     assert "'crank' and 'rocker' fix links 'crank', 'rod' and 'rocker' twice over" in message
     assert "with the drives held, link 'arm' turns freely about 'B'" in message
+
+
+def test_what_slides_only_and_is_held_twice() -> None:
+    links, joints = (
+        "l: [O, A, 20], s: {S: [0, 0]}, t: {T: [0, 0]}, r: [S, T]",
+        ("{j: {prismatic: [l, s], direction: 90, point: S}, k: {prismatic: [s, t], point: T}}"),
+    )
+    message = told(links, "[l, k]", "{A: [10, 10], S: [10, 0], T: [20, 30]}", joints)
+    assert (
+        "'k' fixes links 's' and 'r' and joint 'k' twice over; with the drives held, joint 'j' slides freely" in message
+    )
 
 
 def test_given_outputs_that_say_the_same() -> None:
