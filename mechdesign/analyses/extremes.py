@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses import targets
 from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.rates import drive_velocities
 from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.targets import Error
 from mechdesign.mechanism import Reason
@@ -35,8 +36,8 @@ def extremes(
 ) -> Table:  # fmt: skip
     """Smallest and largest value of each output and error over the valid poses, and the ratio of the times between.
 
-    Where a drive is swept, an output's extreme between two poses is found by its derivative, and an error's by golden
-    section wherever something is swept. `time_ratio` is the longer over the shorter part of a full turn of the swept
+    Where one coordinate is swept, an output's extreme between two poses is found by its derivative, and an error's by
+    golden section. `time_ratio` is the longer over the shorter part of a full turn of the swept
     angle between the two extremes, for a drive of constant speed; nan elsewhere. `min_at` is the swept coordinate, or
     the row where there is none.
 
@@ -78,11 +79,10 @@ def extremes(
     if swept is not None:
         of_outputs, of_errors = rows[rows < len(outputs)], rows[rows >= len(outputs)]
         for k, sign in enumerate((1, -1)):
-            if set(poses.names) == set(mechanism.drives):
-                which = [outputs[j] for j in of_outputs]
-                found[k, of_outputs] = _refined(
-                    study, which, poses, swept, index[k, of_outputs], sign, full_turn, found[k, of_outputs]
-                )
+            which = [outputs[j] for j in of_outputs]
+            found[k, of_outputs] = _refined(
+                study, which, poses, swept, index[k, of_outputs], sign, full_turn, found[k, of_outputs]
+            )
             wanted = [errors[j - len(outputs)] for j in of_errors]
             found[k, of_errors] = _refined_errors(
                 study, wanted, arrays, poses, swept, index[k, of_errors], sign, found[k, of_errors]
@@ -114,7 +114,7 @@ def _refined(
     study: Study, outputs: Sequence[Coordinate], poses: Poses, swept: str, index: NDArray[np.intp], sign: int,
     full_turn: bool, sampled: Array,
 ) -> Array:  # fmt: skip
-    """Extremes where the derivative by the swept drive is zero, beside the pose that is the best of all.
+    """Extremes where the derivative by the swept coordinate is zero, beside the pose that is the best of all.
 
     `sampled` and the answer hold a value and a place a row. Where the derivative does not change its sign beside the
     pose (an extreme at the end of the sweep, or beside a pose that fails) the row stays. `sign` is 1 for the smallest
@@ -125,7 +125,7 @@ def _refined(
     mechanism, group = study.mechanism, poses.groups[0]
     plan = mechanism.plan(group.names)
     drive = mechanism.coordinate(swept)
-    which = mechanism.drives.index(swept)
+    unit = [float(name == swept) for name in group.names]
     lanes = np.arange(len(outputs))
     at = np.asarray(radians(study, drive, group.values[swept]), dtype=float)
     before, after = at[np.maximum(index - 1, 0)], at[np.minimum(index + 1, len(at) - 1)]
@@ -140,15 +140,15 @@ def _refined(
     start = plan.solve(given)
 
     def solve(lane: NDArray[np.intp], place: Array) -> tuple[Array, Array]:
-        """Value of some lanes' output and its derivative by the swept drive, times `sign`."""
+        """Value of some lanes' output and its derivative by the swept coordinate, times `sign`."""
         some = [values[lane] for values in given]
         some[group.names.index(swept)] = place
         configuration = plan.solve(some, start=start.take(lane))
-        rates = mechanism.linearize(configuration).drives()
-        full = (len(mechanism.drives), len(lane))
+        linear = mechanism.linearize(configuration)
+        velocity = linear.velocity(drive_velocities(mechanism, linear, plan.structure.given, unit))
         asked = [outputs[k] for k in lane.tolist()]
         value = [np.broadcast_to(configuration.value(o), lane.shape)[k] for k, o in enumerate(asked)]
-        slope = [np.broadcast_to(first(configuration, o, rates), full)[which, k] for k, o in enumerate(asked)]
+        slope = [np.broadcast_to(first(configuration, o, velocity), lane.shape)[k] for k, o in enumerate(asked)]
         valid = configuration.valid
         return np.where(valid, value, np.nan), sign * np.where(valid, slope, np.nan)
 

@@ -14,6 +14,7 @@ from mechdesign.analyses.motion_limits import motion_limits
 from mechdesign.analyses.poses import judge_failures, pose_in_words
 from mechdesign.analyses.rates import STALLED
 from mechdesign.errors import Problem, StudyError
+from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
@@ -87,8 +88,6 @@ def kinematics(
 
 def _modes(question: Asked, drawn: Motion) -> tuple[Table, list[str], int]:
     """The motion of every assembly, the sketch's first; what is to be said of each; and how many they are."""
-    from mechdesign.mechanism.assemblies import assemblies
-
     study, poses = question.study, question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
     labels: list[str] = []

@@ -50,15 +50,31 @@ def inverse_rates(
     velocities, accelerations : sequence of Value
         Of each of them.
     """
-    configuration = linear.configuration
-    matrix = jacobian(linear, linear.drives(), given)
-    drives = [mechanism.coordinate(name) for name in mechanism.drives]
-    good = _solvable(matrix, given, drives, mechanism.size)
+    matrix, good = _inverted(mechanism, linear, given)
     speeds = _solve(matrix, good, velocities)
     velocity = linear.velocity(speeds)
-    coasting = linear.acceleration(velocity, [0.0] * len(drives))
-    rest = [a - second(configuration, c, velocity, coasting) for a, c in zip(accelerations, given, strict=True)]
+    coasting = linear.acceleration(velocity, [0.0] * len(given))
+    rest = [a - second(linear.configuration, c, velocity, coasting) for a, c in zip(accelerations, given, strict=True)]
     return DriveRates(speeds, _solve(matrix, good, rest))
+
+
+def drive_velocities(
+    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate], velocities: Sequence[Value]
+) -> Sequence[Value]:
+    """Velocities of the drives that give as many coordinates theirs; see `inverse_rates`."""
+    names = [coordinate.name for coordinate in given]
+    if set(names) == set(mechanism.drives):
+        return [velocities[names.index(name)] for name in mechanism.drives]
+    return _solve(*_inverted(mechanism, linear, given), velocities)
+
+
+def _inverted(
+    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]
+) -> tuple[Array, NDArray[np.bool_]]:  # fmt: skip
+    """J of the given coordinates, and where it is regular."""
+    matrix = jacobian(linear, linear.drives(), given)
+    drives = [mechanism.coordinate(name) for name in mechanism.drives]
+    return matrix, _solvable(matrix, given, drives, mechanism.size)
 
 
 def _solvable(

@@ -99,6 +99,19 @@ kinematics: {sweep: {theta: {from: 0, to: 360, step: 7.2}}, outputs: [B, theta]}
     assert (table["min"][2], table["max"][2]) == (0, 360)
 
 
+@pytest.mark.parametrize("sweep", ["P.x: {from: -14, to: 14, step: STEP}", "t1: {from: 10, to: 80, step: STEP}"])
+def test_extremes_of_an_inverse_motion_lie_between_its_poses(sweep: str) -> None:
+    coarse, fine = (
+        kinematics(study_of(ARM, f"kinematics={{sweep: {{{sweep.replace('STEP', step)}, P.y: 8}}, outputs: [E, P]}}"))
+        for step in ("3.5", "0.002")
+    )
+    table, motion = coarse.tables["extremes"], coarse.tables["motion"]
+    for name in ("min", "max"):
+        assert table[name] == pytest.approx(fine.tables["extremes"][name], abs=1e-6)
+    beyond = [table["range"][k] - np.ptp(motion[output]) for k, output in enumerate(table["output"])]
+    assert max(beyond) > 1e-3
+
+
 def test_limits_of_motion_are_found_to_the_last_digits() -> None:
     result = kinematics(study_of(LINKAGE))
     limits = result.tables["limits"]
