@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 GROUND = "ground"
 # The same text, ten times as fast, where PyYAML has its C library.
 DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-# ("x" | "y", point), ("angle", body, reference), ("slide" | "length", joint or leg), ("distance", point, point)
+# ("x" | "y", point), ("angle", body, reference), ("slide" | "length", joint or leg), ("distance", point, point), and
+# ("product", point, point): x of the first times y of the second, which a study writes as an expression
 Coordinate = tuple[str, ...]
 Renaming = Callable[[str], str]
 
@@ -128,7 +129,8 @@ class Layout:
         if kind == "length":
             body = self.bodies[name]
             return abs(self.places[body.to] - self.places[body.points[0]])
-        return abs(self.places[coordinate[2]] - self.places[name])
+        one, two = self.places[name], self.places[coordinate[2]]
+        return one.real * two.imag if kind == "product" else abs(two - one)
 
     # Its equations.
 
@@ -199,7 +201,10 @@ class Layout:
         ]
         if kind in ("x", "y"):
             return moves[0].real if kind == "x" else moves[0].imag
-        span = self.places[coordinate[2]] - self.places[name]
+        one, two = self.places[name], self.places[coordinate[2]]
+        if kind == "product":
+            return moves[0].real * two.imag + one.real * moves[1].imag
+        span = two - one
         return (span.conjugate() * (moves[1] - moves[0])).real / abs(span)
 
     def system(self, given: list[Coordinate]) -> NDArray[np.float64]:
@@ -290,12 +295,7 @@ class Layout:
         if joints:
             section["joints"] = order(joints)
         if self.measures:
-            section["measures"] = order(
-                {
-                    key: {"angle": [name(c[2]), name(c[1])]} if c[0] == "angle" else {c[0]: [name(p) for p in c[1:]]}
-                    for key, c in self.measures.items()
-                }
-            )
+            section["measures"] = order({key: _measure(c, name) for key, c in self.measures.items()})
         study = {"units": {"angle": self.unit}, "mechanism": section}
         return yaml.dump(study, Dumper=DUMPER, sort_keys=False, default_flow_style=None, width=110)
 
@@ -341,3 +341,10 @@ def _told(coordinate: Coordinate, name: Renaming) -> dict[str, str]:
     if kind == "angle" and coordinate[2] != GROUND:
         drive["from"] = name(coordinate[2])
     return drive
+
+
+def _measure(coordinate: Coordinate, name: Renaming) -> object:
+    kind, one, two = coordinate
+    if kind == "product":
+        return f"{name(one)}.x * {name(two)}.y"
+    return {"angle": [name(two), name(one)]} if kind == "angle" else {kind: [name(one), name(two)]}

@@ -281,6 +281,7 @@ class Maker:
             one, two = (rng.choice(list(layout.places)), rng.choice(points))
             if abs(layout.places[one] - layout.places[two]) > 0.3:
                 layout.measures[self.name("m")] = ("distance", one, two)
+        layout.measures[self.name("m")] = ("product", rng.choice(points), rng.choice(points))
         return layout
 
     def regular(self, candidates: Sequence[Coordinate]) -> list[Coordinate] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from random import Random
 
 import numpy as np
 from hypothesis import event
@@ -21,14 +22,15 @@ class Made:
     def __init__(self, layout: Layout, maker: Maker) -> None:
         self.layout = layout
         self.maker = maker
-        self.rng = maker.rng
+        # One for each use: what is drawn must not depend on what was looked at before.
+        self.rng, self._order, self._speed = (Random(maker.rng.getrandbits(64)) for _ in range(3))
 
     def __repr__(self) -> str:
         return f"\n{self.text}# drawn at {self.layout.pose(self.layout.drives)}, rates {self.rates}\n"
 
     @cached_property
     def text(self) -> str:
-        return self.layout.text(self.rng)
+        return self.layout.text(self._order)
 
     @cached_property
     def mechanism(self) -> Mechanism:
@@ -42,7 +44,8 @@ class Made:
     @cached_property
     def rates(self) -> dict[str, float]:
         """Rates of the drives, of which none is small."""
-        return {drive: self.rng.choice([-1, 1]) * self.rng.uniform(0.3, 1.0) for drive in self.layout.drives}
+        rng = self._speed
+        return {drive: rng.choice([-1, 1]) * rng.uniform(0.3, 1.0) for drive in self.layout.drives}
 
     def drives(self, time: NDArray[np.float64], bend: float = 0.0) -> list[NDArray[np.float64]]:
         """Values of the drives, in the mechanism's order, at constant rates from the pose drawn (at time 0).

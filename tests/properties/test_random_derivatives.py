@@ -144,6 +144,8 @@ def test_sensitivities_of_every_order_are_derivatives(made: Made) -> None:
                 [np.broadcast_to(first(state[0], c, state[2]), time.shape) for state in states],
                 [np.broadcast_to(second(state[0], c, state[2], state[3]), time.shape) for state in states],
             ]
-            for order, (values, exact) in enumerate(zip(shown, orders, strict=True)):
+            # The acceleration of an expression has no sensitivity: it is refused.
+            told = orders[:2] if c.kind == "expression" else orders
+            for order, (values, exact) in enumerate(zip(shown, told, strict=False)):
                 derivative = np.broadcast_to(np.asarray(exact(c)), (len(places), len(time)))[row]
                 agree(derivative, slopes(values, h), 1e-7, f"order {order} of {name} by {place}")

@@ -157,7 +157,7 @@ def test_an_assembly_is_kept_along_a_sweep(made: Made, reach: float) -> None:
         assert np.all(leap[both] <= allowed[both]), name
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(mechanisms(most=2))
 def test_every_assembly_closes_and_only_the_first_is_drawn(made: Made) -> None:
     mechanism = made.mechanism
@@ -181,7 +181,7 @@ def test_every_assembly_closes_and_only_the_first_is_drawn(made: Made) -> None:
     assert len(set(places)) == len(places)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(mechanisms(), st.sampled_from([0.3, 2.0]), st.integers(1, 12))
 def test_the_order_and_the_chunks_of_a_sweep_change_no_bit(made: Made, reach: float, chunk: int) -> None:
     time = np.linspace(-reach, reach, 13)
@@ -210,16 +210,18 @@ def test_other_coordinates_given_lead_back_to_the_drives(made: Made, time: float
     try:
         plan = mechanism.plan(given_names)
     except MechanismError as error:
-        # A part that only single x and y of its points tie to the ground is refused.
-        assume("1 %" not in str(error) and "not connected to the ground" not in str(error))
+        assume("1 %" not in str(error))
         raise
     event("newton" if plan.iterative else "closed form")
-    for at, forward in ((0.0, mechanism.sketch_configuration), (time, made.at(np.array(time)))):
-        assume(forward.valid)
-        back = plan.solve([forward.value(mechanism.coordinate(name)) for name in given_names])
-        assert back.valid, given_names
-        for point in layout.places:
-            assert complex(back.point(point)) == pytest.approx(complex(forward.point(point)), abs=1e-8), (at, point)
+    forward = made.at(np.linspace(0, time, 9))
+    assume(forward.valid.all())
+    # On the way no singularity of the inverse problem comes near, beyond which it has another working mode.
+    felt = np.linalg.det(mechanism.jacobian(forward, [mechanism.coordinate(name) for name in given_names]))
+    assume(np.all((felt / felt[0] > 0.3) & (felt / felt[0] < 3)))
+    back = plan.solve([forward.value(mechanism.coordinate(name)) for name in given_names])
+    assert back.valid.all(), given_names
+    for point in layout.places:
+        assert np.abs(back.point(point) - forward.point(point)).max() < 1e-8, (given_names, point)
 
 
 @settings(max_examples=60)
