@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, Margins, joints_of
 from mechdesign.analyses.poses import CHUNK
 from mechdesign.analyses.probing import Floats, Found, Indices, probe
+from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.turning import turning_point
@@ -22,6 +23,8 @@ Solve = Callable[[Indices, Floats], Configuration]
 SLOPE = 1e-4
 # Halvings of a step of the sweep: enough to tell what ends the motion, and to reach the last bit of any drive's value.
 SOME, HALVINGS = 6, 60
+# Precision of roots as a part of a step: of a function that only says yes or no, and of the others.
+COARSE, FINE = 0.02, 1e-13
 # A limit this near to the first or the last value of the sweep lies at it (as a part of the value, or of 1).
 AT_END = 1e-9
 # Ends within this part of the sweep's size are one; a change point within this part of a step of a pose is at it.
@@ -151,7 +154,7 @@ def _within(sweep: _Sweep, steps: Indices) -> tuple[list[Boundary], list[ChangeP
     def evaluate(lane: Indices, x: Floats) -> Floats:
         return margins.evaluate(x, None if start is None else start.take(lane))
 
-    probes = probe(evaluate, begin, end, np.where(sweep.role("reached"), SOME, HALVINGS))
+    probes = probe(evaluate, begin, end, np.where(sweep.role("reached"), COARSE, FINE))
     # Each step from its first pose over the probes to its second.
     every = np.arange(len(steps))
     lane = np.concatenate([every, probes.lane, every])
@@ -219,14 +222,22 @@ def _zeros(
     start: Configuration | None,
 ) -> Floats:  # fmt: skip
     """Where the margins that end the motion are zero, without the allowance for rounding; `good` for other causes."""
-    smooth = np.array([cause.role in ("closure", "limit", "leg") for cause in causes])
-    lanes = np.arange(len(causes))
-    a, b = inner, bad
-    for _ in range(HALVINGS if smooth.any() else 0):
-        middle = a + (b - a) / 2
-        inside = sweep.margins.evaluate(middle, start)[which, lanes] >= 0
-        a, b = np.where(inside, middle, a), np.where(inside, b, middle)
-    return np.where(smooth, a, good)
+    smooth = np.flatnonzero([cause.role in ("closure", "limit", "leg") for cause in causes])
+    found = good.copy()
+    if not len(smooth):
+        return found
+
+    def margin(left: Indices, x: Floats) -> Floats:
+        lane = smooth[left]
+        values = sweep.margins.evaluate(x, None if start is None else start.take(lane))
+        one: Floats = values[which[lane], np.arange(len(lane))]
+        return one
+
+    a, b, every = inner[smooth], bad[smooth], np.arange(len(smooth))
+    ends, none = (margin(every, a), margin(every, b)), np.full(len(smooth), np.nan)
+    place = bracketed_roots(margin, a, ends[0], b, ends[1], none, none, np.abs(b - a) * 2.0**-HALVINGS)
+    found[smooth] = np.where((ends[0] >= 0) & (ends[1] < 0), place, good[smooth])
+    return found
 
 
 def _turned(

@@ -9,6 +9,7 @@ import numpy as np
 
 from mechdesign.analyses import targets
 from mechdesign.analyses.extremes import extremes
+from mechdesign.analyses.loops import loop_tables
 from mechdesign.analyses.motion import Asked, Motion, asked, characteristic_length, entry, move
 from mechdesign.analyses.motion_limits import motion_limits
 from mechdesign.analyses.poses import judge_failures, pose_in_words
@@ -45,7 +46,8 @@ def kinematics(
     Returns
     -------
     Result
-        Tables ``motion``, ``extremes``; for a sweep of one coordinate ``limits``; ``targets`` where there are some;
+        Tables ``motion``, ``extremes``; for a sweep of one coordinate ``limits``; ``loops`` and ``toggles`` of
+        four-bars and slider-cranks; ``targets`` where there are some;
         ``jacobian`` where the study lists as many outputs as drives; ``modes`` with `all_modes`.
 
     Raises
@@ -71,10 +73,13 @@ def kinematics(
     moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
     swept = moving[0] if not poses.listed and len(moving) == 1 else None
     tables["extremes"] = extremes(study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason)
+    limits = None
     if swept is not None:
         group, reason = poses.groups[0], motion.reason
-        tables["limits"], told = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
-        warnings += told
+        limits = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
+        tables["limits"] = limits.table
+        warnings += limits.warnings
+    tables |= loop_tables(study, poses, limits)
     if motion.errors:
         tables["targets"] = targets.table(study, motion.errors, poses, swept, motion.valid)
     if question.square:

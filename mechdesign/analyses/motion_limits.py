@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,20 @@ from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup
 
-# A limit this near to a pose, as a part of its value, is at the value that the study gives.
+# A place this near to a pose or to zero, as a part of the sweep, is there.
 AT_POSE = 1e-12
 # A change point this near to zero, as a part of the sweep, is there.
 SMALL = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """The table of limits and what is to be said beside it; the sweep, and its ends for what else is sought on it."""
+
+    table: Table
+    warnings: list[str]
+    margins: Margins
+    ends: list[Boundary]
 
 
 def motion_limits(
@@ -29,7 +40,7 @@ def motion_limits(
     reason: NDArray[np.int8],
     outputs: Sequence[Coordinate],
     arrays: Mapping[str, NDArray[np.float64]],
-) -> tuple[Table, list[str]]:
+) -> Limits:
     """Every value of the swept coordinate at which the motion ends, with the pose there, and change points as warnings.
 
     `kind` is ``dead centre`` (a group of links is stretched or folded), ``singularity`` (links that are solved
@@ -51,7 +62,7 @@ def motion_limits(
     margins = Margins(study, group, swept)
     ends, changes = boundaries(margins, reason[group.rows] == Reason.OK)
     unit = study.units.label(mechanism.quantity(swept))
-    places = [_as_given(study, margins, group.values[swept], end) for end in ends]
+    places = as_given(study, margins, group.values[swept], [end.place for end in ends], [end.row for end in ends])
     columns = [
         Column(swept, np.array(places, dtype=float), unit, "value at the limit of motion"),
         Column("kind", np.array([end.cause.kind for end in ends], dtype=str), "", "what ends the motion"),
@@ -71,18 +82,30 @@ def motion_limits(
     table = Table("limits", tuple(columns), "limits of motion found along the sweep")
     follows = mechanism.description.branch == "follow"
     warnings = _hidden(swept, unit, places, ends, margins, reason[group.rows] == Reason.OK)
-    return table, warnings if follows else warnings + _warnings(study, margins, swept, changes)
+    if not follows:
+        warnings += _warnings(study, margins, swept, changes)
+    return Limits(table, warnings, margins, ends)
 
 
-def _as_given(study: Study, margins: Margins, given: NDArray[np.float64], end: Boundary) -> float:
-    """A limit in the study's unit; not there and back through radians where it is at a pose."""
-    value = float(in_study_units(study, margins.coordinate, end.place))
-    if abs(value) <= AT_POSE * np.ptp(given):
-        return 0.0
-    for row in (end.row, end.row + 1):
-        if row < len(given) and abs(value - given[row]) <= AT_POSE * max(1.0, abs(value)):
-            return float(given[row])
-    return value
+def as_given(
+    study: Study, margins: Margins, given: NDArray[np.float64], places: Sequence[float], rows: Sequence[int]
+) -> list[float]:
+    """Places on a sweep in the study's unit; those at a pose as the study gives it, not there and back through radians.
+
+    Parameters
+    ----------
+    given : ndarray, shape (poses,)
+        The sweep in the study's unit.
+    rows : sequence of int
+        A pose beside each place, or the first of the two.
+    """
+    found = []
+    for place, row in zip(places, rows, strict=True):
+        value = float(in_study_units(study, margins.coordinate, place))
+        beside = given[max(row - 1, 0) : row + 2]
+        at = beside[np.abs(beside - value) <= AT_POSE * np.ptp(given)]
+        found.append(float(at[0]) if len(at) else 0.0 if abs(value) <= AT_POSE * np.ptp(given) else value)
+    return found
 
 
 def _values(

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.roots import bracketed_roots
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 # Values of all functions in intervals `lane` at `x`: shape (functions, n).
@@ -23,8 +25,9 @@ One = Callable[[Indices, Floats], Floats]
 GOLDEN = (math.sqrt(5) - 1) / 2
 # Golden sections that find the smallest value of a smooth function to rounding.
 SECTIONS = 50
-# Where each part of an interval is looked at; near its ends too, so that the slope there is seen.
-LOOKS = np.array([0.0, 1e-4, *(np.arange(1, 8) / 8), 1 - 1e-4, 1.0])
+# Where each part of an interval is looked at: near its ends too, so that the slope there is seen, and off the round
+# numbers at which roots like to lie.
+LOOKS = np.array([0.0, 1e-4, *((np.arange(8) + GOLDEN) / 8), 1 - 1e-4, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,7 @@ class Probes:
     lane, place : ndarray
         Interval and middle of each part between two roots, in order.
     roots, lows : Found
-        Changes of sign, and smallest values inside the intervals.
+        Changes of sign, and smallest absolute values inside the intervals.
     """
 
     lane: Indices
@@ -65,13 +68,13 @@ class Probes:
     lows: Found
 
 
-def probe(evaluate: Evaluate, begin: Floats, end: Floats, halvings: Indices) -> Probes:
+def probe(evaluate: Evaluate, begin: Floats, end: Floats, precision: Floats) -> Probes:
     """Divide intervals from `begin` to `end` at the roots of all functions, one function after another.
 
     Parameters
     ----------
-    halvings : int array, shape (functions,)
-        By which each function's roots are parted.
+    precision : ndarray, shape (functions,)
+        To which each function's roots are wanted, as a part of the distance between two looks.
     """
     lane = np.arange(len(begin))
     low, high = begin.astype(float), end.astype(float)
@@ -86,9 +89,13 @@ def probe(evaluate: Evaluate, begin: Floats, end: Floats, halvings: Indices) -> 
 
         bottoms = _bottoms(one, grid, values[j], 1)
         tops = _bottoms(one, grid, values[j], -1)
-        lows.append(Found(lane[bottoms[0]], bottoms[1], np.full(len(bottoms[0]), j), bottoms[2]))
+        lows += [Found(lane[part], place, np.full(len(part), j), value) for part, place, value in (bottoms, tops)]
         part, root = _roots(
-            one, int(halvings[j]), grid, values[j], *(np.concatenate(pair) for pair in zip(bottoms, tops, strict=True))
+            one,
+            float(precision[j]),
+            grid,
+            values[j],
+            *(np.concatenate(pair) for pair in zip(bottoms, tops, strict=True)),
         )
         if len(root):
             roots.append(Found(lane[part], root, np.full(len(root), j), np.zeros(len(root))))
@@ -127,7 +134,7 @@ def _bottoms(one: One, grid: Floats, values: Floats, sign: int) -> tuple[Indices
 
 
 def _roots(
-    one: One, halvings: int, grid: Floats, values: Floats, part: Indices, place: Floats, value: Floats
+    one: One, precision: float, grid: Floats, values: Floats, part: Indices, place: Floats, value: Floats
 ) -> tuple[Indices, Floats]:
     """Part and place of each change of sign between the looks and the places added to them."""
     parts = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)), part])
@@ -138,12 +145,12 @@ def _roots(
     parts, places, height = parts[order], places[order], height[order]
     positive, known = height >= 0, np.isfinite(height)
     change = np.flatnonzero((parts[1:] == parts[:-1]) & (positive[1:] != positive[:-1]) & known[1:] & known[:-1])
-    which, a, b, above = parts[change], places[change], places[change + 1], positive[change]
-    for _ in range(halvings if len(change) else 0):
-        middle = a + (b - a) / 2
-        same = (one(which, middle) >= 0) == above
-        a, b = np.where(same, middle, a), np.where(same, b, middle)
-    return which, a + (b - a) / 2
+    which, a, b = parts[change], places[change], places[change + 1]
+    none = np.full(len(change), np.nan)
+    tolerance = np.abs(b - a) * precision
+    return which, bracketed_roots(
+        lambda left, x: one(which[left], x), a, height[change], b, height[change + 1], none, none, tolerance
+    )
 
 
 def _divided(lane: Indices, low: Floats, high: Floats, part: Indices, root: Floats) -> tuple[Indices, Floats, Floats]:

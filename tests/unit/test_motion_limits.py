@@ -28,9 +28,10 @@ kinematics: {{sweep: {{crank: {{from: 0, to: 360, step: 5}}}}, outputs: [B, rock
 """
 
 
-TRIPLE_ROCKER = four_bar(3, 4, 2.5, 4, "{A: [1, 2.8], B: [4.3, 2.3]}")
+# The driven link oscillates between its folded and its stretched dead centre, on either side of the frame.
+ROCKER = four_bar(3, 4, 2.5, 4, "{A: [1, 2.8], B: [4.3, 2.3]}")
 # r > l: the crank turns no further than where the rod is perpendicular to the guide, sin(theta) = l/r = 1/2.
-ROCKER_SLIDER = """
+SLIDER = """
 mechanism:
   links: {ground: {O: [0, 0]}, crank: [O, A, 2], rod: [A, B, 1], slider: {B: [0, 0]}}
   joints: {guide: {prismatic: [ground, slider], through: O, point: B}}
@@ -73,8 +74,8 @@ def by_cosine_law(a: float, d: float, reach: float) -> float:
     return float(np.degrees(np.arccos((a**2 + d**2 - reach**2) / (2 * a * d))))
 
 
-def test_a_triple_rocker_ends_where_the_cosine_law_says() -> None:
-    table = limits(TRIPLE_ROCKER)
+def test_a_rocker_driven_from_its_pivot_ends_where_the_cosine_law_says() -> None:
+    table = limits(ROCKER)
     folded, stretched = by_cosine_law(3, 4, 1.5), by_cosine_law(3, 4, 6.5)
     assert table["crank"] == pytest.approx([folded, stretched, 360 - stretched, 360 - folded], abs=1e-9)
     assert set(table["kind"]) == {"dead centre"}
@@ -87,10 +88,10 @@ def test_a_triple_rocker_ends_where_the_cosine_law_says() -> None:
 
 
 def test_limits_do_not_depend_on_the_direction_or_the_step() -> None:
-    forth = limits(TRIPLE_ROCKER)["crank"]
-    assert limits(TRIPLE_ROCKER, "kinematics.sweep.crank.step=0.7")["crank"] == pytest.approx(forth, abs=1e-9)
+    forth = limits(ROCKER)["crank"]
+    assert limits(ROCKER, "kinematics.sweep.crank.step=0.7")["crank"] == pytest.approx(forth, abs=1e-9)
     back = ", ".join(str(angle) for angle in range(360, -1, -8))
-    text = TRIPLE_ROCKER.replace("sweep: {crank: {from: 0, to: 360, step: 5}}", f"path: {{crank: [{back}]}}")
+    text = ROCKER.replace("sweep: {crank: {from: 0, to: 360, step: 5}}", f"path: {{crank: [{back}]}}")
     assert limits(text)["crank"] == pytest.approx(forth[::-1], abs=1e-9)
 
 
@@ -123,7 +124,7 @@ def test_a_sweep_that_begins_in_a_gap_enters_the_motion() -> None:
 
 @pytest.mark.parametrize(("begin", "end"), [(0, 90), (0, 30), (-30, 30), (-30, 0)])
 def test_limits_at_poses_and_at_the_ends_of_the_sweep(begin: float, end: float) -> None:
-    table = limits(ROCKER_SLIDER, f"kinematics.sweep.crank.from={begin}", f"kinematics.sweep.crank.to={end}")
+    table = limits(SLIDER, f"kinematics.sweep.crank.from={begin}", f"kinematics.sweep.crank.to={end}")
     expected = [angle for angle in (-30, 30) if begin <= angle <= end]
     # At a pose the value is that of the pose itself.
     assert list(table["crank"]) == expected
@@ -131,7 +132,7 @@ def test_limits_at_poses_and_at_the_ends_of_the_sweep(begin: float, end: float) 
 
 
 def test_a_sweep_between_a_drives_own_limits_ends_at_both() -> None:
-    text = ROCKER_SLIDER.replace("  drives:", "  limits: [{drive: crank, min: -20, max: 25}]\n  drives:")
+    text = SLIDER.replace("  drives:", "  limits: [{drive: crank, min: -20, max: 25}]\n  drives:")
     table = limits(text, "kinematics.sweep.crank.from=-20", "kinematics.sweep.crank.to=25")
     assert list(table["crank"]) == [-20, 25]
     assert list(table["joint"]) == ["limits.0", "limits.0"]

@@ -1,0 +1,313 @@
+"""Four-bars and slider-cranks inside a mechanism: closed chains of four bodies, found by their joints alone.
+
+A body is a link with all that is clamped to it; a telescopic leg is two bodies, and a pin in a slot is a block that
+slides along the slot and turns about the pin. Four revolute joints make a four-bar, three and a slide a slider-crank;
+which of its bodies is fixed makes it one of its inversions.
+
+Sources: Grashof (1883); Barker, "A complete classification of planar four-bar linkages", Mechanism and Machine Theory
+20 (1985) 535-554, whose classes are named here as textbooks do: GCCC double-crank, GCRR crank-rocker, GRCR Grashof
+double-rocker, GRRC rocker-crank, RRR1-RRR4 triple-rocker, SCCC and the like change point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value, cross
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.graph import GROUND, rod_of
+from mechdesign.mechanism.model import Fixed, Prismatic, Slot
+
+if TYPE_CHECKING:
+    from mechdesign.mechanism.mechanism import Mechanism
+
+Kind = Literal["four-bar", "slider-crank", "inverted slider-crank"]
+
+# Sums of lengths within this part of each other are equal.
+EQUAL = 1e-9
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A revolute joint at a node, or a slide along an edge of the graph.
+
+    Parameters
+    ----------
+    node : int
+        -1 for a slide.
+    edge : int
+        -1 for a revolute joint.
+    """
+
+    name: str
+    node: int = -1
+    edge: int = -1
+
+
+@dataclass(frozen=True)
+class FourBar:
+    """A closed chain of four bodies.
+
+    Parameters
+    ----------
+    links : tuple of str
+        Frame, input, coupler and output.
+    joints : tuple of Joint
+        Between frame and input, input and coupler, coupler and output, output and frame.
+    lengths : tuple of float
+        Of the links in that order, between their two revolute joints; nan for a link with the slide.
+    offset : float
+        Of a slider-crank: distance of the slide's line from the pin of the body that carries the line, measured at the
+        pin of the body that slides; nan for a four-bar.
+    """
+
+    links: tuple[str, str, str, str]
+    joints: tuple[Joint, Joint, Joint, Joint]
+    lengths: tuple[float, float, float, float]
+    offset: float
+
+    @property
+    def slide(self) -> int:
+        """Which joint is the slide; -1 in a four-bar."""
+        return next((k for k, joint in enumerate(self.joints) if joint.edge >= 0), -1)
+
+    @property
+    def kind(self) -> Kind:
+        """Four-bar, slider-crank (one of the two bodies of the slide is the frame), or an inversion of that."""
+        if self.slide < 0:
+            return "four-bar"
+        return "slider-crank" if self.slide in (0, 3) else "inverted slider-crank"
+
+    @property
+    def excess(self) -> float:
+        """What decides whether a link turns fully: positive where one does, zero at a change point.
+
+        Four-bar: p + q - (s + l), with s and l the shortest and the longest link. Slider-crank: rod - (crank + offset).
+        Inverted: difference of crank and frame, less the offset.
+        """
+        if self.kind == "four-bar":
+            shortest, *others, longest = sorted(self.lengths)
+            excess = sum(others) - (shortest + longest)
+        else:
+            one, two = self._pair()
+            turns = two - one if self.kind == "slider-crank" else abs(one - two)
+            excess = turns - self.offset
+        size = sum(length for length in (*self.lengths, self.offset) if not math.isnan(length))
+        return excess if abs(excess) > EQUAL * size else 0.0
+
+    def _pair(self) -> tuple[float, float]:
+        """Crank and rod of a slider-crank; crank and frame of an inverted one."""
+        if self.kind == "slider-crank":
+            return self.lengths[1 if self.slide == 3 else 3], self.lengths[2]
+        return self.lengths[3 if self.slide == 1 else 1], self.lengths[0]
+
+    @property
+    def type(self) -> str:
+        """Class of the chain by which of its links turn fully against the frame."""
+        if self.excess == 0:
+            return "change point"
+        if self.kind == "four-bar":
+            if self.excess < 0:
+                return "triple-rocker"
+            return ("double-crank", "crank-rocker", "double-rocker", "rocker-crank")[int(np.argmin(self.lengths))]
+        if self.kind == "slider-crank":
+            return "crank-slider" if self.excess > 0 else "rocker-slider"
+        if self.excess < 0:
+            return "rocking block"
+        crank, frame = self._pair()
+        return "turning block" if crank > frame else "oscillating block"
+
+    def condition(self) -> str:
+        """The comparison of lengths behind the type, in words."""
+        if self.kind == "four-bar":
+            shortest, *others, longest = sorted(self.lengths)
+            left, right = ("s + l", shortest + longest), ("p + q", sum(others))
+        elif self.kind == "slider-crank":
+            crank, rod = self._pair()
+            left, right = ("crank + offset", crank + self.offset), ("rod", rod)
+        else:
+            crank, frame = self._pair()
+            left, right = ("offset", self.offset), ("difference of crank and frame", abs(crank - frame))
+        sign = "=" if self.type == "change point" else "<" if self.excess > 0 else ">"
+        # Rounding is no length.
+        return f"{left[0]} {left[1]:.6g} {sign} {right[0]} {left[1] if sign == '=' else right[1]:.6g}"
+
+    @property
+    def name(self) -> str:
+        """``ground-crank-rod-rocker (O A B D)``."""
+        return f"{'-'.join(self.links)} ({' '.join(joint.name for joint in self.joints)})"
+
+    def _pin(self, configuration: Configuration, k: int) -> Value:
+        return configuration.nodes[self.joints[k].node]
+
+    def _across(self, configuration: Configuration, k: int) -> Value:
+        """Unit vector across the line of the slide."""
+        edge = configuration.graph.edges[self.joints[k].edge]
+        return 1j * configuration.vectors.d[self.joints[k].edge] * configuration.rotations[edge.frame]
+
+    def action(self, configuration: Configuration) -> Value:
+        """Vector along which the coupler passes a force on: from pin to pin, or across its slide."""
+        if self.slide in (1, 2):
+            return self._across(configuration, self.slide)
+        return self._pin(configuration, 2) - self._pin(configuration, 1)
+
+    def arm(self, configuration: Configuration, end: int) -> Value:
+        """Vector from the frame to where the coupler pushes the input (`end` 0) or the output (3); across a slide."""
+        if self.slide == end:
+            return self._across(configuration, end)
+        near, far = (1, 2) if end == 0 else (2, 1)
+        tip = far if self.slide == near else near
+        return self._pin(configuration, tip) - self._pin(configuration, end)
+
+    def squareness(self, configuration: Configuration, end: int) -> tuple[Value, Value]:
+        """Sine and cosine of the angle from the arm of the input (`end` 0) or output (3) to the coupler's action."""
+        arm, action = self.arm(configuration, end), self.action(configuration)
+        product = action * np.conj(arm)
+        size = np.abs(product)
+        return product.imag / size, product.real / size
+
+    def transmission(self, configuration: Configuration) -> Value:
+        """Transmission angle, the acute angle between coupler and output (radians, 0 to pi/2).
+
+        Between the coupler's line of action and the output's arm; where the output slides, between the rod and the
+        normal of the guide.
+        """
+        sine, cosine = self.squareness(configuration, 3)
+        return np.arctan2(np.abs(sine), np.abs(cosine))
+
+
+def four_bars(mechanism: Mechanism) -> tuple[FourBar, ...]:
+    """Every four-bar and slider-crank of a mechanism that is not rigid in itself, those on the ground first."""
+    bodies = _Bodies(mechanism)
+    found: dict[frozenset[tuple[str, int, int]], FourBar] = {}
+    for links, joints in _rings(bodies):
+        key = frozenset((joint.name, joint.node, joint.edge) for joint in joints)
+        if key not in found:
+            found[key] = bodies.four_bar(links, joints)
+    size = mechanism.size
+    whole = [loop for loop in found.values() if not any(length <= EQUAL * size for length in loop.lengths)]
+    return tuple(sorted(whole, key=lambda loop: bodies.ground not in loop.links))
+
+
+def describe_loops(mechanism: Mechanism) -> list[str]:
+    """A line for each four-bar and slider-crank: its class and the lengths that decide it."""
+    return [f"{loop.kind} {loop.name}: {loop.type}, {loop.condition()}" for loop in four_bars(mechanism)]
+
+
+class _Bodies:
+    """Bodies and the joints between them; a body is known by the first of its links."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        graph, description = mechanism.graph, mechanism.description
+        self.owner: dict[str, str] = {body: body for body in graph.bodies}
+        for joint in description.joints.values():
+            if isinstance(joint, Fixed):
+                one, other = sorted((self.owner[link] for link in joint.links), key=list(graph.bodies).index)
+                self.owner = {body: one if owner == other else owner for body, owner in self.owner.items()}
+        self.ground = self.owner[GROUND]
+        self.frames: dict[str, int] = {body: graph.bodies[body][0] for body in self.owner.values()}
+        holders: dict[int, list[str]] = {}
+
+        def hold(body: str, node: int) -> None:
+            if body not in holders.setdefault(node, []):
+                holders[node].append(body)
+
+        for body, point in graph.points:
+            hold(self.owner[body], graph.node(point))
+        self.joints: list[tuple[str, str, Joint]] = []
+        edges = {edge.slide: k for k, edge in enumerate(graph.edges) if edge.slide is not None}
+        for name, link in description.links.items():
+            if link.telescopic:
+                self._slide(self.owner[name], self.owner[rod_of(name)], name, edges)
+        for name, joint in description.joints.items():
+            if isinstance(joint, Prismatic):
+                self._slide(self.owner[joint.line.link], self.owner[joint.slider], name, edges)
+            elif isinstance(joint, Slot):
+                carrier, block = self.owner[joint.line.link], f"{name} block"
+                self.frames[block] = self.frames[carrier]
+                self._slide(carrier, block, name, edges)
+                hold(block, graph.node(joint.point))
+        for node, those in holders.items():
+            for k, one in enumerate(those):
+                self.joints += [(one, other, Joint(graph.nodes[node], node=node)) for other in those[k + 1 :]]
+
+    def _slide(self, one: str, other: str, name: str, edges: Mapping[int, int]) -> None:
+        slide = self.mechanism.graph.slides.index(name)
+        self.joints.append((one, other, Joint(name, edge=edges[slide])))
+
+    def four_bar(self, links: Sequence[str], joints: Sequence[Joint]) -> FourBar:
+        """Order a ring (joint k between links k and k + 1): frame, input, coupler, output."""
+        k = self._frame(links)
+        links, joints = [*links[k:], *links[:k]], [*joints[k:], *joints[:k]]
+        if self._known(links[3], joints[3]) < self._known(links[1], joints[0]):
+            links, joints = [links[0], *links[:0:-1]], joints[::-1]
+        pose = self.mechanism.sketch_configuration
+        lengths = [
+            math.nan if min(a.node, b.node) < 0 else float(abs(pose.nodes[b.node] - pose.nodes[a.node]))
+            for a, b in zip([joints[3], *joints[:3]], joints, strict=True)
+        ]
+        return FourBar(
+            (_shown(links[0]), _shown(links[1]), _shown(links[2]), _shown(links[3])),
+            (joints[0], joints[1], joints[2], joints[3]),
+            (lengths[0], lengths[1], lengths[2], lengths[3]),
+            self._offset(joints, pose),
+        )
+
+    def _offset(self, joints: Sequence[Joint], pose: Configuration) -> float:
+        k = next((k for k, joint in enumerate(joints) if joint.edge >= 0), -1)
+        if k < 0:
+            return math.nan
+        edge = joints[k].edge
+        along = pose.vectors.d[edge] * pose.rotations[self.mechanism.graph.edges[edge].frame]
+        span = pose.nodes[joints[(k + 1) % 4].node] - pose.nodes[joints[k - 1].node]
+        offset = abs(float(cross(np.asarray(along), np.asarray(span))))
+        return offset if offset > EQUAL * self.mechanism.size else 0.0
+
+    def _frame(self, links: Sequence[str]) -> int:
+        """Which link of a ring is fixed: the ground, else what a drive is measured from, else the first named."""
+        if self.ground in links:
+            return links.index(self.ground)
+        for drive in self.mechanism.description.drives.values():
+            reference = self.owner[drive.reference]
+            if drive.kind == "angle" and reference in links and self.owner[drive.target] in links:
+                return links.index(reference)
+        return min(range(4), key=lambda k: list(self.frames).index(links[k]))
+
+    def _known(self, link: str, joint: Joint) -> int:
+        """When the place of a link against the frame is known: -1 by the drives, else the group that finds it."""
+        structure, edges = self.mechanism.forward.structure, self.mechanism.graph.edges
+        root = structure.ties[self.frames[link]].root
+        for index, group in enumerate(structure.groups):
+            if (edges[joint.edge].slide in group.slides) if joint.edge >= 0 else (root in group.angles):
+                return index
+        return -1
+
+
+def _shown(body: str) -> str:
+    return body.replace(":", " ")
+
+
+def _rings(bodies: _Bodies) -> Iterator[tuple[list[str], list[Joint]]]:
+    """All rings of four bodies with four different joints, at most one of them a slide; each at least once."""
+    near: dict[str, list[tuple[str, Joint]]] = {}
+    for one, other, joint in bodies.joints:
+        near.setdefault(one, []).append((other, joint))
+        near.setdefault(other, []).append((one, joint))
+    order = {body: k for k, body in enumerate(near)}
+    for a, around in near.items():
+        # Each ring once from its first body, in both directions.
+        for b, ab in around:
+            for c, bc in near[b]:
+                for d, cd in near[c]:
+                    if min(order[b], order[c], order[d]) <= order[a] or len({b, c, d}) < 3:
+                        continue
+                    for last, da in near[d]:
+                        joints = [ab, bc, cd, da]
+                        if last == a and len(set(joints)) == 4 and sum(joint.edge >= 0 for joint in joints) <= 1:
+                            yield [a, b, c, d], joints
