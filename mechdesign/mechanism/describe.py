@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import assemblies
 from mechdesign.mechanism.derivatives import regularity
+from mechdesign.mechanism.four_bars import describe_loops
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Term
 from mechdesign.mechanism.naming import group_in_words, placed_before
@@ -63,6 +64,7 @@ def report(mechanism: Mechanism) -> str:
         *(f"joint: {joint}" for joint in joints_in_words(description, graph)),
         f"mobility: {mechanism.mobility}, loops: {loops}, drives: {', '.join(description.drives) or 'none'}",
         *groups_in_words(mechanism),
+        *describe_loops(mechanism),
     ]
     try:
         lines += assemblies.in_words(mechanism)
