@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,10 @@ from mechdesign.study.poses import Poses
 
 # Beside a pose in which the sine of the angle between two links is below this they may come into line.
 NEAR = 0.3
-# In line as far as the pose at a limit of motion tells, and another pose; one place along a sweep, as a part of it.
+# In line as far as the pose at a limit of motion tells, and another pose; one place along a sweep, as a part of a step.
 IN_LINE = 1e-6
 AT_POSE = 1e-12
-SAME = 1e-7
+SAME = 1e-5
 # Precision of roots as a part of a step.
 FINE = 1e-13
 # An extreme between two poses must be beyond theirs by more than rounding (radians).
@@ -240,7 +241,6 @@ def _toggles(
         samples.cosines.reshape(count, -1)[straight, sample], strict=True,
     )  # fmt: skip
     toggles = [_Toggle(float(p), float(x), int(f), float(c)) for p, x, f, c in at_samples]
-    span = SAME * float(np.ptp(samples.place))
     if len(first):
         probes = probe(lambda lane, x: values(lane, x)[:1], begin, end, np.array([FINE]))
         for found in (probes.roots, probes.lows):
@@ -251,11 +251,25 @@ def _toggles(
             # A sine that jumps from side to side is no root of it.
             for k in np.flatnonzero(np.abs(sine) <= IN_LINE).tolist():
                 what = int(function[found.lane[k]])
-                toggle = _Toggle(float(at[k]), float(found.place[k]), what, float(cosine[k]))
-                if not any(toggle.function == t.function and abs(toggle.place - t.place) <= span for t in toggles):
-                    toggles.append(toggle)
-    toggles.sort(key=lambda toggle: (toggle.position, toggle.function))
-    return _toggle_table(study, loops, poses, limits, toggles)
+                toggles.append(_Toggle(float(at[k]), float(found.place[k]), what, float(cosine[k])))
+    return _toggle_table(study, loops, poses, limits, _once(toggles))
+
+
+def _once(toggles: list[_Toggle]) -> list[_Toggle]:
+    """Toggles in the order of the sweep; of those of one function that are one, the one found first."""
+    kept: list[_Toggle] = []
+    order = sorted(range(len(toggles)), key=lambda k: (toggles[k].function, toggles[k].position))
+    best: int | None = None
+    for k in order:
+        same = best is not None and toggles[k].function == toggles[best].function
+        if same and best is not None and toggles[k].position - toggles[best].position <= SAME:
+            if k < best:
+                best = k
+                kept[-1] = toggles[k]
+        else:
+            best = k
+            kept.append(toggles[k])
+    return sorted(kept, key=lambda toggle: (toggle.position, toggle.function))
 
 
 def _suspects(sines: Floats) -> tuple[Indices, Indices]:
@@ -276,10 +290,10 @@ def _toggle_table(
     given = poses.groups[0].values[name]
     rows = [int(toggle.position) for toggle in toggles]
     places = as_given(study, limits.margins, given, [toggle.place for toggle in toggles], rows)
-    texts = [
-        _words(loops[toggle.function % len(loops)], (0, 3)[toggle.function // len(loops)], toggle.cosine)
-        for toggle in toggles
-    ]
+    texts = []
+    for toggle, both in zip(toggles, _together(toggles, len(loops)), strict=True):
+        loop, end = loops[toggle.function % len(loops)], (0, 3)[toggle.function // len(loops)]
+        texts.append(_words(loop, end, toggle.cosine, both))
     unit = study.units.label(limits.margins.coordinate.quantity)
     links, states, joints, effects, names = zip(*texts, strict=True) if texts else ((), (), (), (), ())
     return Table(
@@ -296,7 +310,18 @@ def _toggle_table(
     )
 
 
-def _words(loop: FourBar, end: int, cosine: float) -> tuple[str, str, str, str, str]:
+def _together(toggles: list[_Toggle], count: int) -> list[bool]:
+    """Whether all three moving links of the loop are in line at a toggle."""
+    found = [False] * len(toggles)
+    order = sorted(range(len(toggles)), key=lambda k: (toggles[k].function % count, toggles[k].position))
+    for one, other in pairwise(order):
+        a, b = toggles[one], toggles[other]
+        if a.function % count == b.function % count and b.position - a.position <= SAME:
+            found[one] = found[other] = True
+    return found
+
+
+def _words(loop: FourBar, end: int, cosine: float, both: bool) -> tuple[str, str, str, str, str]:
     """Links, state, joints, effect and loop of a toggle."""
     joints = [joint.name for joint in loop.joints]
     if end == 0:
@@ -305,4 +330,4 @@ def _words(loop: FourBar, end: int, cosine: float) -> tuple[str, str, str, str, 
         pair, pins, effect = loop.links[2:4], joints[1:], f"{loop.links[1]} at its limit"
     straight = "extended" if (cosine > 0) == (end == 0) else "folded"
     state = "perpendicular" if loop.slide in (1, 2, end) else straight
-    return " ".join(pair), state, " ".join(pins), effect, loop.name
+    return " ".join(pair), state, " ".join(pins), "change point" if both else effect, loop.name

@@ -169,6 +169,12 @@ def test_a_dead_centre_of_the_motion_is_a_toggle() -> None:
     assert reach == pytest.approx([expected[state] for state in toggles["state"][stretched]])
 
 
+def test_a_parallelogram_in_line_is_a_change_point() -> None:
+    table = result(four_bar(4, 1, 4, 1)).tables["toggles"]
+    assert list(table["crank"]) == [0, 0, 180, 180, 360, 360]
+    assert set(table["effect"]) == {"change point"}
+
+
 def test_links_in_line_at_a_pose_and_at_both_ends_of_a_turn() -> None:
     table = result(SLIDER_CRANK, "mechanism.parameters.e=0").tables["toggles"]
     assert list(table["crank"]) == [0, 180, 360]

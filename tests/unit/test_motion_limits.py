@@ -233,3 +233,30 @@ def test_a_crank_that_turns_fully_has_no_limits_and_nothing_to_warn_about() -> N
     text = four_bar(1, 3.5, 3, 4, "{A: [0.5, 0.8], B: [3.3, 2.9]}")
     assert len(limits(text)) == 0
     assert warnings(text) == []
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_limit_of_a_random_six_bar_is_missed_or_invented(seed: int) -> None:
+    """Steps of 10 deg find the same ends as poses every hundredth of a degree."""
+    random = np.random.default_rng(seed)
+    names = ("O", "D", "G", "A", "B", "E", "F")
+    points = random.uniform(-3, 3, (7, 2)).round(2).tolist()
+    at = dict(zip(names, points, strict=True))
+    study = study_of(f"""
+mechanism:
+  links:
+    ground: {{O: {at["O"]}, D: {at["D"]}, G: {at["G"]}}}
+    crank: {{from: O, to: A}}
+    rod: {{points: [A, B, E]}}
+    rocker: {{from: D, to: B}}
+    link: {{from: E, to: F}}
+    swing: {{from: G, to: F}}
+  drives: [crank]
+  sketch: {{A: {at["A"]}, B: {at["B"]}, E: {at["E"]}, F: {at["F"]}}}
+kinematics: {{sweep: {{crank: {{from: 1, to: 361, step: 10}}}}, outputs: [F]}}
+""")
+    fine = np.arange(100, 36101) / 100
+    valid = study.mechanism.forward.solve([np.radians(fine)]).valid
+    changes = np.flatnonzero(valid[1:] != valid[:-1])
+    found = kinematics(study).tables["limits"]["crank"]
+    assert found == pytest.approx((fine[changes] + fine[changes + 1]) / 2, abs=0.0051)
