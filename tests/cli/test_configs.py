@@ -43,7 +43,8 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
 @pytest.mark.parametrize("config", CONFIGS, ids=named)
 def test_results_are_those_of_the_study_as_it_is(config: Path) -> None:
     for command in load(config).questions:
-        manifest = json.loads((ROOT / "results" / config.stem / command / "manifest.json").read_text())
+        folder = ROOT / "results" / config.relative_to(ROOT / "configs").parent / config.stem / command
+        manifest = json.loads((folder / "manifest.json").read_text())
         assert manifest["study"]["sha256"] == hashlib.sha256(config.read_bytes()).hexdigest()
         assert manifest["overrides"] == []
 
