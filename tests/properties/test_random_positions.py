@@ -145,16 +145,19 @@ def test_a_rough_drawing_chooses_the_same_assembly(made: Made) -> None:
 @settings(max_examples=60)
 @given(mechanisms(), st.sampled_from([0.5, 3.0]))
 def test_an_assembly_is_kept_along_a_sweep(made: Made, reach: float) -> None:
-    """From pose to pose nothing moves farther than its speed allows: another assembly would be a leap."""
+    """From pose to pose nothing moves farther than the speeds there allow: another assembly would be a leap."""
+    mechanism = made.mechanism
     time = np.linspace(-reach, reach, 201)
     sweep = made.at(time)
-    velocity = made.mechanism.linearize(sweep).velocity([made.rates[drive] for drive in made.mechanism.drives])
+    velocity = mechanism.linearize(sweep).velocity([made.rates[drive] for drive in mechanism.drives])
     both = sweep.valid[1:] & sweep.valid[:-1]
-    for name in made.mechanism.points:
-        leap = np.abs(np.diff(sweep.point(name)))
-        speed = np.abs(np.broadcast_to(velocity.nodes[made.mechanism.graph.node(name)], time.shape))
-        allowed = 5 * (time[1] - time[0]) * np.maximum(speed[1:], speed[:-1]) + 1e-9
-        assert np.all(leap[both] <= allowed[both]), name
+    moving = [mechanism.graph.node(name) for name in mechanism.points]
+    speeds = [np.abs(np.broadcast_to(velocity.nodes[node], time.shape)) for node in moving]
+    leaps = [np.abs(np.diff(np.broadcast_to(sweep.nodes[node], time.shape))) for node in moving]
+    # The fastest counts: what hangs on a point that passes through infinity turns round with it.
+    fastest = np.max(speeds, axis=0)
+    allowed = 5 * (time[1] - time[0]) * np.maximum(fastest[1:], fastest[:-1]) + 1e-9
+    assert np.all(np.max(leaps, axis=0)[both] <= allowed[both])
 
 
 @settings(max_examples=20)
