@@ -9,7 +9,7 @@ from mechdesign.analyses.legs import Beam, Guide, Leg
 from mechdesign.analyses.screws import Array, Chain, hinge_twist, slide_twist
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
-from mechdesign.study.sections import Profile, StiffnessSection
+from mechdesign.study.stiffness_models import Profile, StiffnessSection
 
 SHEAR_FACTOR = 5 / 6  # of a rectangle
 

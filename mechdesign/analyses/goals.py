@@ -13,7 +13,8 @@ from mechdesign.analyses.region import BRISK, GRID_TOLERANCE, INDICES, Answer, Q
 from mechdesign.errors import MechdesignError, Problem, StudyError
 from mechdesign.results import Result
 from mechdesign.study import Study, load
-from mechdesign.study.sections import COMMANDS, Condition
+from mechdesign.study.optimize_models import Condition
+from mechdesign.study.sections import COMMANDS
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from mechdesign.analyses.rays import Designs, Floats
 from mechdesign.errors import MechanismError, Problem, StudyError
 from mechdesign.memory import keep_freed_memory
 from mechdesign.study import Study
-from mechdesign.study.sections import WorkspaceSection
+from mechdesign.study.workspace_models import WorkspaceSection
 
 # One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
 CLOSE, BRISK = Effort(128, 48), Effort(16, 6)

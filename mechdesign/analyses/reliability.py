@@ -24,7 +24,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.sections import ReliabilitySection
+from mechdesign.study.reliability_models import ReliabilitySection
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names
 from mechdesign.study import Study
-from mechdesign.study.sections import Clearance, Dimension
+from mechdesign.study.reliability_models import Clearance, Dimension
 
 Floats = NDArray[np.float64]
 

@@ -34,7 +34,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.sections import StiffnessSection
+from mechdesign.study.stiffness_models import StiffnessSection
 
 CHUNK = 8192
 # Wrenches (of unit size) nearer to dependence than this are told: the answer hangs on rounding and on tolerances.

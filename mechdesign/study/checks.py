@@ -11,20 +11,15 @@ from mechdesign.study import pose_checks, targets
 from mechdesign.study.document import Path
 from mechdesign.study.names import Names
 from mechdesign.study.numbers import suggestion
+from mechdesign.study.optimize_models import Condition, OptimizeSection
 from mechdesign.study.parameters import Parameters
 from mechdesign.study.pose_models import PoseSection
+from mechdesign.study.reliability_models import Dimension, ReliabilitySection
 from mechdesign.study.reporter import Reporter
-from mechdesign.study.sections import (
-    COMMANDS,
-    Condition,
-    Dimension,
-    KinematicsSection,
-    OptimizeSection,
-    ReliabilitySection,
-    StiffnessSection,
-    WorkspaceSection,
-)
+from mechdesign.study.sections import COMMANDS, KinematicsSection
+from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.units import KINDS, QUANTITY, QuantityError, describe, measure
+from mechdesign.study.workspace_models import WorkspaceSection
 
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}

@@ -23,21 +23,16 @@ from mechdesign.study.build import Builder
 from mechdesign.study.document import Document, plain, read
 from mechdesign.study.models import MechanismSection, UnitsSection
 from mechdesign.study.numbers import LOST, Context, check_parameter_name, read_number, shown
+from mechdesign.study.optimize_models import OptimizeSection
 from mechdesign.study.parameters import Parameters
 from mechdesign.study.pose_models import PoseSection
+from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter, unknown_key
-from mechdesign.study.sections import (
-    COMMANDS,
-    KinematicsSection,
-    OptimizeSection,
-    ReliabilitySection,
-    Requirement,
-    StiffnessSection,
-    StudyFile,
-    WorkspaceSection,
-)
+from mechdesign.study.sections import COMMANDS, KinematicsSection, Requirement, StudyFile
+from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.targets import Target
 from mechdesign.study.units import Units, units_from
+from mechdesign.study.workspace_models import WorkspaceSection
 
 
 @dataclass(frozen=True, eq=False)

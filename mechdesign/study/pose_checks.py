@@ -12,8 +12,9 @@ from mechdesign.mechanism.model import Quantity
 from mechdesign.study import poses, targets
 from mechdesign.study.document import Path
 from mechdesign.study.pose_models import PoseSection
+from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter
-from mechdesign.study.sections import COMMANDS, KinematicsSection, ReliabilitySection
+from mechdesign.study.sections import COMMANDS, KinematicsSection
 from mechdesign.study.targets import Target
 
 if TYPE_CHECKING:

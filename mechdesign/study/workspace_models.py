@@ -1,0 +1,62 @@
+"""The workspace section of the study file."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from mechdesign.study.lists import as_list
+from mechdesign.study.models import Model
+from mechdesign.study.numbers import (
+    NUMBER_FORM,
+    Angle,
+    Choice,
+    CoordinateName,
+    Length,
+    NonNegativeAngle,
+    Number,
+    OrShort,
+    PointName,
+    Positive,
+    PositiveLength,
+    Whole,
+    failure,
+)
+
+
+class Scan(Model):
+    """Rays about a point; angles in the study's unit."""
+
+    about: tuple[Length, Length] | None = None
+    from_: Angle | None = Field(None, alias="from")
+    to: Angle | None = None
+    rays: Annotated[int, Whole(2, 1_000_000)] | None = None
+
+
+class Integrate(Model):
+    """The rule of integration over the workspace."""
+
+    rule: Annotated[str, Choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
+    tolerance: Positive = 1e-5
+    nodes: Annotated[int, Whole(1, 100_000)] | None = None
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Integrate:
+        if self.rule == "gauss" and self.nodes is not None:
+            raise failure("rule 'gauss' chooses its nodes by 'tolerance'; 'nodes' belongs to midpoint and sector_mean")
+        return self
+
+
+class WorkspaceSection(Model):
+    """Where can it work?"""
+
+    point: PointName
+    at: dict[CoordinateName, Annotated[tuple[Number, ...], BeforeValidator(as_list), OrShort((NUMBER_FORM,))]] = Field(
+        default_factory=dict
+    )
+    scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
+    integrate: Integrate = Integrate()
+    margin: NonNegativeAngle = 0.0
+    assembly: Annotated[str, Choice(("same", "any"))] = "same"
+    characteristic_length: PositiveLength | None = None
