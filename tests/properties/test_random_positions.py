@@ -83,12 +83,14 @@ def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
     assert 20 in ok
     event(f"{10 * (len(ok) // 5)} % valid")
     closed = configuration.take(ok)
-    bound = 1e-12 * max(1.0, made.size)
+    # Slides that become nearly parallel carry their point far away: the size of each pose counts.
+    far = [np.abs(np.broadcast_to(x, ok.shape)) for x in (*closed.nodes, *closed.slides)]
+    bound = 1e-12 * np.maximum(1.0, np.max(far, axis=0))
     for what, gap in gaps(made, closed).items():
-        assert np.abs(gap).max() < bound, what
+        assert np.all(np.abs(gap) < bound), what
     for drive, value in zip(made.mechanism.drives, made.drives(time[ok]), strict=True):
         off = closed.value(made.mechanism.coordinate(drive)) - value
-        assert np.abs(wrap(off) if made.mechanism.quantity(drive) == "angle" else off).max() < bound, drive
+        assert np.all(np.abs(wrap(off) if made.mechanism.quantity(drive) == "angle" else off) < bound), drive
 
 
 @settings(max_examples=100)
@@ -157,6 +159,9 @@ def test_an_assembly_is_kept_along_a_sweep(made: Made, reach: float) -> None:
     # The fastest counts: what hangs on a point that passes through infinity turns round with it.
     fastest = np.max(speeds, axis=0)
     allowed = 5 * (time[1] - time[0]) * np.maximum(fastest[1:], fastest[:-1]) + 1e-9
+    # Where a closure (a squared length) may reach zero between two poses, two assemblies meet: a leg of no length.
+    least = np.min([np.broadcast_to(c, time.shape) for c in sweep.closures] or [np.full(len(time), np.inf)], axis=0)
+    both &= np.minimum(least[1:], least[:-1]) > allowed**2
     assert np.all(np.max(leaps, axis=0)[both] <= allowed[both])
 
 
