@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.dips import hidden_places, sign_changes
 from mechdesign.analyses.field import Field, Places
 from mechdesign.analyses.roots import bracketed_roots
 
@@ -175,28 +176,37 @@ def _others(
     values = values[np.flatnonzero(np.append(~quadratic, np.ones(len(values) - len(quadratic), dtype=bool)))]
     rows = np.flatnonzero(np.append(~quadratic, np.ones(len(designs.field.labels) - len(quadratic), dtype=bool)))
     positive = values > 0
-    cut = ~positive.all(axis=(0, 1)) & (width > thin[owner])
+    thick = width > thin[owner]
+
+    def margin_at(function: Ints, lane: Ints, radius: Floats) -> Floats:
+        z = designs.about + radius * direction[owner[lane]]
+        found_there = designs.field.margins(z, {name: value[lane] for name, value in local.items()})
+        return found_there[rows[function], np.arange(len(lane))]
+
+    dips = hidden_places(margin_at, radii, values)
+    cut = ~positive.all(axis=(0, 1)) & thick
+    cut[dips[1]] |= thick[dips[1]]
     if not cut.any():
         return found
     lanes = np.flatnonzero(cut)
-    values, positive, radii = values[:, :, lanes], positive[:, :, lanes], radii[:, lanes]
-    margin, cell, lane = np.nonzero(positive[:, 1:] != positive[:, :-1])
-    third = np.where(cell > 0, cell - 1, np.minimum(cell + 2, samples - 1))
+    brackets = sign_changes(radii[:, lanes], values[:, :, lanes], _within(dips, lanes))
+    margin, lane = brackets.function, brackets.lane
 
     def evaluate(which: Ints, radius: Floats) -> Floats:
-        at = lanes[lane[which]]
-        z = designs.about + radius * direction[owner[at]]
-        found_there = designs.field.margins(z, {name: value[at] for name, value in local.items()})
-        return found_there[rows[margin[which]], np.arange(len(which))]
-
-    def sample(k: Ints) -> tuple[Floats, Floats]:
-        return radii[k, lane], values[margin, k, lane]
+        return margin_at(margin[which], lanes[lane[which]], radius)
 
     tolerance = ROUNDING * found.outer[lanes[lane]]
-    radius = bracketed_roots(evaluate, *sample(cell), *sample(cell + 1), *sample(third), tolerance)
-    turn = np.where(positive[margin, cell + 1, lane], 1, -1)
-    part = _intervals(rows[margin], lane, turn, radius, (~positive[:, 0]).sum(axis=0), found.outer[lanes], 0.0)
+    radius = bracketed_roots(evaluate, *brackets.low, *brackets.high, *brackets.third, tolerance)
+    turn = np.where(brackets.high[1] > 0, 1, -1)
+    start = (~positive[:, 0][:, lanes]).sum(axis=0)
+    part = _intervals(rows[margin], lane, turn, radius, start, found.outer[lanes], 0.0)
     return _replace(found, lanes, part)
+
+
+def _within(dips: tuple[Ints, Ints, Floats, Floats], lanes: Ints) -> tuple[Ints, Ints, Floats, Floats]:
+    """Hidden places of the chosen lanes, numbered among them."""
+    use = np.isin(dips[1], lanes)
+    return dips[0][use], np.searchsorted(lanes, dips[1][use]), dips[2][use], dips[3][use]
 
 
 def _replace(found: Intervals, lanes: Ints, part: Intervals) -> Intervals:
