@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.errors import Problem, StudyError
 from mechdesign.results import Result, Table
+from mechdesign.rows import UnknownColumnError, choose
 
 
 class Requirement(Protocol):
@@ -19,7 +18,7 @@ class Requirement(Protocol):
 
     @property
     def result(self) -> str:
-        """``command.column`` or ``command.table.column``."""
+        """``command.column``, ``command.table.column`` or ``command.table.row.column``."""
 
     @property
     def where(self) -> Mapping[str, Any] | None:
@@ -96,30 +95,19 @@ def judge(
             continue
         try:
             verdicts.append(_judge(result, requirement, freedom))
-        except _UnknownColumnError as error:
+        except UnknownColumnError as error:
             problems.append(Problem(str(error), f"requirements.{index}", file))
     if problems:
         raise StudyError(problems)
     return tuple(verdicts)
 
 
-class _UnknownColumnError(Exception):
-    """A requirement asks for a column that the result has not."""
-
-
 def _judge(result: Result, requirement: Requirement, freedom: int) -> Verdict:
-    table, name = _locate(result, requirement.result.partition(".")[2])
-    values = _numbers(table, name)
-    if requirement.abs:
-        values = np.abs(values)
-    where = requirement.where or {}
-    chosen = np.ones(len(table), dtype=bool)
-    for column, wanted in where.items():
-        if column not in table:
-            raise _UnknownColumnError(_unknown("where", column, table.names))
-        chosen &= _equal(table[column], wanted)
+    path = requirement.result.partition(".")[2]
+    chosen = choose(result, path, requirement.where or {}, absolute=requirement.abs)
+    table, name, values = chosen.table, chosen.column, chosen.values
     words = _words(requirement)
-    rows = np.flatnonzero(chosen)
+    rows = np.flatnonzero(chosen.counts)
     if not rows.size:
         return Verdict(words, met=False, worst=float("nan"), place="no row of " + table.name)
     undefined = rows[np.isnan(values[rows])]
@@ -132,40 +120,6 @@ def _judge(result: Result, requirement: Requirement, freedom: int) -> Verdict:
         met = bool(low_met and high_met)
         worst = high if requirement.at_least is None or not high_met else low
     return Verdict(words, met, float(values[worst]), _place(table, int(worst), name, freedom))
-
-
-def _locate(result: Result, path: str) -> tuple[Table, str]:
-    """Find a column: the first table that has it, or the table named before it."""
-    for table in result.tables.values():
-        if path in table:
-            return table, path
-    name, _, column = path.partition(".")
-    if name in result.tables and column in result.tables[name]:
-        return result.tables[name], column
-    known = [column for table in result.tables.values() for column in table.names]
-    raise _UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
-
-
-def _unknown(where: str, name: str, known: Iterable[str]) -> str:
-    names = list(dict.fromkeys(known))
-    close = get_close_matches(name, names, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(names)}"
-    return f"{where}: no column {name!r}; {hint}"
-
-
-def _numbers(table: Table, name: str) -> NDArray[np.float64]:
-    values = np.asarray(table[name])
-    if values.dtype.kind not in "fiub":
-        raise _UnknownColumnError(
-            f"column {name!r} of {table.name} holds words, which cannot be compared with a number"
-        )
-    return values.astype(float)
-
-
-def _equal(values: NDArray[Any], wanted: object) -> NDArray[np.bool_]:
-    if values.dtype.kind in "fiub" and isinstance(wanted, (int, float)):
-        return np.asarray(np.isclose(values.astype(float), float(wanted), rtol=1e-9, atol=1e-12))
-    return np.array([str(value) == str(wanted) for value in values.tolist()], dtype=bool)
 
 
 def _words(requirement: Requirement) -> str:

@@ -34,6 +34,7 @@ class Builder:
         self.reporter = reporter
         self.places: dict[str, Place] = {}
         self.formulas: dict[str, Expression] = {}
+        self.measured: set[str] = set()
         self.links: dict[str, Link] = {}
         self.sketch = {name: complex(x.nominal, y.nominal) for name, (x, y) in section.sketch.items()}
 
@@ -58,19 +59,21 @@ class Builder:
         factors = {
             name: self.units.angle_factor if place.quantity == "angle" else 1.0 for name, place in self.places.items()
         }
-        return Parameters(dict(nominal), dict(formulas), dict(self.formulas), factors)
+        return Parameters(dict(nominal), dict(formulas), dict(self.formulas), factors, frozenset(self.measured))
 
     def report(self, path: Iterable[str | int], message: str, *, at_key: bool = False) -> None:
         """Note a problem at a path below ``mechanism``."""
         self.reporter.report((*ROOT, *path), message, at_key=at_key)
 
-    def place(self, name: str, value: Value | float, quantity: Quantity = "length") -> Term:
-        """Register a number of the geometry and return its name."""
+    def place(self, name: str, value: Value | float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
+        """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
         factor = self.units.angle_factor if quantity == "angle" else 1.0
         nominal = value.nominal if isinstance(value, Value) else value
         self.places[name] = Place(name, nominal * factor, quantity)
         if isinstance(value, Value) and value.expression is not None:
             self.formulas[name] = value.expression
+        if measured:
+            self.measured.add(name)
         return name
 
     def check_name(self, name: str, known: Iterable[str], what: str, path: Iterable[str | int]) -> bool:
@@ -167,7 +170,7 @@ class Builder:
                     ("links", name), f"{start!r} and {end!r} are at one place in the sketch: no length to measure"
                 )
                 length = 1.0
-            points[end] = (self.place(f"{name}.length", length), 0.0)
+            points[end] = (self.place(f"{name}.length", length, measured=True), 0.0)
         measured = [point for point, place in section.points.items() if place is None]
         frame: list[complex] | None = None
         if measured:
@@ -237,7 +240,10 @@ class Builder:
         return [self.sketch[point] for point in points]
 
     def _point(self, link: str, point: str, x: Value | float, y: Value | float) -> tuple[Term, Term]:
-        return self.place(f"{link}.{point}.x", x), self.place(f"{link}.{point}.y", y)
+        # What the study gives comes as a `Value`, what is measured as a number.
+        measured = not isinstance(x, Value)
+        x_term = self.place(f"{link}.{point}.x", x, measured=measured)
+        return x_term, self.place(f"{link}.{point}.y", y, measured=measured)
 
     def link_direction(self, name: str) -> float | None:
         """Angle of a link's x axis in the sketch (radians), None where the sketch does not tell."""

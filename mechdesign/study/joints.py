@@ -128,7 +128,7 @@ def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, 
         builder.report(path, message)
         return None
     angle = (directions[1] - directions[0]) / builder.units.angle_factor
-    return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle"))
+    return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle", measured=True))
 
 
 def check_pins(builder: Builder) -> None:

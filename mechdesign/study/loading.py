@@ -18,6 +18,7 @@ from mechdesign.errors import MechanismError, Problem, StudyError
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
+from mechdesign.mechanism.variant import Variant
 from mechdesign.study import checks, overrides, pose_checks, poses
 from mechdesign.study.build import Builder
 from mechdesign.study.document import Document, plain, read
@@ -142,6 +143,24 @@ def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), 
     if isinstance(changes, str):
         changes = (changes,)
     overrides.apply(document, changes)
+    return load_document(document, path, hashlib.sha256(content).hexdigest(), tuple(changes), seed)
+
+
+def load_document(
+    document: Document,
+    path: pathlib.Path,
+    text_sha256: str,
+    changes: tuple[str, ...] = (),
+    seed: int | None = None,
+    original: Mechanism | None = None,
+) -> Study:
+    """Load a study from the data of a file, overrides applied; see `load`.
+
+    Parameters
+    ----------
+    original : Mechanism, optional
+        Of a study that differs in numbers alone: its assembly is taken, where else the sketch would choose one.
+    """
     reporter = Reporter(document)
     data = _sections(document, reporter)
     context, formulas = _context(data, reporter)
@@ -153,7 +172,8 @@ def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), 
     builder = Builder(section, context.units, context.parameters, reporter)
     description = builder.build()
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
-    mechanism = None if reporter.concerns("mechanism", "units") else _compiled(description, reporter)
+    wrong = reporter.concerns("mechanism", "units")
+    mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(context.parameters, formulas)
     parts = checks.check(parts, builder.names, parameters, reporter, path.parent)
     reporter.done()
@@ -171,9 +191,9 @@ def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), 
     return Study(
         name=name,
         path=path,
-        text_sha256=hashlib.sha256(content).hexdigest(),
+        text_sha256=text_sha256,
         seed=seed,
-        overrides=tuple(changes),
+        overrides=changes,
         units=units,
         resolved=resolved,
         mechanism=mechanism,
@@ -259,9 +279,9 @@ def _adapter(key: str) -> TypeAdapter[Any]:
     return TypeAdapter(StudyFile.model_fields[key].rebuild_annotation())
 
 
-def _compiled(description: Description, reporter: Reporter) -> Mechanism | None:
+def _compiled(description: Description, reporter: Reporter, original: Mechanism | None) -> Mechanism | None:
     try:
-        return Mechanism(description)
+        return Mechanism(description) if original is None else Variant(original, description)
     except MechanismError as error:
         reporter.report(error.key.split("."), str(error))
         return None

@@ -26,12 +26,15 @@ class Parameters:
         Places that depend on parameters.
     factors : mapping of str to float
         Every place; radians per study unit for an angle, 1 for a length.
+    measured : frozenset of str
+        Places that the study leaves out and that are so measured from its sketch.
     """
 
     nominal: Mapping[str, float] = field(default_factory=dict)
     formulas: Mapping[str, Expression] = field(default_factory=dict)
     dependent: Mapping[str, Expression] = field(default_factory=dict)
     factors: Mapping[str, float] = field(default_factory=dict)
+    measured: frozenset[str] = frozenset()
 
     def values(self, changed: Mapping[str, ArrayLike]) -> dict[str, Number]:
         """All parameters where some have other values; those that depend on them follow."""

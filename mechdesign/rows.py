@@ -1,0 +1,102 @@
+"""Columns of results by name, and the rows that count: what requirements, goals and conditions judge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.results import Result, Table
+
+
+class UnknownColumnError(Exception):
+    """A column that the result has not, or one of words."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """A column and the rows of its table that count.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (rows,)
+        All rows; absolute values where these are judged.
+    counts : ndarray of bool, shape (rows,)
+        Which of them count.
+    """
+
+    table: Table
+    column: str
+    values: NDArray[np.float64]
+    counts: NDArray[np.bool_]
+
+
+def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:
+    """Find a column and the rows in which others have the values of `where`.
+
+    Parameters
+    ----------
+    path : str
+        ``column``, of the first table that has it; ``table.column``; or ``table.row.column`` with a word of the row,
+        as in ``extremes.C.x.range``.
+
+    Raises
+    ------
+    UnknownColumnError
+        If there is no such column, or it holds words.
+    """
+    table, column, counts = _locate(result, path)
+    values = np.asarray(table[column])
+    if values.dtype.kind not in "fiub":
+        raise UnknownColumnError(
+            f"column {column!r} of {table.name} holds words, which cannot be compared with a number"
+        )
+    for name, wanted in where.items():
+        if name not in table:
+            raise UnknownColumnError(_unknown("where", name, table.names))
+        counts = counts & _equal(table[name], wanted)
+    numbers = values.astype(float)
+    return Chosen(table, column, np.abs(numbers) if absolute else numbers, counts)
+
+
+def worst(values: NDArray[np.float64], counts: NDArray[np.bool_], *, largest: bool) -> NDArray[np.float64]:
+    """The smallest or largest of the rows that count, along the last axis; nan where one is nan or none counts."""
+    none = -np.inf if largest else np.inf
+    inside = np.where(counts, values, none)
+    found = inside.max(axis=-1, initial=none) if largest else inside.min(axis=-1, initial=none)
+    return np.where(counts.any(axis=-1), found, np.nan)
+
+
+def _locate(result: Result, path: str) -> tuple[Table, str, NDArray[np.bool_]]:
+    for table in result.tables.values():
+        if path in table:
+            return table, path, np.ones(len(table), dtype=bool)
+    name, _, rest = path.partition(".")
+    if name in result.tables:
+        table = result.tables[name]
+        if rest in table:
+            return table, rest, np.ones(len(table), dtype=bool)
+        for column in table.names:
+            word = rest.removesuffix(f".{column}")
+            for words in table.columns if word != rest else ():
+                if words.values.dtype.kind not in "fiub" and (rows := _equal(words.values, word)).any():
+                    return table, column, rows
+    known = [column for table in result.tables.values() for column in table.names]
+    raise UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
+
+
+def _unknown(where: str, name: str, known: Iterable[str]) -> str:
+    names = list(dict.fromkeys(known))
+    close = get_close_matches(name, names, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(names)}"
+    return f"{where}: no column {name!r}; {hint}"
+
+
+def _equal(values: NDArray[Any], wanted: object) -> NDArray[np.bool_]:
+    if values.dtype.kind in "fiub" and isinstance(wanted, (int, float)):
+        return np.asarray(np.isclose(values.astype(float), float(wanted), rtol=1e-9, atol=1e-12))
+    return np.array([str(value) == str(wanted) for value in values.tolist()], dtype=bool)

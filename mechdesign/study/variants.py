@@ -1,0 +1,222 @@
+"""A study with other dimensions: as if its file had been changed, without reading and checking it again.
+
+Only numbers of the geometry are evaluated anew. Where other numbers of the study depend on what is changed (a sweep's
+end, a tolerance, a dimension measured from the sketch) the data is validated again, so that they follow.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.errors import Problem, StudyError
+from mechdesign.expressions import Expression, ExpressionError, Number
+from mechdesign.mechanism.variant import Variant
+from mechdesign.study.document import Document, Mark, plain
+from mechdesign.study.loading import Study, load_document
+from mechdesign.study.models import LINK_KEYS
+from mechdesign.study.parameters import Parameters
+
+Floats = NDArray[np.float64]
+
+# Sections whose numbers are read once, when the study is loaded.
+SECTIONS = ("kinematics", "workspace", "reliability", "stiffness", "requirements")
+
+
+def variant(study: Study, changed: Mapping[str, float]) -> Study:
+    """The study with other values of parameters or single places, in its units; the assembly stays the sketch's.
+
+    A parameter that depends on changed ones follows. A place that is changed itself becomes a number: parameters no
+    longer change it.
+
+    Raises
+    ------
+    StudyError
+        If a name is neither a parameter nor a place, or the values make no mechanism.
+    MechanismError, AssemblyError
+        See `mechdesign.mechanism.variant.Variant`.
+    """
+    file = str(study.path or "")
+    check_names(study, changed)
+    values = {name: np.asarray(value, dtype=float) for name, value in changed.items()}
+    parameters, places = study.parameters.values(values), study.parameters.places(values)
+    (wrong,) = faults(study, parameters, places, 1)
+    if wrong:
+        raise StudyError([Problem(wrong, "mechanism", file)])
+    resolved = changed_data(study, changed)
+    if follows(study, changed):
+        document = Document(file, resolved, values={(): Mark(file)})
+        path = study.path or pathlib.Path()
+        return load_document(document, path, study.text_sha256, study.overrides, study.seed, study.mechanism)
+    description = study.mechanism.description
+    new = {name: dataclasses.replace(description.places[name], nominal=float(value)) for name, value in places.items()}
+    description = dataclasses.replace(description, places={**description.places, **new})
+    old = study.parameters
+    return dataclasses.replace(
+        study,
+        resolved=resolved,
+        mechanism=Variant(study.mechanism, description),
+        parameters=Parameters(
+            {name: float(value) for name, value in parameters.items()},
+            {name: formula for name, formula in old.formulas.items() if name not in changed},
+            {place: formula for place, formula in old.dependent.items() if place not in changed},
+            old.factors,
+            old.measured.difference(changed),
+        ),
+    )
+
+
+def check_names(study: Study, names: Collection[str]) -> None:
+    """Check that names are parameters or places.
+
+    Raises
+    ------
+    StudyError
+        With every name that is neither.
+    """
+    known = {*study.parameters.known()}
+    wrong = [
+        Problem("is neither a parameter nor a dimension", n, str(study.path or "")) for n in names if n not in known
+    ]
+    if wrong:
+        raise StudyError(wrong)
+
+
+def faults(study: Study, parameters: Mapping[str, Number], places: Mapping[str, Number], count: int) -> list[str]:
+    """Why the numbers of each of `count` designs make no mechanism; empty where they do."""
+    found = np.full(count, "", dtype=object)
+
+    def note(wrong: Any, message: str) -> None:
+        found[np.broadcast_to(wrong, count) & (found == "")] = message
+
+    for name, value in (*parameters.items(), *places.items()):
+        note(~np.isfinite(value), f"{name} has no finite value")
+    nominal, links = study.mechanism.nominal, study.mechanism.description.links
+    for name, value in places.items():
+        owner, _, last = name.rpartition(".")
+        if owner in links and last == "length":
+            note(~(np.asarray(value) > 0), f"{name} is not positive")
+    for index, limit in enumerate(study.mechanism.description.limits):
+        low, high = (
+            places.get(f"limits.{index}.{end}", nominal.get(f"limits.{index}.{end}")) for end in ("min", "max")
+        )
+        if low is not None and high is not None:
+            note(np.asarray(high) < low, f"limits.{index}: the maximum is below the minimum")
+        for end in (low, high):
+            if limit.kind == "distance" and end is not None:
+                note(np.asarray(end) < 0, f"limits.{index}: a distance is never negative")
+    return [str(reason) for reason in found]
+
+
+def moved(study: Study, names: Collection[str]) -> set[str]:
+    """Those of the names that are parameters, and the parameters that follow from them."""
+    found = {name for name in names if name in study.parameters.nominal}
+    for name, formula in study.parameters.formulas.items():
+        if name not in names and formula.names & found:
+            found.add(name)
+    return found
+
+
+def follows(study: Study, names: Collection[str]) -> bool:
+    """Whether more than numbers of the geometry depends on parameters or places.
+
+    A name in any text of a section counts: that it never misses matters more than that it is sometimes wrong.
+    """
+    parameters = moved(study, names)
+    mechanism = study.resolved["mechanism"]
+    # An expression of a target is evaluated with the parameters at hand; the numbers of a list are not.
+    read = [study.resolved.get(name) for name in SECTIONS]
+    read += [target for target in (mechanism.get("targets") or {}).values() if not isinstance(target, str)]
+    if any(_mentions(part, parameters) for part in read):
+        return True
+    if not study.parameters.measured:
+        return False
+    formulas = study.parameters.dependent
+    places = {*names, *(place for place, formula in formulas.items() if formula.names & parameters)}
+    return _mentions(mechanism.get("sketch"), parameters) or any(_drawn(study, place) for place in places)
+
+
+def _drawn(study: Study, place: str) -> bool:
+    """Whether a place has a part in how links lie on the sketch."""
+    owner, _, last = place.rpartition(".")
+    link = study.mechanism.description.links.get(owner)
+    if link is not None:
+        return last == "length" and len(link.points) > 2
+    return last in ("x", "y")
+
+
+def _mentions(data: Any, names: Collection[str]) -> bool:
+    if isinstance(data, dict):
+        return any(_mentions(value, names) for value in data.values())
+    if isinstance(data, list):
+        return any(_mentions(value, names) for value in data)
+    if not isinstance(data, str) or not names:
+        return False
+    try:
+        return not Expression.parse(data).names.isdisjoint(names)
+    except ExpressionError:
+        return False
+
+
+def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
+    """The study as plain data with other values: what its file would be."""
+    data: dict[str, Any] = plain(study.resolved)
+    mechanism = data["mechanism"]
+    for name, value in changed.items():
+        owner, _, last = name.rpartition(".")
+        if name in study.parameters.nominal:
+            mechanism["parameters"][name] = float(value)
+        elif owner.startswith("limits."):
+            mechanism["limits"][int(owner.partition(".")[2])][last] = float(value)
+        elif last in ("direction", "angle"):
+            mechanism["joints"][owner][last] = float(value)
+        elif last == "length":
+            link = mechanism["links"][owner]
+            if isinstance(link, list):
+                mechanism["links"][owner] = [*link[:2], float(value)]
+            else:
+                link["length"] = float(value)
+        else:
+            link, _, point = owner.rpartition(".")
+            points = _points(study, mechanism["links"], link)
+            points[point]["xy".index(last)] = float(value)
+    return data
+
+
+def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[Any]]:
+    """The points of a link in its data, brought to the form ``{P: [x, y]}``; those measured become numbers."""
+    described = study.mechanism.description.links[name]
+    raw = links[name]
+    own = raw if isinstance(raw, dict) and not any(key in raw for key in LINK_KEYS) else None
+    given = own if own is not None else raw.get("points") if isinstance(raw, dict) else None
+    given = given if isinstance(given, dict) else {}
+    numbers = study.mechanism.nominal
+    points: dict[str, list[Any]] = {}
+    for point, terms in described.points.items():
+        if described.ends is None or point not in described.ends:
+            known = given.get(point)
+            points[point] = known or [numbers[term] if isinstance(term, str) else term for term in terms]
+    if described.ends is None:
+        links[name] = points
+    else:
+        links[name] = {**_long(raw), "points": points}
+    return points
+
+
+def _long(raw: Any) -> dict[str, Any]:
+    """A binary link with its keys."""
+    return dict(zip(("from", "to", "length"), raw, strict=False)) if isinstance(raw, list) else dict(raw)
+
+
+def names_in(study: Study, names: Collection[str]) -> Iterator[str]:
+    """Places that depend on any of the names."""
+    parameters = moved(study, names)
+    for place, formula in study.parameters.dependent.items():
+        if place not in names and formula.names & parameters:
+            yield place
+    yield from (name for name in names if name in study.parameters.factors)
