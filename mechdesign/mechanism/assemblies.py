@@ -133,8 +133,13 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
     for converged in state.converged:
         solved &= converged
     every = plan.configuration(state, (STARTS,), {}, vectors, solved, limits=False)
+    good = every.valid
+    for slide in plan.mechanism.graph.telescopic:
+        # A leg without length has no direction: whatever its angle, it is no assembly.
+        with np.errstate(invalid="ignore"):
+            good = good & (np.asarray(every.slides[slide]) > SAME * size)
     found = [sketch] if drawn else []
-    for lane in np.flatnonzero(every.valid):
+    for lane in np.flatnonzero(good):
         one = every.take(int(lane))
         if not any(_same(one, other, size) for other in found):
             found.append(one)

@@ -79,7 +79,7 @@ class _Path:
         self.is_angle = np.concatenate(
             [[True] * len(g.angles) + [False] * (len(g.slides) + 2 * len(g.bases)) for g in groups]
         ).astype(bool)
-        self.scale = np.where(self.is_angle, 1.0, size)[:, None]
+        self.size = size
         self.given = [(np.asarray(a, dtype=float), b) for a, b in zip(start.given, given, strict=True)]
         names = set(places) | set(start.places)
         self.places = {
@@ -118,6 +118,10 @@ class _Path:
         rows = [np.broadcast_to(v, shape) for index in self.indices for part in state.unknowns[index] for v in part]
         return np.stack(rows), state
 
+    def scale(self, table: Array) -> Array:
+        """What changes are measured by: radians, and the mechanism's size or a length beyond it."""
+        return np.where(self.is_angle[:, None], 1.0, np.maximum(self.size, np.abs(table)))
+
     def change(self, new: Array, old: Array) -> Array:
         """How far the unknowns moved, angles the short way round."""
         difference = new - old
@@ -149,7 +153,8 @@ def follow(
     slope = path.change(first, table) / BEGINNING
     slope = np.where(np.isfinite(slope).all(axis=0), slope, 0.0)
     done = np.zeros(count)
-    step = _planned(path, slope)
+    step = _planned(path, slope, table)
+    steady = np.ones(count, dtype=bool)
     moving = every
     for _ in range(MAX_ROUNDS):
         if not len(moving):
@@ -160,21 +165,24 @@ def follow(
         new, state = path.solve(moving, target, old + slope[:, moving] * taken)
         moved = path.change(new, old)
         with np.errstate(invalid="ignore"):
-            good = (np.abs(moved) <= MAX_CHANGE * path.scale).all(axis=0)
+            good = (np.abs(moved) <= MAX_CHANGE * path.scale(old)).all(axis=0)
         for converged, determinant, sign in zip(state.converged, state.determinants, path.signs, strict=True):
             good &= converged & (np.sign(determinant) == sign[moving])
         reached = moving[good]
         table[:, reached] = old[:, good] + moved[:, good]
         slope[:, reached] = moved[:, good] / taken[good]
         done[reached] = target[good]
-        step[reached] = np.minimum(_planned(path, slope[:, reached]), 2 * step[reached])
+        # Longer steps only after two in a row: before a singularity every second one is refused.
+        growth = np.where(steady[reached], 2.0, 1.0)
+        step[reached] = np.minimum(_planned(path, slope[:, reached], table[:, reached]), growth * step[reached])
         step[moving[~good]] = taken[~good] / 2
+        steady[moving] = good
         moving = moving[(done[moving] < 1) & (step[moving] >= SMALLEST_STEP)]
     return path.guess(table), done >= 1
 
 
-def _planned(path: _Path, slope: Array) -> Array:
+def _planned(path: _Path, slope: Array, table: Array) -> Array:
     """Step over which the unknowns change as much as is planned."""
-    speed = (np.abs(slope) / path.scale).max(axis=0)
+    speed = (np.abs(slope) / path.scale(table)).max(axis=0)
     with np.errstate(divide="ignore"):
         return np.asarray(np.minimum(1.0, PLANNED / speed))

@@ -100,6 +100,10 @@ def start_state(graph: Graph, structure: Structure, vectors: Vectors, given: Seq
         w.append(given[k])
     for slide, k in structure.known_slides:
         slides[slide] = given[k]
+    for k, coordinate in enumerate(structure.given):
+        # Half a point may stand in an expression before the other half is known.
+        if coordinate.kind in ("x", "y"):
+            nodes[coordinate.node] = vector(given[k], np.nan) if coordinate.kind == "x" else vector(np.nan, given[k])
     for node, x, y in structure.known_nodes:
         nodes[node] = vector(given[x], given[y])
     return State(graph, structure, vectors, w, nodes, rotations, ties, slides)

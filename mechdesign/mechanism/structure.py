@@ -327,6 +327,8 @@ def _group(
             paths[bases[-1]] = (bases[-1], ())
             continue
         pending.remove(k)
+    # Points that conditions place by themselves, before any link that bears them.
+    bases += sorted(free - paths.keys())
     form = _form(edges, roots, angles, slides, loops, conditions)
     return Group(form, angles, slides, tuple(loops), tuple(tree), conditions, tuple(bases))
 

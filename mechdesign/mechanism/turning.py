@@ -105,6 +105,7 @@ class _Fold:
             g = np.nan
         return np.append(errors, g)
 
+    @quiet
     def solve(self, scale: float) -> tuple[float, State] | None:
         """The coordinate's value at the fold, and the state there."""
         from scipy.optimize import root

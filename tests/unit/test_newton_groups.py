@@ -166,3 +166,23 @@ mechanism:
         back = mechanism.solve({name: forward[name] for name in names})
         for drive in mechanism.drives:
             assert back[drive] == pytest.approx(forward[drive], rel=1e-12)
+
+
+def test_expressions_of_points_place_them_before_any_link_does() -> None:
+    text = """
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [0.7, 1]}
+    leg: {from: O, to: E, telescopic: true}
+    arm: [E, P, 1.5]
+  joints: {clamp: {fixed: [leg, arm], point: E, angle: 74}}
+  drives: {turn: {angle: leg}, reach: {length: leg}}
+  sketch: {E: [1.2, 1.4], P: [0.1, 2.4]}
+  measures: {xy: "P.x * P.y", gap: {distance: [G, E]}, tip: "hypot(E.x, P.y)"}
+"""
+    mechanism = study_of(text).mechanism
+    drawn = mechanism.sketch_configuration
+    for given in (("P.x", "xy"), ("E.y", "xy"), ("xy", "gap"), ("E.y", "tip")):
+        found = mechanism.plan(given).solve([drawn.value(mechanism.coordinate(name)) for name in given])
+        assert found.valid
+        assert abs(found.point("P") - drawn.point("P")) == pytest.approx(0, abs=1e-12)
