@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.poses import CHUNK, radians
+from mechdesign.analyses.poses import CHUNK, dimensions, radians, starts
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.plan import Plan
@@ -63,7 +63,7 @@ def continuous(
     parts = _parts(plan, given, begins, ends)
     coarse = np.flatnonzero(neighbours & ((parts > 1) | (np.abs(moved) >= SURE).any(axis=0)))
     if len(coarse):
-        moved[:, coarse] = _on_the_way(plan, coordinates, given, begins[coarse], ends[coarse], parts[coarse])
+        moved[:, coarse] = _on_the_way(plan, coordinates, poses, given, begins[coarse], ends[coarse], parts[coarse])
     turns = np.round((angles[:, begins] + moved - angles[:, ends]) / (2 * np.pi))
     turns = np.concatenate([np.zeros((len(angles), 1)), np.where(together, turns, 0.0)], axis=1)
     total = np.cumsum(turns, axis=1)
@@ -93,7 +93,7 @@ def _parts(plan: Plan, given: Sequence[Array], begins: NDArray[np.intp], ends: N
 
 
 def _on_the_way(
-    plan: Plan, coordinates: Sequence[Coordinate], given: Sequence[Array],
+    plan: Plan, coordinates: Sequence[Coordinate], poses: Poses, given: Sequence[Array],
     begins: NDArray[np.intp], ends: NDArray[np.intp], parts: NDArray[np.intp],
 ) -> Array:  # fmt: skip
     """How far each angle turns between pairs of poses, shape (angles, pairs); nearest where the way does not close."""
@@ -108,7 +108,9 @@ def _on_the_way(
             pairs = at[first : first + max(1, CHUNK // (count + 1))]
             way = np.linspace(0.0, 1.0, count + 1)
             between = [v[begins[pairs], None] * (1 - way) + v[ends[pairs], None] * way for v in given]
-            configuration = plan.solve(between, limits=False)
+            rows = begins[pairs, None]
+            start = starts(plan.mechanism, poses, rows) if plan.iterative else None
+            configuration = plan.solve(between, dimensions(poses, rows), start=start, limits=False)
             shape = configuration.shape
             angles = np.stack([np.broadcast_to(configuration.value(c), shape) for c in coordinates])
             steps = wrap(np.diff(angles, axis=-1))
@@ -125,10 +127,10 @@ def _on_the_way(
 
 def _across(values: Array, turn: float, grid: Sequence[int]) -> Array:
     """Whole turns between the lines of a grid taken out, its last axis being continuous already."""
-    table = values.reshape(grid)
     for axis in range(len(grid) - 2, -1, -1):
-        for stack in table.reshape(-1, grid[axis], math.prod(grid[axis + 1 :])):
+        # Each design of several has a grid of its own.
+        for stack in values.reshape(-1, grid[axis], math.prod(grid[axis + 1 :])):
             for before, block in pairwise(stack):
                 jump = (block - before)[np.isfinite(block - before)][:1]
                 block -= turn * np.round(jump / turn).sum()
-    return table.reshape(-1)
+    return values

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses import targets
-from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.poses import dimensions, in_study_units, radians, starts
 from mechdesign.analyses.rates import drive_velocities
 from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.targets import Error
-from mechdesign.mechanism import Reason
+from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.plan import Plan
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -51,58 +54,65 @@ def extremes(
         See `mechdesign.mechanism.Reason`.
     """
     mechanism = study.mechanism
+    shape = (poses.designs, poses.count // poses.designs)
     names = [*(output.name for output in outputs), *(error.name for error in errors)]
     quantities = [*(output.quantity for output in outputs), *(error.quantity for error in errors)]
     curves = [*(arrays[output.name] for output in outputs), *(error.values for error in errors)]
-    at = poses.values[swept] if swept is not None else np.arange(poses.count, dtype=float)
+    at = poses.values[swept] if swept is not None else np.tile(np.arange(shape[1], dtype=float), shape[0])
     unit = study.units.label(mechanism.quantity(swept)) if swept is not None else ""
     turn = 2 * np.pi / study.units.angle_factor
-    full_turn = bool(
-        swept is not None
-        and mechanism.quantity(swept) == "angle"
-        and np.ptp(at) >= turn * (1 - 1e-9)
-        and not reason.any()
-    )
-    found = np.full((2, len(names), 2), np.nan)  # smallest and largest: value and place
-    index = np.zeros((2, len(names)), dtype=np.intp)
-    moving = np.zeros(len(names), dtype=bool)
+    full_turn = np.zeros(shape[0], dtype=bool)
+    if swept is not None and mechanism.quantity(swept) == "angle" and np.ptp(at) >= turn * (1 - 1e-9):
+        full_turn[:] = ~reason.reshape(shape).any(axis=1)
+    found = np.full((2, shape[0], len(names), 2), np.nan)  # smallest and largest: value and place
+    index = np.zeros((2, shape[0], len(names)), dtype=np.intp)
+    moving = np.zeros((shape[0], len(names)), dtype=bool)
+    first_row = np.arange(shape[0]) * shape[1]
     for k, (curve, quantity) in enumerate(zip(curves, quantities, strict=True)):
-        values = np.where(reason == Reason.OK, curve, np.nan)
-        if np.isfinite(values).any():
-            index[:, k] = np.nanargmin(values), np.nanargmax(values)
-            size = {"length": mechanism.size, "angle": turn}.get(quantity, 0.0)
-            moving[k] = np.nanmax(values) - np.nanmin(values) > STILL * max(float(np.nanmax(np.abs(values))), size)
-            if not moving[k]:
-                index[:, k] = np.flatnonzero(np.isfinite(values))[0]
-            found[:, k, 0], found[:, k, 1] = values[index[:, k]], at[index[:, k]]
-    rows = np.flatnonzero(moving)
+        values = np.where(reason == Reason.OK, curve, np.nan).reshape(shape)
+        known = np.isfinite(values)
+        some = known.any(axis=1)
+        low, high = np.where(known, values, np.inf), np.where(known, values, -np.inf)
+        size = {"length": mechanism.size, "angle": turn}.get(quantity, 0.0)
+        with np.errstate(invalid="ignore"):
+            scale = np.maximum(np.where(known, np.abs(values), 0.0).max(axis=1), size)
+            moving[:, k] = some & (high.max(axis=1) - low.min(axis=1) > STILL * scale)
+        still = known.argmax(axis=1)
+        for end, best in enumerate((low.argmin(axis=1), high.argmax(axis=1))):
+            rows = first_row + np.where(moving[:, k], best, still)
+            index[end, :, k] = rows
+            found[end, some, k, 0], found[end, some, k, 1] = values.ravel()[rows[some]], at[rows[some]]
     if swept is not None:
-        of_outputs, of_errors = rows[rows < len(outputs)], rows[rows >= len(outputs)]
+        design, which = np.nonzero(moving)
         for k, sign in enumerate((1, -1)):
-            which = [outputs[j] for j in of_outputs]
-            found[k, of_outputs] = _refined(
-                study, which, poses, swept, index[k, of_outputs], sign, full_turn, found[k, of_outputs]
-            )
-            wanted = [errors[j - len(outputs)] for j in of_errors]
-            found[k, of_errors] = _refined_errors(
-                study, wanted, arrays, poses, swept, index[k, of_errors], sign, found[k, of_errors]
-            )
-    span = found[1, :, 0] - found[0, :, 0]
-    ratio = np.full(len(names), np.nan)
-    if full_turn:
-        part = np.where(moving, (found[1, :, 1] - found[0, :, 1]) % turn, np.nan)
-        with np.errstate(divide="ignore"):
-            ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
-        ratio[~np.isfinite(ratio)] = np.nan
+            for of_errors in (False, True):
+                mine = (which >= len(outputs)) == of_errors
+                lanes = design[mine], which[mine]
+                if not mine.any():
+                    continue
+                # Targets may be known within the sweep only.
+                sweep = _Sweep(study, poses, swept, index[k][lanes], full_turn[lanes[0]] & (not of_errors))
+                sampled = found[k][lanes]
+                if of_errors:
+                    found[k][lanes] = _refined_errors(sweep, errors, lanes[1] - len(outputs), arrays, sign, sampled)
+                else:
+                    found[k][lanes] = _refined(sweep, outputs, lanes[1], sign, sampled)
+    low_ends, high_ends = found.reshape(2, -1, 2)
+    span = high_ends[:, 0] - low_ends[:, 0]
+    timed = moving.ravel() & np.repeat(full_turn, len(names))
+    part = np.where(timed, (high_ends[:, 1] - low_ends[:, 1]) % turn, np.nan)
+    with np.errstate(divide="ignore"):
+        ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
+    ratio[~np.isfinite(ratio)] = np.nan
     where = f"{swept or 'row'} at the"
     return Table(
         "extremes",
         (
-            Column("output", np.array(names), "", "output or error, in its own unit"),
-            Column("min", found[0, :, 0], "", "smallest value over the motion"),
-            Column("min_at", found[0, :, 1], unit, f"{where} smallest value"),
-            Column("max", found[1, :, 0], "", "largest value over the motion"),
-            Column("max_at", found[1, :, 1], unit, f"{where} largest value"),
+            Column("output", np.tile(np.array(names), shape[0]), "", "output or error, in its own unit"),
+            Column("min", low_ends[:, 0], "", "smallest value over the motion"),
+            Column("min_at", low_ends[:, 1], unit, f"{where} smallest value"),
+            Column("max", high_ends[:, 0], "", "largest value over the motion"),
+            Column("max_at", high_ends[:, 1], unit, f"{where} largest value"),
             Column("range", span, "", "max - min"),
             Column("time_ratio", ratio, "", "longer over shorter time between the extremes, constant speed"),
         ),
@@ -110,45 +120,90 @@ def extremes(
     )
 
 
-def _refined(
-    study: Study, outputs: Sequence[Coordinate], poses: Poses, swept: str, index: NDArray[np.intp], sign: int,
-    full_turn: bool, sampled: Array,
-) -> Array:  # fmt: skip
+@dataclass(frozen=True, eq=False)
+class _Sweep:
+    """Lanes of a sweep, each beside one pose.
+
+    Parameters
+    ----------
+    index : ndarray of int, shape (lanes,)
+        The pose.
+    full_turn : ndarray of bool, shape (lanes,)
+        Whether the ends of the sweep are one pose.
+    """
+
+    study: Study
+    poses: Poses
+    swept: str
+    index: NDArray[np.intp]
+    full_turn: NDArray[np.bool_]
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Plan of the coordinates given."""
+        return self.study.mechanism.plan(self.poses.groups[0].names)
+
+    @cached_property
+    def swept_at(self) -> int:
+        """Which of the given coordinates moves."""
+        return self.poses.groups[0].names.index(self.swept)
+
+    @cached_property
+    def given(self) -> list[Array]:
+        """Values of the given coordinates at the poses, in the study's units."""
+        return [np.asarray(values, dtype=float)[self.index] for values in self.poses.groups[0].columns()]
+
+    @cached_property
+    def start(self) -> Configuration:
+        """The poses."""
+        start = starts(self.plan.mechanism, self.poses, self.index) if self.plan.iterative else None
+        return self._solve(self.given, self.index, start)
+
+    def _solve(self, given: Sequence[Array], index: NDArray[np.intp], start: Configuration | None) -> Configuration:
+        values = [radians(self.study, c, v) for c, v in zip(self.plan.structure.given, given, strict=True)]
+        return self.plan.solve(values, dimensions(self.poses, index), start=start)
+
+    def solve(self, lane: NDArray[np.intp], place: Array) -> Configuration:
+        """Some lanes with the swept coordinate elsewhere, in the study's units."""
+        given = [values[lane] for values in self.given]
+        given[self.swept_at] = place
+        return self._solve(given, self.index[lane], self.start.take(lane))
+
+    def beside(self) -> tuple[Array, Array]:
+        """The swept coordinate at the poses before and after, in rising order; at an end, the pose itself."""
+        at = self.poses.groups[0].values[self.swept]
+        line = self.poses.count // self.poses.designs
+        row = self.index % line
+        before, after = at[self.index - (row > 0)], at[self.index + (row < line - 1)]
+        before = np.where(self.full_turn & (row == 0), at[0] - (at[line - 1] - at[line - 2]), before)
+        after = np.where(self.full_turn & (row == line - 1), at[line - 1] + (at[1] - at[0]), after)
+        return np.minimum(before, after), np.maximum(before, after)
+
+
+def _refined(sweep: _Sweep, outputs: Sequence[Coordinate], which: NDArray[np.intp], sign: int, sampled: Array) -> Array:
     """Extremes where the derivative by the swept coordinate is zero, beside the pose that is the best of all.
 
-    `sampled` and the answer hold a value and a place a row. Where the derivative does not change its sign beside the
-    pose (an extreme at the end of the sweep, or beside a pose that fails) the row stays. `sign` is 1 for the smallest
-    values, -1 for the largest.
+    `sampled` and the answer hold a value and a place a lane, `which` its output. Where the derivative does not change
+    its sign beside the pose (an extreme at the end of the sweep, or beside a pose that fails) the row stays. `sign` is
+    1 for the smallest values, -1 for the largest.
     """
-    if not outputs:
-        return sampled
-    mechanism, group = study.mechanism, poses.groups[0]
-    plan = mechanism.plan(group.names)
-    drive = mechanism.coordinate(swept)
-    unit = [float(name == swept) for name in group.names]
-    lanes = np.arange(len(outputs))
-    at = np.asarray(radians(study, drive, group.values[swept]), dtype=float)
-    before, after = at[np.maximum(index - 1, 0)], at[np.minimum(index + 1, len(at) - 1)]
-    if full_turn:
-        before = np.where(index == 0, at[0] - (at[-1] - at[-2]), before)
-        after = np.where(index == len(at) - 1, at[-1] + (at[1] - at[0]), after)
-    low, high = np.minimum(before, after), np.maximum(before, after)
-    given = [
-        np.asarray(radians(study, c, v), dtype=float)[index]
-        for c, v in zip(plan.structure.given, group.columns(), strict=True)
-    ]
-    start = plan.solve(given)
+    study, mechanism, plan = sweep.study, sweep.study.mechanism, sweep.plan
+    drive = mechanism.coordinate(sweep.swept)
+    unit = [float(name == sweep.swept) for name in sweep.poses.groups[0].names]
+    lanes = np.arange(len(which))
+    at = np.asarray(radians(study, drive, sweep.given[sweep.swept_at]), dtype=float)
+    low, high = (np.asarray(radians(study, drive, end), dtype=float) for end in sweep.beside())
 
     def solve(lane: NDArray[np.intp], place: Array) -> tuple[Array, Array]:
         """Value of some lanes' output and its derivative by the swept coordinate, times `sign`."""
-        some = [values[lane] for values in given]
-        some[group.names.index(swept)] = place
-        configuration = plan.solve(some, start=start.take(lane))
+        configuration = sweep.solve(lane, np.asarray(in_study_units(study, drive, place)))
         linear = mechanism.linearize(configuration)
         velocity = linear.velocity(drive_velocities(mechanism, linear, plan.structure.given, unit))
-        asked = [outputs[k] for k in lane.tolist()]
-        value = [np.broadcast_to(configuration.value(o), lane.shape)[k] for k, o in enumerate(asked)]
-        slope = [np.broadcast_to(first(configuration, o, velocity), lane.shape)[k] for k, o in enumerate(asked)]
+        value, slope = np.empty(lane.shape), np.empty(lane.shape)
+        for k in np.unique(which[lane]):
+            mine = which[lane] == k
+            value[mine] = np.broadcast_to(configuration.value(outputs[k]), lane.shape)[mine]
+            slope[mine] = np.broadcast_to(first(configuration, outputs[k], velocity), lane.shape)[mine]
         valid = configuration.valid
         return np.where(valid, value, np.nan), sign * np.where(valid, slope, np.nan)
 
@@ -166,44 +221,38 @@ def _refined(
     )  # fmt: skip
     value[moving] = solve(moving, place[moving])[0]
     # Where the pose itself is the extreme, its place is kept as the study gives it.
-    turns &= np.isfinite(value) & (np.abs(place - at[index]) > 1e-9 * step)
-    if full_turn:
-        begin, end = min(at[0], at[-1]), max(at[0], at[-1])
-        place = np.where(place < begin, place + 2 * np.pi, np.where(place > end, place - 2 * np.pi, place))
-    answer = sampled.copy()
+    turns &= np.isfinite(value) & (np.abs(place - at) > 1e-9 * step)
+    ends = np.asarray(radians(study, drive, sweep.poses.groups[0].values[sweep.swept]), dtype=float)
+    begin, end = ends.min(), ends.max()
+    around = np.where(place < begin, place + 2 * np.pi, np.where(place > end, place - 2 * np.pi, place))
+    place = np.where(sweep.full_turn, around, place)
     turn = 2 * np.pi / study.units.angle_factor
-    for k in np.flatnonzero(turns).tolist():
-        answer[k] = in_study_units(study, outputs[k], value[k]), in_study_units(study, drive, place[k])
-        if outputs[k].quantity == "angle":
-            # Continuous with the poses beside it.
-            answer[k, 0] += turn * round((sampled[k, 0] - answer[k, 0]) / turn)
-    return answer
+    place = np.asarray(in_study_units(study, drive, place))
+    angular = np.array([output.quantity == "angle" for output in outputs])[which]
+    value = np.where(angular, value / study.units.angle_factor, value)
+    # Continuous with the poses beside it.
+    value = np.where(angular, value + turn * np.round((sampled[:, 0] - value) / turn), value)
+    return np.where(turns[:, None], np.stack([value, place], axis=1), sampled)
 
 
 def _refined_errors(
-    study: Study, asked: Sequence[Error], arrays: Mapping[str, Array], poses: Poses, swept: str,
-    index: NDArray[np.intp], sign: int, sampled: Array,
+    sweep: _Sweep, asked: Sequence[Error], which: NDArray[np.intp], arrays: Mapping[str, Array], sign: int,
+    sampled: Array,
 ) -> Array:  # fmt: skip
     """Extremes of errors between the poses beside the best one of all, by golden section.
 
     A lane's row stays where nothing better is found: beside a pose that fails, or where a target is given a pose.
     """
-    if not asked:
-        return sampled
-    mechanism, group = study.mechanism, poses.groups[0]
-    plan = mechanism.plan(group.names)
+    study, poses = sweep.study, sweep.poses
+    mechanism = study.mechanism
     watched = [mechanism.coordinate(name) for name in targets.needed(study, poses)]
     turn = 2 * np.pi / study.units.angle_factor
-    given = [np.asarray(values, dtype=float)[index] for values in group.columns()]
-    start = plan.solve([radians(study, c, v) for c, v in zip(plan.structure.given, given, strict=True)])
+    every = np.arange(len(which))
 
     def error(place: Array) -> Array:
         """Each lane's error, times `sign`; infinite where it has none."""
-        given[group.names.index(swept)] = place
-        held = dict(zip(group.names, given, strict=True))
-        solved = plan.solve(
-            [radians(study, c, v) for c, v in zip(plan.structure.given, given, strict=True)], start=start
-        )
+        solved = sweep.solve(every, place)
+        held = dict(zip(poses.groups[0].names, sweep.given, strict=True)) | {sweep.swept: place}
         values = {}
         for c in watched:
             value = held.get(c.name)
@@ -211,16 +260,15 @@ def _refined_errors(
                 value = np.broadcast_to(np.asarray(in_study_units(study, c, solved.value(c))), place.shape)
                 if c.quantity == "angle":
                     # Continuous with the pose itself.
-                    value = value + turn * np.round((arrays[c.name][index] - value) / turn)
+                    value = value + turn * np.round((arrays[c.name][sweep.index] - value) / turn)
             values[c.name] = value
-        known = {found.name: found.values for found in targets.errors(study, poses, values, None)}
-        none = np.full(place.shape, np.nan)
-        own = np.array([known.get(one.name, none)[lane] for lane, one in enumerate(asked)])
+        own = np.full(place.shape, np.nan)
+        for found in targets.errors(study, poses, values, sweep.index, between=True):
+            mine = np.array([one.name == found.name for one in asked])[which]
+            own[mine] = found.values[mine]
         return np.where(solved.valid & np.isfinite(own), sign * own, np.inf)
 
-    at = group.values[swept]
-    one, other = at[np.maximum(index - 1, 0)], at[np.minimum(index + 1, len(at) - 1)]
-    low, high = np.minimum(one, other), np.maximum(one, other)
+    low, high = sweep.beside()
     for _ in range(SECTIONS):
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         lower = error(left) < error(right)
@@ -229,6 +277,6 @@ def _refined_errors(
     value = sign * error(place)
     # Where the pose itself is the extreme its place is kept as the study gives it: beside it values are equal.
     size = {"length": mechanism.size, "angle": turn}
-    rounding = STILL * np.array([size.get(one.quantity, 0.0) for one in asked])
+    rounding = STILL * np.array([size.get(one.quantity, 0.0) for one in asked])[which]
     better = np.isfinite(value) & (sign * (sampled[:, 0] - value) > rounding)
     return np.where(better[:, None], np.stack([value, place], axis=1), sampled)

@@ -20,6 +20,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
+from mechdesign.study.poses import Poses
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
@@ -68,12 +69,8 @@ def kinematics(
     motion = move(question, progress)
     warnings, failed = judge_failures(study, poses, motion.reason)
     warnings += _conditioning(motion) + _stalled(motion) + targets.gaps(study, motion.errors, poses, motion.valid)
-    columns = motion.columns()
-    tables = {"motion": Table("motion", tuple(columns), "positions, velocities and accelerations per pose")}
-    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
-    swept = moving[0] if not poses.listed and len(moving) == 1 else None
-    tables["extremes"] = extremes(study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason)
-    limits = None
+    tables = {"motion": motion_table(motion), "extremes": extremes_table(motion)}
+    swept, limits = swept_of(poses), None
     if swept is not None:
         group, reason = poses.groups[0], motion.reason
         limits = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
@@ -81,9 +78,9 @@ def kinematics(
         warnings += limits.warnings
     tables |= loop_tables(study, poses, limits)
     if motion.errors:
-        tables["targets"] = targets.table(study, motion.errors, poses, swept, motion.valid)
+        tables["targets"] = targets_table(motion)
     if question.square:
-        tables["jacobian"] = _jacobian(motion)
+        tables["jacobian"] = jacobian_table(motion)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(motion.reason))}
     if all_modes:
         tables["modes"], told, counts["modes"] = _modes(question, motion)
@@ -112,7 +109,31 @@ def _modes(question: Asked, drawn: Motion) -> tuple[Table, list[str], int]:
     return Table("modes", tuple(columns), "the motion of every assembly mode"), warnings, len(parts)
 
 
-def _jacobian(motion: Motion) -> Table:
+def swept_of(poses: Poses) -> str | None:
+    """The one coordinate that moves along a sweep; None of listed poses, and where several do."""
+    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
+    return moving[0] if not poses.listed and len(moving) == 1 else None
+
+
+def motion_table(motion: Motion) -> Table:
+    """Every pose with all outputs."""
+    return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
+
+
+def extremes_table(motion: Motion) -> Table:
+    """Smallest and largest values; see `mechdesign.analyses.extremes.extremes`."""
+    question, poses = motion.asked, motion.asked.poses
+    swept = swept_of(poses)
+    return extremes(question.study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason)
+
+
+def targets_table(motion: Motion) -> Table:
+    """Errors against the targets."""
+    poses = motion.asked.poses
+    return targets.table(motion.asked.study, motion.errors, poses, swept_of(poses), motion.valid)
+
+
+def jacobian_table(motion: Motion) -> Table:
     """Every entry of the Jacobian, a row a pose."""
     question = motion.asked
     columns = motion.pose_columns()

@@ -12,6 +12,7 @@ from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.variant import drawn
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -64,7 +65,9 @@ def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
         whole = [radians(study, c, v) for c, v in zip(plan.structure.given, group.columns(), strict=True)]
         for begin in range(0, len(group.rows), CHUNK):
             given = [values[begin : begin + CHUNK] for values in whole]
-            configuration = plan.solve(given)
+            rows = group.rows[begin : begin + CHUNK]
+            start = starts(mechanism, poses, rows) if plan.iterative else None
+            configuration = plan.solve(given, dimensions(poses, rows), start=start)
             known: dict[str, Value] = dict(zip(group.names, given, strict=True))
             drives = tuple(
                 np.broadcast_to(
@@ -73,7 +76,21 @@ def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
                 )
                 for name in mechanism.drives
             )
-            yield SolvedPoses(group.rows[begin : begin + CHUNK], group.names, configuration, drives)
+            yield SolvedPoses(rows, group.names, configuration, drives)
+
+
+def dimensions(poses: Poses, rows: NDArray[np.intp]) -> dict[str, Value]:
+    """Dimensions of the designs that some poses belong to, where they differ from the nominal ones; shape of `rows`."""
+    return {name: values[rows] for name, values in poses.places.items()}
+
+
+def starts(mechanism: Mechanism, poses: Poses, rows: NDArray[np.intp]) -> Configuration | None:
+    """Where poses of other designs without a closed form start: their own assembled sketch, shape of `rows`."""
+    if not poses.places:
+        return None
+    each = poses.count // poses.designs
+    designs, which = np.unique(rows // each, return_inverse=True)
+    return drawn(mechanism, dimensions(poses, designs * each)).take(which.reshape(rows.shape))
 
 
 def pose_columns(study: Study, poses: Poses) -> list[Column]:

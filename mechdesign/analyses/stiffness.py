@@ -31,7 +31,7 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Result
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.stiffness_models import StiffnessSection
@@ -87,14 +87,44 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     """
     asked = ask(study)
     poses = study.poses("stiffness")
-    size = asked.size
-    matrices = {name: np.full((poses.count, size, size), np.nan) for name in ("K", "C")}
+    progress.start(poses.count, "poses")
+    found = solve(study, asked, poses, jobs, progress)
+    warnings, failed = judge_failures(study, poses, found.reason)
+    known = np.isfinite(found.matrices["K"]).all(axis=(1, 2)) | np.isfinite(found.matrices["C"]).all(axis=(1, 2))
+    warnings += _cautions(study, poses, asked, known | (found.rank > 0), found.rank, found.margin)
+    counts = {"poses": poses.count, "invalid": int(np.count_nonzero(found.reason))}
+    return Result("stiffness", tables(study, asked, poses, found), warnings, counts, failed)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """How the body is held in every pose; see `mechdesign.analyses.compliance.Held`.
+
+    Parameters
+    ----------
+    matrices : dict of str to ndarray, shape (poses, size, size)
+        K and C.
+    reason : int8 array, shape (poses,)
+        See `mechdesign.mechanism.Reason`.
+    """
+
+    matrices: dict[str, Array]
+    rank: NDArray[np.intp]
+    free: Array
+    margin: Array
+    reason: NDArray[np.int8]
+    springs: list[Springs]
+
+
+def solve(study: Study, asked: Asked, poses: Poses, jobs: int | None = 1, progress: Progress = NULL) -> Found:
+    """Solve all poses; one that cannot be assembled is nan."""
+    shape = (poses.count, asked.size, asked.size)
+    matrices = {name: np.full(shape, np.nan) for name in ("K", "C")}
     rank = np.zeros(poses.count, dtype=np.intp)
-    free = np.full((poses.count, size), np.nan)
+    free = np.full(shape[:2], np.nan)
     margin = np.full(poses.count, np.inf)
     reason = np.zeros(poses.count, dtype=np.int8)
     springs: list[Springs] = []
-    progress.start(poses.count, "poses")
     for solved in solve_poses(study, poses):
         configuration = solved.configuration
         reason[solved.rows] = configuration.reason
@@ -109,18 +139,20 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             rank[rows], free[rows], margin[rows] = held.rank, held.free, held.margin
             springs += [Springs(rows[s.row], s.leg, s.stiffness, s.place, s.angle) for s in found]
             progress.update(len(index))
-    warnings, failed = judge_failures(study, poses, reason)
-    known = np.isfinite(matrices["K"]).all(axis=(1, 2)) | np.isfinite(matrices["C"]).all(axis=(1, 2)) | (rank > 0)
-    warnings += _cautions(study, poses, asked, known, rank, margin)
-    tables = [
-        stiffness_table(study, poses, matrices["K"], matrices["C"], rank, free, reason == 0),
-        compliance_table(study, poses, matrices["C"]),
-        springs_table(study, poses, asked.legs, springs),
+    return Found(matrices, rank, free, margin, reason, springs)
+
+
+def tables(study: Study, asked: Asked, poses: Poses, found: Found) -> dict[str, Table]:
+    """Tables ``stiffness``, ``compliance``, ``springs`` and, with loads, ``deflections``."""
+    stiff, soft = found.matrices["K"], found.matrices["C"]
+    made = [
+        stiffness_table(study, poses, stiff, soft, found.rank, found.free, found.reason == 0),
+        compliance_table(study, poses, soft),
+        springs_table(study, poses, asked.legs, found.springs),
     ]
     if asked.section.loads:
-        tables.append(deflections_table(study, poses, np.array(asked.section.loads), matrices["C"]))
-    counts = {"poses": poses.count, "invalid": int(np.count_nonzero(reason))}
-    return Result("stiffness", {table.name: table for table in tables}, warnings, counts, failed)
+        made.append(deflections_table(study, poses, np.array(asked.section.loads), soft))
+    return {table.name: table for table in made}
 
 
 def ask(study: Study) -> Asked:

@@ -56,19 +56,23 @@ def needed(study: Study, poses: Poses) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def errors(study: Study, poses: Poses, values: Mapping[str, Array], rows: NDArray[np.intp] | None) -> Iterator[Error]:
+def errors(
+    study: Study, poses: Poses, values: Mapping[str, Array], rows: NDArray[np.intp], *, between: bool = False
+) -> Iterator[Error]:
     """Errors of all targets, a point's x and y before its distance.
 
     Parameters
     ----------
     values : mapping of str to ndarray, shape (n,)
         The coordinates of `needed` in the study's units, angles continuous where they are so in the results.
-    rows : ndarray of int, shape (n,), or None
-        The pose of each value; None for values between the poses, where targets that are given a pose have none.
+    rows : ndarray of int, shape (n,)
+        The pose of each value.
+    between : bool
+        Whether they are values beside those poses, where targets that are given a pose have none.
     """
     turn = 2 * np.pi / study.units.angle_factor
     for target in study.targets.values():
-        wanted = _wanted(study, target, poses, values, rows)
+        wanted = _wanted(study, target, poses, values, rows, between)
         if wanted is None:
             continue
         parts = []
@@ -84,11 +88,12 @@ def errors(study: Study, poses: Poses, values: Mapping[str, Array], rows: NDArra
 
 
 def _wanted(
-    study: Study, target: Target, poses: Poses, values: Mapping[str, Array], rows: NDArray[np.intp] | None
+    study: Study, target: Target, poses: Poses, values: Mapping[str, Array], rows: NDArray[np.intp], between: bool
 ) -> Sequence[Array] | None:
     """What each coordinate of a target should be; None where that is not known between the poses."""
     if target.expression is not None:
-        env: dict[str, ArrayLike] = {**study.parameters.nominal, **values}
+        varied = {name: column[rows] for name, column in poses.parameters.items()}
+        env: dict[str, ArrayLike] = {**study.parameters.nominal, **varied, **values}
         return [np.asarray(target.expression.evaluate(env), dtype=float) + 0 * values[target.owner]]
     table = target.table
     assert table is not None
@@ -97,8 +102,8 @@ def _wanted(
         assert drive is not None
         turn = 2 * np.pi / study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else None
         return _interpolated(table, values[drive], turn)
-    if len(table) == poses.count:
-        return None if rows is None else list(table[rows].T)
+    if len(table) == poses.count // poses.designs:
+        return None if between else list(table[rows % len(table)].T)
     x, y = (values[name] for name in target.coordinates)
     foot = nearest(x + 1j * y, table[:, 0] + 1j * table[:, 1])
     return [foot.real, foot.imag]
@@ -145,31 +150,31 @@ def nearest(points: NDArray[np.complex128], corners: NDArray[np.complex128]) -> 
 
 
 def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None, valid: NDArray[np.bool_]) -> Table:
-    """Mean and largest errors over the valid poses that have a target."""
-    at = poses.values[swept] if swept is not None else np.arange(poses.count, dtype=float)
-    rows: list[tuple[float, ...]] = []
-    for error in found:
-        known = np.flatnonzero(valid & np.isfinite(error.values))
-        values = error.values[known]
-        if not len(known):
-            rows.append((np.nan,) * 4)
-            continue
-        worst = int(np.argmax(np.abs(values)))
-        rows.append(
-            (
-                float(np.sqrt(np.mean(values**2))),
-                float(np.mean(values)),
-                abs(float(values[worst])),
-                float(at[known[worst]]),
-            )
+    """Mean and largest errors of each design over the valid poses that have a target."""
+    shape = (poses.designs, poses.count // poses.designs)
+    at = poses.values[swept] if swept is not None else np.tile(np.arange(shape[1], dtype=float), shape[0])
+    found_at = np.full((4, poses.designs, len(found)), np.nan)
+    for k, error in enumerate(found):
+        known = (valid & np.isfinite(error.values)).reshape(shape)
+        some = known.any(axis=1)
+        values = np.where(known, error.values.reshape(shape), 0.0)[some]
+        count = known[some].sum(axis=1)
+        worst = np.where(known[some], np.abs(values), -1.0).argmax(axis=1)
+        lane = np.arange(len(worst))
+        found_at[:, some, k] = (
+            np.sqrt((values**2).sum(axis=1) / count),
+            values.sum(axis=1) / count,
+            np.abs(values[lane, worst]),
+            at.reshape(shape)[some][lane, worst],
         )
-    rms, mean, largest, where = np.array(rows, dtype=float).reshape(-1, 4).T
+    rms, mean, largest, where = found_at.reshape(4, -1)
     unit = study.units.label(study.mechanism.quantity(swept)) if swept is not None else ""
-    units = np.array([study.units.label(error.quantity) for error in found], dtype=str)
+    units = np.tile(np.array([study.units.label(error.quantity) for error in found], dtype=str), poses.designs)
+    outputs = np.tile(np.array([error.output for error in found], dtype=str), poses.designs)
     return Table(
         "targets",
         (
-            Column("output", np.array([error.output for error in found], dtype=str), "", "what has a target"),
+            Column("output", outputs, "", "what has a target"),
             Column("rms", rms, "", "root of the mean square of the error (of a point: of its distance from the path)"),
             Column("mean", mean, "", "mean error"),
             Column("max_abs", largest, "", "largest absolute error"),

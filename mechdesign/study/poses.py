@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description
@@ -44,7 +44,7 @@ class PoseGroup:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """All poses of a question.
+    """All poses of a question; of several designs, one design's after the other's.
 
     Parameters
     ----------
@@ -56,12 +56,19 @@ class Poses:
         Whether a person listed these very poses, so that one that fails is an error.
     grid : tuple of int
         Number of values along each swept coordinate; the last varies fastest. One number for lists and paths.
+    designs : int
+        Each has as many poses.
+    places, parameters : mapping of str to ndarray, shape (count,)
+        Where designs differ from the study's own: dimensions (lengths, radians), and parameters in the study's units.
     """
 
     groups: tuple[PoseGroup, ...]
     count: int
     listed: bool
     grid: tuple[int, ...]
+    designs: int = 1
+    places: Mapping[str, Floats] = field(default_factory=dict)
+    parameters: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -76,6 +83,26 @@ class Poses:
             for name in group.names:
                 columns[name][group.rows] = group.values[name]
         return columns
+
+
+def stacked(poses: Poses, designs: int, places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> Poses:
+    """The same poses of several designs; places and parameters of shape (designs,)."""
+
+    def each(values: Mapping[str, ArrayLike]) -> dict[str, Floats]:
+        return {
+            name: np.repeat(np.broadcast_to(np.asarray(value, dtype=float), designs), poses.count)
+            for name, value in values.items()
+        }
+
+    first = poses.count * np.arange(designs)[:, None]
+    groups = tuple(
+        PoseGroup(
+            group.names, {name: np.tile(v, designs) for name, v in group.values.items()}, (first + group.rows).ravel()
+        )
+        for group in poses.groups
+    )
+    count = poses.count * designs
+    return Poses(groups, count, poses.listed, poses.grid, designs, each(places), each(parameters))
 
 
 def sweep_values(sweep: Sweep) -> Floats:
