@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.indices import local_indices
+from mechdesign.analyses.indices.local import Entries, Local
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
@@ -135,13 +135,14 @@ class Field:
     def _determinants(self, configuration: Configuration) -> list[Value]:
         return determinants(self.mechanism.linearize(configuration))
 
-    def indices(self, z: NDArray[np.complex128], places: Places) -> tuple[Value, Value, Value]:
-        """Inverse condition, resistivity and determinant of the Jacobian at points `z`."""
+    def local(self, z: NDArray[np.complex128], places: Places) -> Local:
+        """What local indices at points `z` are computed from."""
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             configuration = self.configuration(z, places)
-            return local_indices(self._jacobian(configuration))
+            return Local(configuration, *self._jacobian(configuration))
 
-    def _jacobian(self, configuration: Configuration) -> list[list[Value]]:
+    def _jacobian(self, configuration: Configuration) -> tuple[Entries, Entries]:
+        """The Jacobian per radian, and with angles as lengths where there is a characteristic length."""
         linear = self.mechanism.linearize(configuration)
         rest = [0.0] * len(linear.structure.edges)
         drives = linear.structure.given
@@ -150,13 +151,8 @@ class Field:
         ]
         jacobian: list[list[Value]] = [[first(configuration, out, rates) for rates in columns] for out in self.outputs]
         if self.length is None:
-            return jacobian
+            return jacobian, jacobian
         rows = [self.length if out.quantity == "angle" else 1.0 for out in self.outputs]
         scale = [1 / self.length if drive.quantity == "angle" else 1.0 for drive in drives]
-        return [[entry * r * c for entry, c in zip(row, scale, strict=True)]
-                for row, r in zip(jacobian, rows, strict=True)]  # fmt: skip
-
-    def mixed(self) -> bool:
-        """Whether lengths and angles mix among the outputs or among the drives."""
-        kinds = {out.quantity for out in self.outputs}
-        return len(kinds) > 1 or len({c.quantity for c in self.mechanism.forward.structure.given}) > 1
+        return jacobian, [[entry * r * c for entry, c in zip(row, scale, strict=True)]
+                          for row, r in zip(jacobian, rows, strict=True)]  # fmt: skip

@@ -9,7 +9,7 @@ from importlib import import_module
 import numpy as np
 
 from mechdesign.analyses.rays import Floats
-from mechdesign.analyses.region import BRISK, GRID_TOLERANCE, INDICES, Answer, Question, answer, questions
+from mechdesign.analyses.region import BRISK, GRID_TOLERANCE, Answer, Question, answer, batched, questions
 from mechdesign.errors import MechdesignError, Problem, StudyError
 from mechdesign.results import Result
 from mechdesign.study import Study, load
@@ -41,7 +41,7 @@ class Goal:
     @property
     def index(self) -> bool:
         """Whether it is an index of the workspace, evaluated for many designs at once."""
-        return self.command == "workspace" and self.column in INDICES and not self.where
+        return self.command == "workspace" and batched(self.column) and not self.where
 
     def worst(self, result: Result) -> float:
         """The value of the worst row; nan where a row has none.
@@ -103,7 +103,8 @@ class Evaluator:
         self.goals = list(goals)
         self.question: Question | None = None
         if any(goal.index for goal in goals):
-            asked = questions(study, GRID_TOLERANCE)
+            columns = dict.fromkeys(("area", *(goal.column for goal in goals if goal.index)))
+            asked = questions(study, GRID_TOLERANCE, tuple(columns))
             if len(asked) > 1:
                 message = "an optimisation compares one workspace a design: hold one value of each coordinate"
                 raise StudyError((Problem(message, "workspace.at", str(study.path or "")),))

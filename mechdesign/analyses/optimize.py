@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.designs import best, grid, in_words, most_common, normalised
 from mechdesign.analyses.goals import Evaluated, Evaluator, Goal, bounds_of, goal
 from mechdesign.analyses.rays import Floats
-from mechdesign.analyses.region import GRID_TOLERANCE, INDICES, questions
+from mechdesign.analyses.region import GRID_TOLERANCE, questions
 from mechdesign.analyses.workspace import index_meanings
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.parallel import map_chunks
@@ -219,4 +219,4 @@ def _warnings(study: Study, designs: _Designs) -> Iterator[str]:
             yield f"{name} of {int(loose.sum())} designs is not known to the tolerance asked for; see {name}_error"
 
 
-__all__ = ["INDICES", "optimize"]
+__all__ = ["optimize"]

@@ -14,10 +14,13 @@ The error estimate adds the errors along each ray by absolute value to those in 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mechdesign.analyses.integrands import Integrand
 from mechdesign.analyses.panels import Panels
 from mechdesign.analyses.radial import BLOCK, RADII, along, evaluate, pieces
 from mechdesign.analyses.rays import Designs, Floats, Ints, trace
@@ -29,6 +32,8 @@ MOST_PASSES = 24
 MOST_HALVINGS = 12
 # Shares of the tolerance: of errors along all rays, and of the area (the divisor of every mean).
 ALONG, AREA = 0.6, 0.1
+# The area is integrated at least to this relative tolerance.
+FINEST_AREA = 1e-6
 # Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
 SINGLE = 0.01
 
@@ -41,8 +46,8 @@ class Integral:
     ----------
     area, area_error : ndarray, shape (designs,)
         Area of the region.
-    mean, mean_error : ndarray, shape (2, designs)
-        Means of inverse condition and resistivity over the region within the margins of the scan; nan where empty.
+    mean, mean_error : ndarray, shape (integrands, designs)
+        Means over the region within the margins of the scan; nan where empty, infinite where the integral is.
     boundary : (design, angle, radius)
         Points of the boundary that were met.
     """
@@ -79,16 +84,24 @@ def _join(one: _Cells, other: _Cells) -> _Cells:
 
 
 def integrate(
-    designs: Designs, panels: Panels, tolerance: float, samples: int, counted: tuple[float, float], means: bool = True
+    designs: Designs,
+    panels: Panels,
+    tolerance: float,
+    samples: int,
+    counted: tuple[float, float],
+    integrands: Sequence[Integrand],
+    endless: NDArray[np.bool_],
 ) -> Integral:
-    """Area and means of the local indices of every design, to a relative tolerance.
+    """Area and means of local indices of every design, to a relative tolerance.
 
     Parameters
     ----------
     counted : (float, float)
         Range of angle that the means are taken over; panels must end there.
-    means : bool
-        False for the area alone.
+    integrands : sequence of Integrand
+        None for the area alone.
+    endless : ndarray of bool, shape (integrands, designs)
+        Integrals that are infinite, for which nothing is refined.
     """
     count = designs.count
     middle = 0.5 * (panels.low + panels.high)
@@ -97,19 +110,21 @@ def integrate(
     fresh = _Cells(panels.design, panels.low, panels.high, zero, zero + 1, inside)
     span = np.bincount(panels.design, panels.high - panels.low, count).astype(float)
     done: _Cells | None = None
-    # Rows: area, area within the margins, and the indices; of the values and of their errors.
-    values = errors = np.zeros((4, 0))
+    # Rows: area, area within the margins, and the integrands; of the values and of their errors.
+    values = errors = np.zeros((2 + len(integrands), 0))
+    of_area = min(AREA * tolerance, FINEST_AREA)
+    each = np.where(endless, np.inf, tolerance)
     allowed: Floats | None = None
     boundary: tuple[Ints, Floats, Floats] | None = None
     for _ in range(MOST_PASSES):
-        value, error, allowed, met = _evaluate(
-            designs, fresh, panels.reach, samples, tolerance, allowed, span, means=means
-        )
+        value, error, allowed, met = _evaluate(designs, integrands, fresh, panels.reach, samples, each, allowed, span)
         boundary = met if boundary is None else boundary
         done = fresh if done is None else _join(done, fresh)
         values, errors = np.concatenate([values, value], axis=1), np.concatenate([errors, error], axis=1)
         total, doubt = (np.stack([np.bincount(done.design, row, count) for row in rows]) for rows in (values, errors))
-        wanted = np.stack([AREA * tolerance * total[0], AREA * tolerance * total[1], *(tolerance * total[2:])])
+        with np.errstate(invalid="ignore"):
+            wanted = np.stack([of_area * total[0], of_area * total[1], *np.fmax(each * total[2:], 0.0)])
+            wanted[2:][endless] = np.inf
         late = (doubt > wanted).any(axis=0)
         if not late.any():
             break
@@ -117,8 +132,8 @@ def integrate(
         allowed = np.where(late, 0.5, 1.0) * allowed
         cells = np.bincount(done.design, minlength=count)
         share = errors / np.maximum(wanted, 1e-300)[:, done.design]
-        worst = np.zeros((4, count))
-        for row in range(4):
+        worst = np.zeros((len(wanted), count))
+        for row in range(len(wanted)):
             np.maximum.at(worst[row], done.design, share[row])
         # The worst cell, and those that exceed their equal share of the tolerance.
         over = (share >= np.minimum(worst, 1 / np.maximum(cells, 1))[:, done.design]) & (doubt > wanted)[:, done.design]
@@ -131,21 +146,24 @@ def integrate(
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = total[2:] / total[1]
         mean_error = (doubt[2:] + np.abs(mean) * doubt[1]) / total[1]
+    mean[endless & (total[1] > 0)], mean_error[endless] = np.inf, 0.0
     return Integral(total[0], doubt[0], mean, mean_error, boundary)
 
 
 def _evaluate(
     designs: Designs,
+    integrands: Sequence[Integrand],
     cells: _Cells,
     reach: Floats,
     samples: int,
-    tolerance: float,
+    tolerance: Floats,
     allowed: Floats | None,
     span: Floats,
-    *,
-    means: bool,
 ) -> tuple[Floats, Floats, Floats, tuple[Ints, Floats, Floats]]:
-    """Values and errors (4, cells) of new cells, the error allowed along rays (2, designs), boundary points met."""
+    """Values and errors (rows, cells) of new cells, the error allowed along rays (integrands, designs), the boundary.
+
+    `tolerance` is of each integrand and design.
+    """
     nodes, count = len(ANGLES.nodes), len(cells.low)
     middle, half = 0.5 * (cells.start + cells.stop), 0.5 * (cells.stop - cells.start)
     place, density = spread(cells.low, cells.high, middle + half * ANGLES.nodes[:, None], cubic)
@@ -154,31 +172,37 @@ def _evaluate(
     intervals = trace(designs, design, theta, reach[design], samples)
     ray, inner, outer = intervals.ray, intervals.inner, intervals.outer
     area = np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta))
-    value, error = np.zeros((2, len(theta))), np.zeros((2, len(theta)))
-    if means:
+    value = error = np.zeros((len(integrands), len(theta)))
+    if integrands:
         parts = pieces(intervals, reach[design], designs.field.singular)
         at = parts.ray
-        pilot = evaluate(designs, design[at], theta[at], parts)
+        pilot = evaluate(designs, integrands, design[at], theta[at], parts)
         if allowed is None:
             share = weight * np.repeat(ANGLES.weights, count)
             sums = [np.bincount(design[at], row * share[at], designs.count) for row in pilot[0]]
-            allowed = np.asarray(ALONG * tolerance * np.stack(sums), dtype=float)
+            allowed = np.asarray(ALONG * tolerance * np.maximum(sums, np.finfo(float).tiny), dtype=float)
         each = allowed[:, design] * np.maximum(1 / span[design], SINGLE / weight)
-        value, error = along(designs, design, theta, parts, pilot, each)
+        value, error = along(designs, integrands, design, theta, parts, pilot, each)
     rows = (area, area * counted, *(value * counted))
-    total, doubt = np.empty((4, count)), np.empty((4, count))
+    total, doubt = np.empty((2, len(rows), count))
     for k, row in enumerate(rows):
         total[k], doubt[k] = ANGLES.apply((row * weight).reshape(nodes, -1))
-    for k in range(2):
+    for k in range(len(integrands)):
         doubt[2 + k] += ANGLES.weights @ (error[k] * weight * counted).reshape(nodes, -1)
     met = (np.tile(design[ray], 2), np.tile(theta[ray], 2), np.concatenate([inner, outer]))
-    return total, doubt, np.zeros((2, designs.count)) if allowed is None else allowed, met
+    return total, doubt, np.zeros_like(tolerance) if allowed is None else allowed, met
 
 
 def simple_means(
-    designs: Designs, reach: Floats, samples: int, theta: Floats, fractions: Floats, by_area: bool
+    designs: Designs,
+    integrands: Sequence[Integrand],
+    reach: Floats,
+    samples: int,
+    theta: Floats,
+    fractions: Floats,
+    by_area: bool,
 ) -> Floats:
-    """Means of the indices (2, designs) by fixed nodes: the sums that papers use, for comparison.
+    """Means of indices (integrands, designs) by fixed nodes: the sums that papers use, for comparison.
 
     Parameters
     ----------
@@ -194,16 +218,16 @@ def simple_means(
     intervals = trace(designs, design, angle, reach[design], samples)
     owner = design[intervals.ray]
     sector = (intervals.outer - intervals.inner) * (intervals.outer + intervals.inner)
-    total = np.zeros((2, len(owner)))
+    total = np.zeros((len(integrands), len(owner)))
     block = max(1, BLOCK * len(RADII.nodes) // len(fractions))
     for k in range(0, len(owner), block):
         at = slice(k, k + block)
         r = intervals.inner[at] + fractions[:, None] * (intervals.outer - intervals.inner)[at]
         z = designs.about + r * np.exp(1j * angle[intervals.ray[at]])
         weight = r / r.sum(axis=0) if by_area else np.full(r.shape, 1 / len(fractions))
-        for index, found in enumerate(designs.field.indices(z, designs.of(owner[at]))[:2]):
-            product = found * weight
-            total[index, at] = np.where(np.isfinite(product), product, 0.0).sum(axis=0)
+        local = designs.field.local(z, designs.of(owner[at]))
+        for index, integrand in enumerate(integrands):
+            total[index, at] = (integrand.values(local) * weight).sum(axis=0)
     area = np.bincount(owner, sector, designs.count)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.stack([np.bincount(owner, row * sector, designs.count) for row in total]) / area
+        return np.array([np.bincount(owner, row * sector, designs.count) for row in total]) / area

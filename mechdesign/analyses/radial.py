@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.integrands import Integrand
 from mechdesign.analyses.rays import Designs, Floats, Intervals, Ints, clearances
 from mechdesign.analyses.rules import Rule, cosine
+from mechdesign.mechanism.algebra import Value
 
 RADII = Rule.of(11, 2, 0.5)
 # Pieces evaluated at once (11 nodes each).
@@ -21,16 +24,16 @@ FIT = 0.01
 # A segment is split at a ridge that lies within this share of it, else in the middle.
 INSIDE = 0.9
 
-# A ridge is a kink where w = W + B x^2 has W below this share of B; w is nearly 1 only where c is nearly 0.
-SHARP, SINGULAR = 0.25, 1e-6
-# Pieces with w above this everywhere have no ridge that would matter (c below 0.39).
+# A ridge is a kink where w = W + B x^2 has W below this share of B.
+SHARP = 0.25
+# Pieces with w above this everywhere have no ridge that would matter (inverse condition below 0.39).
 FLAT = 0.2
 NEWTON_STEPS = 3
 
 # A singularity nearer to an interval than this share of its width needs the interval in two halves.
 NEAR = 0.5
 
-# Integrals and their estimated errors (2, pieces), and the place of the ridge, in [-1, 1] (pieces).
+# Integrals and their estimated errors (integrands, pieces), and the place of the ridge, in [-1, 1] (pieces).
 Integrals = tuple[Floats, Floats, Floats]
 
 
@@ -112,20 +115,28 @@ def pieces(intervals: Intervals, reach: Floats, singular: NDArray[np.bool_]) -> 
 
 
 def along(
-    designs: Designs, design: Ints, theta: Floats, parts: Pieces, pilot: Integrals, allowed: Floats
+    designs: Designs,
+    integrands: Sequence[Integrand],
+    design: Ints,
+    theta: Floats,
+    parts: Pieces,
+    pilot: Integrals,
+    allowed: Floats,
 ) -> tuple[Floats, Floats]:
-    """Integrals of the indices along rays and their estimated errors, both of shape (2, rays).
+    """Integrals along rays and their estimated errors, both of shape (integrands, rays).
 
     Parameters
     ----------
     design, theta : ndarray, shape (rays,)
     pilot : Integrals
         Of `parts`, as evaluated by `evaluate`.
-    allowed : ndarray, shape (2, rays)
-        Error that a piece may have; those with a larger one are split, at the ridge of the inverse condition where this
-        is what errs, else in the middle.
+    allowed : ndarray, shape (integrands, rays)
+        Error that a piece may have; those with a larger one are split, at the ridge where singular values meet where
+        this is what errs, else in the middle.
     """
-    value, error = np.zeros((2, len(theta))), np.zeros((2, len(theta)))
+    count = len(integrands)
+    kinked = np.array([integrand.kinked for integrand in integrands])
+    value, error = np.zeros((count, len(theta))), np.zeros((count, len(theta)))
     found, doubt, ridge = pilot
     low, high = parts.limits
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -135,16 +146,16 @@ def along(
         ray = parts.ray
         rough = doubt > np.maximum(allowed[:, ray], noise)
         split = rough.any(axis=0) & (splits < MOST_SPLITS)
-        for k in range(2):
+        for k in range(count):
             value[k] += np.bincount(ray[~split], found[k, ~split], len(theta))
             error[k] += np.bincount(ray[~split], doubt[k, ~split], len(theta))
         if not split.any():
             break
-        share = np.where(rough[0] & (np.abs(ridge) < INSIDE), ridge, 0.0)[split]
+        share = np.where(rough[kinked].any(axis=0) & (np.abs(ridge) < INSIDE), ridge, 0.0)[split]
         parts = parts.pick(split)
         parts = parts.split(_refined(designs, design[parts.ray], theta[parts.ray], parts, share))
         noise = np.concatenate([noise[:, split]] * 2, axis=1)
-        found, doubt, ridge = evaluate(designs, design[parts.ray], theta[parts.ray], parts)
+        found, doubt, ridge = evaluate(designs, integrands, design[parts.ray], theta[parts.ray], parts)
     return value, error
 
 
@@ -157,18 +168,19 @@ def _refined(designs: Designs, design: Ints, theta: Floats, parts: Pieces, share
     step = FIT * (parts.stop - parts.start)[ridges]
     around = at[ridges] + step * np.array([-1.0, 0.0, 1.0])[:, None]
     z = designs.about + parts.pick(ridges).radius(around)[0] * np.exp(1j * theta[ridges])
-    condition = designs.field.indices(z, designs.of(design[ridges]))[0]
-    low, middle, high = ((1 - condition) / (1 + condition)) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
+        low, middle, high = designs.field.local(z, designs.of(design[ridges])).roundness
         shift = 0.5 * (low - high) / (low + high - 2 * middle)
     at[ridges] += step * np.where(np.abs(shift) < 1, shift, 0.0)
     return at
 
 
-def evaluate(designs: Designs, design: Ints, theta: Floats, parts: Pieces) -> Integrals:
-    """Integrals of index times radius over pieces, their errors (2, pieces), and where to split."""
-    found, doubt = np.empty((2, len(theta))), np.empty((2, len(theta)))
-    ridges = np.empty(len(theta))
+def evaluate(
+    designs: Designs, integrands: Sequence[Integrand], design: Ints, theta: Floats, parts: Pieces
+) -> Integrals:
+    """Integrals of indices times radius over pieces, their errors (integrands, pieces), and where to split."""
+    found, doubt = np.empty((2, len(integrands), len(theta)))
+    ridges = np.zeros(len(theta))
     for k in range(0, len(theta), BLOCK):
         at = slice(k, k + BLOCK)
         part = parts.pick(at)
@@ -179,59 +191,86 @@ def evaluate(designs: Designs, design: Ints, theta: Floats, parts: Pieces) -> In
         measure = np.where(high - low > 100 * NEAREST * high, r * slope * half, 0.0)
         gap = np.minimum(NEAREST * high, 0.5 * (high - low))
         z = designs.about + np.clip(r, low + gap, high - gap) * np.exp(1j * theta[at])
-        condition, resistivity, _ = designs.field.indices(z, designs.of(design[at]))
-        # On the boundary itself, where rounding leaves an interval of no width, an index has no value.
-        condition = np.where(np.isfinite(condition), condition, 0.0)
-        resistivity = np.where(np.isfinite(resistivity), resistivity, 0.0)
-        found[1, at], doubt[1, at] = RADII.apply(resistivity * measure)
-        found[0, at], doubt[0, at], ridges[at] = _with_ridge(condition, measure)
+        local = designs.field.local(z, designs.of(design[at]))
+        ridge: _Ridge | None = None
+        for j, integrand in enumerate(integrands):
+            value, kink = integrand(local)
+            if kink is None:
+                found[j, at], doubt[j, at] = RADII.apply(value * measure)
+                continue
+            if ridge is None:
+                ridge = _Ridge.of(local.roundness)
+                ridges[at] = ridge.place
+            found[j, at], doubt[j, at] = ridge.integral(value, kink, measure)
     return found, doubt, ridges
 
 
-def _with_ridge(condition: Floats, measure: Floats) -> tuple[Floats, Floats, Floats]:
-    """Integrals of inverse condition c times `measure` over segments, their errors, and the place of the ridge of c.
+@dataclass(frozen=True, eq=False)
+class _Ridge:
+    """Where singular values meet, on each segment of a batch.
 
-    At isotropy c has a kink (the singular values cross), but w = ((1 - c)/(1 + c))^2 has none, and
+    There an index f has a kink, but w = ((sigma_max - sigma_min)/(sigma_max + sigma_min))^2 has none, and
+    f = s + k sqrt(w) with smooth s and k. So with w about W + B x^2 + C x^3 at the place x = 0 where it is least, and
+    q = -k measure, all of the kink but its third order is in g = (q + (q' + q C/2B) x) sqrt(W + B x^2). What the rule
+    integrates is f measure + g; the integral of g is closed and taken off again, so that g need not be exact.
 
-        c = (1 + w)/(1 - w) - sqrt(w) 2/(1 - w)
-
-    so with w about W + B x^2 + C x^3 at the place x = 0 where it is least, and q = 2 measure/(1 - w), all of the kink
-    but its third order is in g = (q + (q' + q C/2B) x) sqrt(W + B x^2). What the rule integrates is c measure + g; the
-    integral of g is closed and taken off again, so that g need not be exact.
+    Parameters
+    ----------
+    rows : ndarray of int
+        Segments on which w comes near zero; what follows is theirs.
+    at, value, bend, third : ndarray, shape (rows,)
+        Place of the least w in [-1, 1], W, and second and third derivative there.
+    unseen : ndarray, shape (rows,)
+        What W is not known to.
+    place : ndarray
+        Of all segments; 0 where there is none.
     """
-    w = ((1 - condition) / (1 + condition)) ** 2
-    kinked = np.flatnonzero(w.min(axis=0) < FLAT)
-    total, doubt = np.empty(w.shape[1]), np.empty(w.shape[1])
-    ridge = np.zeros(w.shape[1])
-    smooth = np.flatnonzero(w.min(axis=0) >= FLAT)
-    total[smooth], doubt[smooth] = RADII.apply((condition * measure)[:, smooth])
-    total[kinked], doubt[kinked], ridge[kinked] = _kinked(w[:, kinked], condition[:, kinked], measure[:, kinked])
-    return total, doubt, ridge
 
+    rows: Ints
+    at: Floats
+    value: Floats
+    bend: Floats
+    third: Floats
+    unseen: Floats
+    place: Floats
 
-def _kinked(w: Floats, condition: Floats, measure: Floats) -> tuple[Floats, Floats, Floats]:
-    """As `_with_ridge`, for segments whose w comes near zero."""
-    weight = 2 * measure / np.maximum(1 - w, SINGULAR)
-    spectrum = RADII.spectrum @ w
-    ridge = _least(w, spectrum)
-    value, _, bend, third = _series(spectrum, ridge, 3)
-    q, q_slope = _series(RADII.spectrum @ weight, ridge, 1)
-    b = 0.5 * bend
-    sharp = (b > 0) & (value < SHARP * b)
-    b, floor = np.where(sharp, b, 1.0), np.maximum(value, 1e-24)
-    a0 = np.where(sharp, q, 0.0)
-    a1 = np.where(sharp, q_slope + q * third / (12 * b), 0.0)
-    x = RADII.nodes[:, None] - ridge
-    total, doubt = RADII.apply(condition * measure + (a0 + a1 * x) * np.sqrt(floor + b * x * x))
-    root = np.sqrt(b)
-    for sign, end in ((-1, 1 - ridge), (1, -1 - ridge)):
-        height = np.sqrt(floor + b * end * end)
-        area = 0.5 * (end * height + floor / root * np.arcsinh(end * root / np.sqrt(floor)))
-        total = total + sign * (a0 * area + a1 * height**3 / (3 * b))
-    # What W is not known to is the height of a tip that may lie between two nodes, unseen.
-    last, decay = RADII.tail(spectrum)
-    unseen = 4 * np.abs(a0) * last * decay / root
-    return total, doubt + unseen, ridge
+    @staticmethod
+    def of(roundness: Value) -> _Ridge:
+        """The ridges of w at the nodes, shape (nodes, segments)."""
+        w = np.where(np.isfinite(roundness), roundness, 1.0)
+        rows = np.flatnonzero(w.min(axis=0) < FLAT)
+        spectrum = RADII.spectrum @ w[:, rows]
+        at = _least(w[:, rows], spectrum)
+        value, _, bend, third = _series(spectrum, at, 3)
+        last, decay = RADII.tail(spectrum)
+        place = np.zeros(w.shape[1])
+        place[rows] = at
+        return _Ridge(rows, at, value, bend, third, last * decay, place)
+
+    def integral(self, values: Floats, kink: Floats, measure: Floats) -> tuple[Floats, Floats]:
+        """Integrals of an index times `measure` over the segments, and their errors."""
+        total, doubt = RADII.apply(values * measure)
+        if self.rows.size:
+            rows = self.rows
+            total[rows], doubt[rows] = self._kinked(values[:, rows], kink[:, rows], measure[:, rows])
+        return total, doubt
+
+    def _kinked(self, values: Floats, kink: Floats, measure: Floats) -> tuple[Floats, Floats]:
+        q, q_slope = _series(RADII.spectrum @ (-kink * measure), self.at, 1)
+        b = 0.5 * self.bend
+        sharp = (b > 0) & (self.value < SHARP * b)
+        b, floor = np.where(sharp, b, 1.0), np.maximum(self.value, 1e-24)
+        a0 = np.where(sharp, q, 0.0)
+        a1 = np.where(sharp, q_slope + q * self.third / (12 * b), 0.0)
+        x = RADII.nodes[:, None] - self.at
+        total, doubt = RADII.apply(values * measure + (a0 + a1 * x) * np.sqrt(floor + b * x * x))
+        root = np.sqrt(b)
+        for sign, end in ((-1, 1 - self.at), (1, -1 - self.at)):
+            height = np.sqrt(floor + b * end * end)
+            area = 0.5 * (end * height + floor / root * np.arcsinh(end * root / np.sqrt(floor)))
+            total = total + sign * (a0 * area + a1 * height**3 / (3 * b))
+        # What W is not known to is the height of a tip that may lie between two nodes, unseen.
+        return total, doubt + 4 * np.abs(a0) * self.unseen / root
 
 
 def _least(w: Floats, spectrum: Floats) -> Floats:

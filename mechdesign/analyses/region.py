@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.analyses.bounding import bounding_box
 from mechdesign.analyses.field import Field, Places
+from mechdesign.analyses.indices import INDICES, OF_JACOBIAN, Prepared, prepare
+from mechdesign.analyses.integrands import Integrand
 from mechdesign.analyses.jacobians import mixes
 from mechdesign.analyses.panels import Effort, Panels, find_panels
+from mechdesign.analyses.peaks import Peaks, find_peaks
 from mechdesign.analyses.quadrature import Integral, integrate, simple_means
 from mechdesign.analyses.rays import Designs, Floats
 from mechdesign.errors import MechanismError, Problem, StudyError
@@ -26,7 +31,12 @@ RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
 AREA_TOLERANCE = 1e-6
 # Relative tolerance of the integrals where the study says none: of one region, and of each design of many.
 TOLERANCE, GRID_TOLERANCE = 1e-5, 1e-4
-INDICES = ("GII", "GRI", "SUI", "area", "box_area")
+# Relative accuracy of the smallest and largest values of an index.
+PEAK_TOLERANCE = 1e-5
+# What every workspace has; of the local indices follow their statistics, as ``sigma_min_mean``.
+COLUMNS = ("GII", "GRI", "SUI", "area", "box_area")
+MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
+STATISTICS = ("mean", "min", "max", "std")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +53,10 @@ class Question:
         Range of angle that the means are taken over.
     rays : int or None
         As the study asks.
+    indices : tuple of Prepared
+        Local indices: those that the study asks for, and what `wanted` needs.
+    wanted : tuple of str
+        Columns of the answer.
     """
 
     field: Field
@@ -54,19 +68,46 @@ class Question:
     rule: str
     tolerance: float
     nodes: int | None
+    indices: tuple[Prepared, ...]
+    wanted: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Indices of each design and their estimated errors (0 where the rule has none), by the names of `INDICES`."""
+    """The wanted columns for each design, and their estimated errors (0 where the rule has none)."""
 
     values: dict[str, Floats]
     errors: dict[str, Floats]
     panels: Panels
 
 
-def questions(study: Study, tolerance: float = TOLERANCE) -> list[Question]:
-    """One question a value of ``at``; `tolerance` is that of the integrals where the study says none.
+def columns(names: Iterable[str]) -> tuple[str, ...]:
+    """Columns of a workspace with these local indices."""
+    return (*COLUMNS, *(f"{name}_{kind}" for name in names for kind in STATISTICS))
+
+
+def split(column: str) -> tuple[str, str]:
+    """Local index and statistic of a column, ``("", "")`` of the area and its like."""
+    if column in MEANS:
+        return MEANS[column], "mean"
+    name, _, kind = column.rpartition("_")
+    return (name, kind) if name in INDICES and kind in STATISTICS else ("", "")
+
+
+def batched(column: str) -> bool:
+    """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
+    return column in COLUMNS or split(column)[0] in OF_JACOBIAN
+
+
+def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:
+    """One question a value of ``at``.
+
+    Parameters
+    ----------
+    tolerance : float
+        Of the integrals where the study says none.
+    wanted : sequence of str, optional
+        Columns of the answer; left out, all of those indices that the study asks for.
 
     Raises
     ------
@@ -110,12 +151,16 @@ def questions(study: Study, tolerance: float = TOLERANCE) -> list[Question]:
         raise _problem(study, "workspace.margin", "the margin leaves nothing of the scan")
     factors = [unit if c.quantity == "angle" else 1.0 for c in plan.structure.given[2:]]
     integrate_by = section.integrate
+    asked = OF_JACOBIAN if section.indices is None else section.indices
+    wanted = columns(asked) if wanted is None else tuple(wanted)
+    indices = prepare(study, list(dict.fromkeys(filter(None, (split(column)[0] for column in wanted)))))
     return [
         Question(
             replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True))),
             dict(zip(section.at, values, strict=True)), about, (start, stop), (start + margin, stop - margin),
             section.scan.rays, integrate_by.rule,
             integrate_by.tolerance if "tolerance" in integrate_by.model_fields_set else tolerance, integrate_by.nodes,
+            indices, wanted,
         )
         for values in itertools.product(*section.at.values())
     ]  # fmt: skip
@@ -145,22 +190,93 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
     cuts = tuple(sorted(set(question.counted) - set(question.scan)))
     panels = find_panels(designs, question.scan, effort, cuts)
     if not panels.closes.any():
-        nothing = {name: np.full(count, np.nan if name in ("GII", "GRI", "SUI") else 0.0) for name in INDICES}
-        return Answer(nothing, {name: np.zeros(count) for name in INDICES}, panels)
+        nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
+        return Answer(nothing, {name: np.zeros(count) for name in question.wanted}, panels)
     samples, gauss = effort.samples, question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
-    integral = integrate(designs, panels, tolerance, samples, question.counted, means=gauss)
+    integrands, peaks = _integrands(question), _peaks(question, designs, panels, samples)
+    endless = _endless(question, integrands, peaks, count)
+    integral = integrate(
+        designs,
+        panels,
+        tolerance,
+        samples,
+        question.counted,
+        integrands if gauss else (),
+        endless[: gauss * len(endless)],
+    )
     means, doubts = integral.mean, integral.mean_error
     if not gauss:
-        means, doubts = _simple(question, designs, panels, samples), np.zeros_like(means)
-    box = bounding_box(designs, panels, integral.boundary, samples)
+        means, doubts = _simple(question, designs, panels, samples, integrands), np.zeros((len(integrands), count))
+    values: dict[str, Floats] = {"area": integral.area}
+    errors: dict[str, Floats] = {"area": integral.area_error}
+    if {"SUI", "box_area"} & set(question.wanted):
+        box = bounding_box(designs, panels, integral.boundary, samples)
+        values["box_area"], errors["box_area"] = box, np.zeros(count)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values["SUI"], errors["SUI"] = integral.area / box, integral.area_error / box
+    for column in question.wanted:
+        name, kind = split(column)
+        if name:
+            values[column], errors[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
+    pick = question.wanted
+    return Answer({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels)
+
+
+def _integrands(question: Question) -> tuple[Integrand, ...]:
+    """What the wanted means and standard deviations need: the indices, and their squares."""
+    asked = {split(column) for column in question.wanted}
+    return tuple(
+        Integrand(index, power)
+        for power, kinds in ((1, ("mean", "std")), (2, ("std",)))
+        for index in question.indices
+        if any((index.name, kind) in asked for kind in kinds)
+    )
+
+
+def _peaks(question: Question, designs: Designs, panels: Panels, samples: int) -> Peaks | None:
+    """Extremes, where they are wanted or an integral may be infinite."""
+    asked = {split(column) for column in question.wanted}
+    wanted = np.array([[(index.name, kind) in asked for index in question.indices] for kind in ("min", "max")])
+    squares = any(kind == "std" for _, kind in asked)
+    if not wanted.any() and not squares and all(index.index.crossing != np.inf for index in question.indices):
+        return None
+    return find_peaks(designs, panels, question.indices, samples, PEAK_TOLERANCE, wanted)
+
+
+def _endless(question: Question, integrands: Sequence[Integrand], peaks: Peaks | None, count: int) -> NDArray[np.bool_]:
+    """Integrals that are infinite: the integrand grows at least as 1/distance towards a curve."""
+    if peaks is None:
+        return np.zeros((len(integrands), count), dtype=bool)
+    order = dict(zip((index.name for index in question.indices), peaks.order, strict=True))
+    return np.array([integrand.power * order[integrand.index.name] >= 1 for integrand in integrands]).reshape(-1, count)
+
+
+def _statistic(
+    name: str, kind: str, question: Question, integrands: Sequence[Integrand], means: Floats, doubts: Floats,
+    peaks: Peaks | None,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Values and errors of one statistic of one index."""
+    if kind in ("min", "max"):
+        assert peaks is not None
+        at = (("min", "max").index(kind), [index.name for index in question.indices].index(name))
+        return peaks.value[at], peaks.error[at]
+    row = {(integrand.index.name, integrand.power): k for k, integrand in enumerate(integrands)}
+    mean, doubt = means[row[name, 1]], doubts[row[name, 1]]
+    if kind == "mean":
+        return mean, doubt
+    square, square_doubt = means[row[name, 2]], doubts[row[name, 2]]
     with np.errstate(invalid="ignore", divide="ignore"):
-        values = (*means, integral.area / box, integral.area, box)
-        errors = (*doubts, integral.area_error / box, integral.area_error, np.zeros(count))
-    return Answer(dict(zip(INDICES, values, strict=True)), dict(zip(INDICES, errors, strict=True)), panels)
+        spread = np.where(np.isinf(square), np.inf, np.sqrt(np.maximum(square - mean * mean, 0.0)))
+        total = square_doubt + 2 * np.abs(mean) * doubt
+        # Of a deviation that is nothing but its error the square is in doubt, not the root's slope.
+        error = np.where(np.isinf(spread), 0.0, np.minimum(total / (2 * spread), np.sqrt(total)))
+    return spread, error
 
 
-def _simple(question: Question, designs: Designs, panels: Panels, samples: int) -> Floats:
+def _simple(
+    question: Question, designs: Designs, panels: Panels, samples: int, integrands: Sequence[Integrand]
+) -> Floats:
     nodes = question.nodes or RADIAL_NODES[question.rule]
     low, high = question.counted
     if question.rule == "sector_mean":
@@ -170,7 +286,11 @@ def _simple(question: Question, designs: Designs, panels: Panels, samples: int) 
         rays = question.rays or MIDPOINT_RAYS
         theta = low + (high - low) * (np.arange(rays) + 0.5) / rays
         fractions = (np.arange(nodes) + 0.5) / nodes
-    return simple_means(designs, panels.reach, samples, theta, fractions, by_area=question.rule == "midpoint")
+    return simple_means(
+        designs, integrands, panels.reach, samples, theta, fractions, by_area=question.rule == "midpoint"
+    )
 
 
-__all__ = ["BRISK", "CLOSE", "INDICES", "Answer", "Integral", "Question", "answer", "questions"]
+__all__ = [
+    "BRISK", "CLOSE", "COLUMNS", "Answer", "Integral", "Question", "answer", "batched", "columns", "questions", "split",
+]  # fmt: skip

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.curves import Patch, patches
+from mechdesign.analyses.indices import INDICES, prepare
+from mechdesign.analyses.indices.index import determinant_power, power_of_length
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.rays import Designs, Floats
-from mechdesign.analyses.region import CLOSE, INDICES, Answer, Question, answer, questions
+from mechdesign.analyses.region import CLOSE, COLUMNS, Answer, Question, answer, questions, split
 from mechdesign.errors import AssemblyError
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
@@ -90,36 +92,39 @@ def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Answer])
         label = study.units.label(study.mechanism.quantity(name))
         yield Column(name, np.array([question.held[name] for question in asked]), label, "held coordinate")
     meanings = index_meanings(study, asked[0])
-    for name in INDICES:
-        unit, meaning = meanings[name]
-        yield Column(name, np.concatenate([given.values[name] for given in answers]), unit, meaning)
-    if asked[0].rule == "gauss":
-        for name in INDICES[:4]:
-            values = np.concatenate([given.errors[name] for given in answers])
-            yield Column(f"{name}_error", values, meanings[name][0], f"estimated error of {name}")
+
+    def column(name: str) -> Column:
+        return Column(name, np.concatenate([given.values[name] for given in answers]), *meanings[name])
+
+    def error(name: str) -> Column:
+        values = np.concatenate([given.errors[name] for given in answers])
+        return Column(f"{name}_error", values, meanings[name][0], f"estimated error of {name}")
+
+    estimated = asked[0].rule == "gauss"
+    statistics = [name for name in asked[0].wanted if name not in COLUMNS]
+    yield from (column(name) for name in COLUMNS)
+    yield from (error(name) for name in COLUMNS[:4] if estimated)
+    yield from (column(name) for name in statistics)
+    yield from (error(name) for name in statistics if estimated or not name.endswith(("_mean", "_std")))
 
 
 def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each index."""
+    """Unit and meaning of each column of the answer."""
     area = study.units.label("area")
-    return {
+    found = {
         "GII": ("", "mean of the inverse condition number over the region"),
-        "GRI": (_resistivity_unit(study, question), "mean of 1/abs(det J) over the region"),
+        "GRI": (INDICES["resistivity"].unit(study, question.field), "mean of 1/abs(det J) over the region"),
         "SUI": ("", "area of the region over that of the rectangle around it"),
         "area": (area, "area of the region"),
         "box_area": (area, "area of the rectangle around the region"),
     }
+    for name in (name for name in question.wanted if name not in COLUMNS):
+        index, kind = INDICES[split(name)[0]], split(name)[1]
+        found[name] = (index.unit(study, question.field), f"{_STATISTICS[kind]} over the region: {index.meaning}")
+    return found
 
 
-def _resistivity_unit(study: Study, question: Question) -> str:
-    lengths = [c.quantity == "length" for c in question.field.outputs]
-    driven = [c.quantity == "length" for c in question.field.mechanism.forward.structure.given]
-    return "" if study.units.length == "dimensionless" else _power(study.units.length, sum(driven) - sum(lengths))
-
-
-def _power(name: str, power: int) -> str:
-    text = name if abs(power) == 1 else f"{name}^{abs(power)}"
-    return "" if power == 0 else text if power > 0 else f"1/{text}"
+_STATISTICS = {"mean": "mean", "min": "infimum", "max": "supremum", "std": "standard deviation"}
 
 
 def _stack(parts: Sequence[Sequence[Column]]) -> tuple[Column, ...]:
@@ -140,19 +145,27 @@ def _held(study: Study, question: Question, rows: int) -> list[Column]:
 def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
     grids = [patch.grid(question.about) for patch in found]
     z = np.concatenate([grid.ravel() for grid in grids])
-    condition, resistivity, determinant = question.field.indices(z, {})
+    local = question.field.local(z, {})
+    names = dict.fromkeys(("inverse_condition", "resistivity", *(index.name for index in question.indices)))
     node = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)) for grid in grids])
     ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
     patch = np.repeat(np.arange(len(grids)), [grid.size for grid in grids])
-    length, unit = study.units.label("length"), _resistivity_unit(study, question)
-    inverse = _power(study.units.length, -2 if unit.endswith("^2") else -1) if unit.startswith("1/") else ""
+    length, determinant = study.units.label("length"), power_of_length(study, determinant_power(question.field))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        columns = [
+            Column(index.name, np.broadcast_to(index.values(local), z.shape), index.index.unit(study, question.field),
+                   index.index.meaning)
+            for index in prepare(study, list(names))
+        ]  # fmt: skip
     return [
         *_held(study, question, len(z)),
         Column("x", z.real, length, "place of the point"),
         Column("y", z.imag, length, "place of the point"),
-        Column("inverse_condition", condition, "", "smallest over largest singular value of the Jacobian"),
-        Column("resistivity", resistivity, unit, "1/abs(det J)"),
-        Column("det_J", determinant, inverse.removeprefix("1/"), "determinant of the Jacobian, per radian"),
+        *columns[:2],
+        Column(
+            "det_J", np.broadcast_to(local.determinant, z.shape), determinant, "determinant of the Jacobian, per radian"
+        ),
+        *columns[2:],
         Column("patch", patch, "", "part of the region between two boundary curves"),
         Column("ray", ray, "", "ray of the patch's grid"),
         Column("node", node, "", "node along the ray, from the inner to the outer boundary"),

@@ -25,6 +25,12 @@ from mechdesign.study.numbers import (
 )
 
 
+INDEX_NAMES = (
+    "inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max", "k_min", "sigma_position",
+    "reliability",
+)  # fmt: skip
+
+
 class Scan(Model):
     """Rays about a point; angles in the study's unit."""
 
@@ -60,3 +66,4 @@ class WorkspaceSection(Model):
     margin: NonNegativeAngle = 0.0
     assembly: Annotated[str, Choice(("same", "any"))] = "same"
     characteristic_length: PositiveLength | None = None
+    indices: Annotated[tuple[Annotated[str, Choice(INDEX_NAMES)], ...], BeforeValidator(as_list)] | None = None

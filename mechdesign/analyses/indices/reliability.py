@@ -1,0 +1,52 @@
+"""Reliability at a pose: the chance that first-order normal errors keep the limits of the reliability section."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechdesign.analyses.first_order import Rates, linear_errors
+from mechdesign.analyses.indices.assembled import assembled_only
+from mechdesign.analyses.indices.index import Evaluate, Index, number
+from mechdesign.analyses.indices.local import Floats
+from mechdesign.analyses.probability import failure_probability
+from mechdesign.analyses.sources import Source, find_sources
+from mechdesign.errors import Problem, StudyError
+from mechdesign.mechanism import Configuration, Mechanism
+
+if TYPE_CHECKING:
+    from mechdesign.analyses.reliability import Question
+    from mechdesign.study import Study
+
+STILL = Rates((), ())
+
+
+def prepare(study: Study) -> Evaluate:
+    """Find what varies and what it is limited to."""
+    # Here, for the poses of a reliability question may themselves be nodes of a workspace.
+    from mechdesign.analyses.reliability import ask
+
+    sources = find_sources(study)[0].first_order()
+    assert study.reliability is not None
+    question = ask(study, study.reliability)
+    if not question.limited:
+        message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
+        raise StudyError((Problem(message, "reliability.limits", str(study.path or "")),))
+    return assembled_only(partial(evaluate, study.mechanism, question, sources))
+
+
+def evaluate(
+    mechanism: Mechanism, question: Question, sources: tuple[Source, ...], configuration: Configuration
+) -> Floats:
+    """Probability that all limits hold, the drives held [S2, eqs. 10, 11]."""
+    positions = tuple(channel for channel in question.channels if channel.order == 0)
+    covariance = linear_errors(mechanism, configuration, positions, sources, STILL).covariance()
+    return 1 - np.array([failure_probability(each, question.bands, question.discs) for each in covariance])
+
+
+INDEX = Index(
+    "reliability", "probability that first-order errors keep the limits", prepare, number, bounds=(0.0, 1.0),
+    section="reliability",
+)  # fmt: skip
