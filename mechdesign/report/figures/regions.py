@@ -1,0 +1,231 @@
+"""Regions of a workspace as pictures need them, one a value of the held coordinates: fill, outline, singularities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from mechdesign.report.figures import style
+from mechdesign.results import Result, Table
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
+
+Floats = NDArray[np.float64]
+Grid = tuple[Floats, Floats, Floats]
+
+# How a piece of the boundary is drawn by what ends the region there: colour, dashes, words.
+FATES: Mapping[str, tuple[str, object, str]] = {
+    "limit": (style.INK, "-", "ends at a limit"),
+    "stretched": (style.BLUE, (0, (5, 1.5)), "a leg is stretched"),
+    "folded": (style.PURPLE, (0, (2, 1)), "a leg is folded"),
+    "reach": (style.ORANGE, (0, (4, 1.2)), "a leg is at the end of its reach"),
+    "singularity": (style.VERMILION, (0, (6, 1.5, 1, 1.5)), "ends at a singularity"),
+}
+# Loci of singularities inside: of the closure (parallel) and of a leg (serial).
+LOCI: Mapping[str, tuple[str, str]] = {
+    "forward": (style.VERMILION, "parallel singularity"),
+    "inverse": (style.GREEN, "leg in line (serial singularity)"),
+}
+_LEFT, _RIGHT, _TOP, _BELOW, _BAR, _LEGEND = 0.72, 0.12, 0.34, 0.52, 0.95, 0.24
+_TALLEST = 6.5
+_PAD = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """The region for one value of each held coordinate.
+
+    Parameters
+    ----------
+    title : str
+        ``platform.angle = 15 deg``; empty where nothing is held.
+    held : mapping of str to float
+    row : int
+        Its row of the table of indices.
+    """
+
+    title: str
+    held: Mapping[str, float]
+    row: int
+    local: Table
+    boundary: Table
+    singularities: Table | None
+
+    def grids(self, column: str) -> Iterator[Grid]:
+        """x, y and a column of each patch, shape (rays, nodes)."""
+        for patch in np.unique(self.local["patch"]):
+            rows = self.local["patch"] == patch
+            shape = (int(self.local["ray"][rows].max()) + 1, int(self.local["node"][rows].max()) + 1)
+            x, y, z = (self.local[name][rows].reshape(shape) for name in ("x", "y", column))
+            yield x, y, z
+
+    def places(self) -> NDArray[np.complex128]:
+        """Every place of the region's grid and outline."""
+        found = [table["x"] + 1j * table["y"] for table in (self.local, self.boundary)]
+        return np.concatenate(found)
+
+
+def regions(study: Study, result: Result) -> list[Region]:
+    """The regions that are not empty, in the order of the table of indices."""
+    indices = result.tables["indices"]
+    held = [name for name in (study.workspace.at if study.workspace else ()) if name in result.tables["local"]]
+    found = []
+    for row in range(len(indices)):
+        values = {name: float(indices[name][row]) for name in held}
+        local = pick(result.tables["local"], values)
+        if not len(local):
+            continue
+        lines = result.tables.get("singularities")
+        title = ", ".join(
+            f"{name} = {value:g} {study.units.label(study.mechanism.quantity(name))}".strip()
+            for name, value in values.items()
+        )
+        found.append(
+            Region(title, values, row, local, pick(result.tables["boundary"], values),
+                   pick(lines, values) if lines is not None and len(lines) else None)
+        )  # fmt: skip
+    return found
+
+
+def pick(table: Table, values: Mapping[str, float]) -> Table:
+    """Rows of a table in which columns have these values."""
+    rows = np.ones(len(table), dtype=bool)
+    for name, value in values.items():
+        rows &= table[name] == value
+    columns = tuple(type(c)(c.name, np.asarray(c.values)[rows], c.unit, c.meaning) for c in table.columns)
+    return Table(table.name, columns, table.meaning)
+
+
+def curves(table: Table) -> Iterator[NDArray[np.intp]]:
+    """Rows of each curve of a boundary or of a locus."""
+    for curve in np.unique(table["curve"]):
+        yield np.flatnonzero(table["curve"] == curve)
+
+
+def fate(kind: str, at: str) -> str:
+    """What ends the region at a piece of its boundary: one of `FATES`."""
+    if kind == "limit":
+        return "limit"
+    for word in ("stretched", "folded", "reach"):
+        if at.endswith(word):
+            return word
+    return "singularity"
+
+
+def outline(axes: Axes, region: Region, *, width: float = 1.5) -> set[str]:
+    """Draw the boundary, coloured by what ends it; returns the fates that occur."""
+    seen = set()
+    boundary = region.boundary
+    for rows in curves(boundary):
+        found = fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]]))
+        color, dashes, _ = FATES[found]
+        # White below keeps the gaps of dashes clean.
+        axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=width + 0.6, zorder=3)
+        axes.plot(boundary["x"][rows], boundary["y"][rows], color=color, linestyle=dashes, linewidth=width,
+                  solid_capstyle="round", zorder=3)  # fmt: skip
+        seen.add(found)
+    return seen
+
+
+def loci(axes: Axes, region: Region) -> set[str]:
+    """Draw the singularities inside the region, with a pale edge that shows on every colour; returns their kinds."""
+    table = region.singularities
+    if table is None:
+        return set()
+    seen = set()
+    for rows in curves(table):
+        kind = str(table["kind"][rows[0]])
+        axes.plot(table["x"][rows], table["y"][rows], color=LOCI[kind][0], linewidth=1.8, zorder=3.2,
+                  path_effects=[withStroke(linewidth=3.4, foreground="white")])  # fmt: skip
+        seen.add(kind)
+    return seen
+
+
+def fill(axes: Axes, region: Region) -> None:
+    """Fill the region in a pale colour."""
+    for x, y, _ in region.grids("det_J"):
+        edge = [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
+        axes.fill(*edge, color=style.SKY, alpha=0.25, linewidth=0)
+
+
+def keys(fates: set[str], kinds: set[str]) -> list[Line2D]:
+    """Entries of a legend for what `outline` and `loci` have drawn."""
+    entries = [
+        Line2D([], [], color=color, linestyle=dashes, linewidth=1.5, label=words)  # type: ignore[arg-type]
+        for name, (color, dashes, words) in FATES.items() if name in fates
+    ]  # fmt: skip
+    return entries + [
+        Line2D([], [], color=color, linewidth=1.8, label=words)
+        for kind, (color, words) in LOCI.items()
+        if kind in kinds
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A figure of panels of one scale, with room for a bar of colours at the right and a legend below."""
+
+    figure: Figure
+    axes: tuple[Axes, ...]
+    bar: Axes | None
+
+    def legend(self, entries: Sequence[Line2D]) -> None:
+        """Entries in one row below the panels."""
+        if entries:
+            self.figure.legend(handles=list(entries), loc="lower left", ncols=4, columnspacing=1.4, borderaxespad=0.3,
+                               bbox_to_anchor=(_LEFT / style.WIDTH - 0.02, 0.0))  # fmt: skip
+
+
+def sheet(
+    study: Study, places: NDArray[np.complex128], titles: Sequence[str], title: str, *, bar: bool
+) -> Sheet:  # fmt: skip
+    """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all."""
+    number = len(titles)
+    x, y = places.real, places.imag
+    pad = _PAD * max(float(np.ptp(x)), float(np.ptp(y)), 1e-12)
+    wide, tall = float(np.ptp(x)) + 2 * pad, float(np.ptp(y)) + 2 * pad
+    columns = number if number < 4 else 2 if number == 4 else 3
+    rows = -(-number // columns)
+    room = style.WIDTH - _RIGHT - (_BAR if bar else 0.0)
+    scale = min((room - _LEFT * columns) / columns / wide, (_TALLEST if rows == 1 else 7.5 / rows) / tall)
+    width, height = scale * wide, scale * tall
+    above = _TOP if number > 1 else 0.0
+    outer = 0.4 + rows * (height + above) + (rows - 1) * 0.28 + _BELOW + _LEGEND
+    figure = style.new_figure(style.WIDTH, outer, layout=None)
+    step = (room - _LEFT) / columns
+    panels = []
+    for k, name in enumerate(titles):
+        column, row = k % columns, k // columns
+        left = _LEFT + column * step + max(0.0, (step - _LEFT - width) / 2) * (number > 1)
+        low = _LEGEND + _BELOW + (rows - 1 - row) * (height + above + 0.28)
+        axes = figure.add_axes((left / style.WIDTH, low / outer, width / style.WIDTH, height / outer))
+        axes.set_xlim(float(x.min()) - pad, float(x.max()) + pad)
+        axes.set_ylim(float(y.min()) - pad, float(y.max()) + pad)
+        axes.set_aspect("equal")
+        axes.grid(visible=False)
+        axes.set_title(name, loc="left", fontsize=9.5)
+        unit = study.units.label("length")
+        if row == rows - 1 or k + columns >= number:
+            axes.set_xlabel(style.axis_label("x", unit))
+        if column == 0:
+            axes.set_ylabel(style.axis_label("y", unit))
+        panels.append(axes)
+    figure.text(_LEFT / style.WIDTH, 1 - 0.12 / outer, title[0].upper() + title[1:], va="top", fontsize=11)
+    colors = None
+    if bar:
+        edge = (_LEFT + (columns - 1) * step + width if number == 1 else room) + 0.15
+        long = min(rows * (height + above + 0.28) - above - 0.28, 4.0)
+        middle = _LEGEND + _BELOW + (rows * (height + above + 0.28) - above - 0.28) / 2
+        colors = figure.add_axes(
+            (edge / style.WIDTH, (middle - long / 2) / outer, 0.16 / style.WIDTH, long / outer)
+        )  # fmt: skip
+    return Sheet(figure, tuple(panels), colors)

@@ -1,0 +1,108 @@
+"""Pictures of workspaces: equal axes, what ends the region, levels of maps and their names, panels side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.report.figures import style
+from mechdesign.report.figures.inscribed import inscribed_figure
+from mechdesign.report.figures.maps import index_columns
+from mechdesign.report.figures.regions import fate, regions
+from mechdesign.report.figures.workspace import figures
+from mechdesign.results import Column, Result, Table
+
+FIVE_BAR = """
+units: {length: m}
+mechanism:
+  links:
+    ground: {B1: [-0.15, 0], B2: [0.15, 0]}
+    lower_1: [B1, D1, 0.25]
+    upper_1: [D1, C, 0.4]
+    lower_2: [B2, D2, 0.25]
+    upper_2: [D2, C, 0.4]
+  drives: {phi1: {angle: lower_1}, phi2: {angle: lower_2}}
+  limits: [{distance: [B1, C], max: 0.6}]
+  sketch: {D1: [-0.33, 0.17], D2: [0.33, 0.17], C: [0, 0.4]}
+workspace: {point: C, scan: {about: [0, 0], from: 0, to: 180, rays: 40}}
+"""
+ARM = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    upper: [O, A, 40]
+    lower: [A, B, 30]
+    hand: [B, T, 10]
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}, q3: {angle: hand, from: lower}}
+  sketch: {A: [20, 35], B: [48, 28], T: [48, 18]}
+workspace: {point: T, at: {hand.angle: [-90, 0, 60]}, scan: {rays: 30}, characteristic_length: 10}
+"""
+
+
+def test_maps_have_equal_axes_named_levels_and_a_legend_of_what_ends_the_region() -> None:
+    study = study_of(FIVE_BAR)
+    result = mechdesign.workspace(study)
+    with style.context():
+        drawn = figures(study, result)
+        page = drawn["inverse_condition"]
+    assert {*index_columns(regions(study, result)[0]), "workspace", "drives"} <= set(drawn)
+    axes, bar = page.axes
+    assert axes.get_aspect() == 1
+    ticks = [float(label.get_text()) for label in bar.get_yticklabels()]
+    named = [float(text.get_text()) for text in axes.texts]
+    assert named
+    assert set(named) <= set(ticks)
+    assert len(set(named)) == len(named)
+    words = {text.get_text() for text in page.legends[0].get_texts()}
+    assert {"ends at a limit", "a leg is stretched"} <= words
+    assert axes.get_xlabel() == "x [m]"
+
+
+def test_held_coordinates_are_shown_side_by_side_at_one_scale() -> None:
+    study = study_of(ARM)
+    with style.context():
+        page = figures(study, mechdesign.workspace(study))["inverse_condition"]
+    panels = page.axes[:3]
+    assert [axes.get_title(loc="left") for axes in panels] == [
+        "hand.angle = -90 deg", "hand.angle = 0 deg", "hand.angle = 60 deg"]  # fmt: skip
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in panels}) == 1
+
+
+@pytest.mark.parametrize(("kind", "at", "expected"), [
+    ("limit", "q1 stretched", "limit"), ("singularity", "upper-lower stretched", "stretched"),
+    ("singularity", "upper-lower folded", "folded"), ("singularity", "assembly 0", "singularity"),
+])  # fmt: skip
+def test_fates(kind: str, at: str, expected: str) -> None:
+    assert fate(kind, at) == expected
+
+
+def test_an_index_that_grows_without_bound_is_cut_off_and_the_bar_says_so() -> None:
+    study = study_of(FIVE_BAR)
+    result = mechdesign.workspace(study)
+    with style.context():
+        page = figures(study, result)["resistivity"]
+    top = max(float(label.get_text()) for label in page.axes[1].get_yticklabels())
+    assert top < np.nanmax(result.tables["local"]["resistivity"]) / 10
+    # An arrow instead of a flat end.
+    assert page.axes[0].collections[0].extend == "max"
+
+
+def test_the_largest_shapes_are_drawn_where_the_table_has_them() -> None:
+    study = study_of(FIVE_BAR)
+    result = mechdesign.workspace(study)
+    found = regions(study, result)
+    plain = Result("workspace", {**result.tables, "indices": Table("indices", (Column("area", np.ones(1)),))})
+    shapes = {"circle_x": 0.0, "circle_y": 0.4, "circle_radius": 0.1, "rectangle_x": 0.0, "rectangle_y": 0.4,
+              "rectangle_width": 0.2, "rectangle_height": 0.1}  # fmt: skip
+    columns = tuple(Column(name, np.array([value])) for name, value in shapes.items())
+    with style.context():
+        assert inscribed_figure(study, plain, found) is None
+        page = inscribed_figure(
+            study, Result("workspace", {**result.tables, "indices": Table("indices", columns)}), found
+        )
+    assert page is not None
+    circle, rectangle = page.axes[0].patches[-2:]
+    assert circle.get_window_extent().height == pytest.approx(2 * rectangle.get_window_extent().height, rel=1e-6)
+    assert [text.get_text() for text in page.axes[0].texts] == ["r = 0.1 m", "0.2 x 0.1 m"]
