@@ -59,7 +59,7 @@ def same(a: Configuration, b: Configuration) -> None:
         assert np.array_equal(one, two, equal_nan=True)
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(mechanisms())
 def test_a_sketch_is_assembled_in_the_pose_it_was_drawn_in(made: Made) -> None:
     mechanism = made.mechanism
@@ -74,7 +74,7 @@ def test_a_sketch_is_assembled_in_the_pose_it_was_drawn_in(made: Made) -> None:
             assert (wrap(miss) if coordinate[0] == "angle" else miss) == pytest.approx(0, abs=1e-9), name
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(mechanisms(), st.sampled_from([0.2, 1.0, 4.0]))
 def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
     time = np.linspace(-reach, reach, 41)
