@@ -26,6 +26,8 @@ from mechdesign.study.workspace_models import WorkspaceSection
 # One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
 CLOSE, BRISK = Effort(128, 48), Effort(16, 6)
 SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
+# Rays of the tables of local indices and of the boundary, unless the study says how many.
+RAYS = 181
 RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6
@@ -292,5 +294,5 @@ def _simple(
 
 
 __all__ = [
-    "BRISK", "CLOSE", "COLUMNS", "Answer", "Integral", "Question", "answer", "batched", "columns", "questions", "split",
+    "BRISK", "CLOSE", "COLUMNS", "RAYS", "Answer", "Integral", "Question", "answer", "batched", "columns", "questions", "split",
 ]  # fmt: skip

@@ -12,14 +12,11 @@ from mechdesign.analyses.indices import INDICES, prepare
 from mechdesign.analyses.indices.index import determinant_power, power_of_length
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.rays import Designs, Floats
-from mechdesign.analyses.region import CLOSE, COLUMNS, Answer, Question, answer, questions, split
+from mechdesign.analyses.region import CLOSE, COLUMNS, RAYS, Answer, Question, answer, questions, split
 from mechdesign.errors import AssemblyError
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-
-# Rays of the tables of local indices and of the boundary, unless the study says how many.
-RAYS = 181
 
 
 def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:

@@ -19,9 +19,10 @@ from mechdesign.study.reporter import Reporter
 from mechdesign.study.sections import COMMANDS, KinematicsSection
 from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.units import KINDS, QUANTITY, QuantityError, describe, measure
-from mechdesign.study.workspace_models import WorkspaceSection
+from mechdesign.study.workspace_models import INDEX_NAMES, NEEDED, WorkspaceSection
 
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
+_STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
@@ -29,7 +30,7 @@ def check(
     parts: Mapping[str, Any], names: Names, parameters: Parameters, reporter: Reporter, folder: pathlib.Path
 ) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
-    checker = Checker(names, parameters, reporter)
+    checker = Checker(names, parameters, reporter, parts)
     found = dict(parts)
     for command in COMMANDS:
         section = parts.get(command)
@@ -56,8 +57,9 @@ def check(
 class Checker:
     """Looks names and units up, and notes what is wrong with them."""
 
-    def __init__(self, names: Names, parameters: Parameters, reporter: Reporter) -> None:
+    def __init__(self, names: Names, parameters: Parameters, reporter: Reporter, parts: Mapping[str, Any]) -> None:
         self.names = names
+        self.parts = parts
         self.parameters = parameters
         self.reporter = reporter
 
@@ -128,6 +130,11 @@ class Checker:
             for index in range(len(values)):
                 if quantity in ("length", "angle"):
                     self.kind((*path, index), quantity)
+        for index, name in enumerate(section.indices or ()):
+            needed = NEEDED.get(name)
+            if needed is not None and self.parts.get(needed) is None:
+                message = f"the index {name!r} needs the {needed} section, and the study has none"
+                self.reporter.report(("workspace", "indices", index), message)
         scan = section.scan
         if (scan.from_ is None) != (scan.to is None):
             self.reporter.report(("workspace", "scan"), "'from' and 'to' belong together")
@@ -180,8 +187,9 @@ class Checker:
     def _result(self, name: str, path: Path, *, dotted: bool = False) -> None:
         command, _, rest = name.partition(".")
         if not rest:
-            if dotted or name not in INDICES:
-                hint = suggestion(name, INDICES) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+            known = (*INDICES, *_STATISTICS)
+            if dotted or name not in known:
+                hint = suggestion(name, known) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
                 self.reporter.report(path, f"there is no result {name!r}{hint}")
         else:
             self.known(command, COMMANDS, "command", path)

@@ -90,6 +90,13 @@ class Study:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
 
+    @cached_property
+    def _nodes(self) -> poses.Poses:
+        # Here, for these poses are themselves the answer to a question.
+        from mechdesign.analyses.nodes import workspace_nodes
+
+        return workspace_nodes(self)
+
     def poses(self, section: str) -> poses.Poses:
         """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
 
@@ -102,6 +109,8 @@ class Study:
         """
         for name in dict.fromkeys((section, "kinematics")):
             asked: PoseSection | None = getattr(self, name)
+            if asked is not None and asked.at_nodes:
+                return self._nodes
             if asked is not None:
                 folder = self.path.parent if self.path else pathlib.Path()
                 found = poses.expand(asked, folder)

@@ -16,6 +16,7 @@ from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter
 from mechdesign.study.sections import COMMANDS, KinematicsSection
 from mechdesign.study.targets import Target
+from mechdesign.study.workspace_models import WorkspaceSection
 
 if TYPE_CHECKING:
     from mechdesign.study.checks import Checker
@@ -26,6 +27,8 @@ _ACCELERATION_KINDS: dict[Quantity, str] = {"length": "acceleration", "angle": "
 
 def coordinates(checker: Checker, command: str, section: PoseSection) -> None:
     """Check the names and units of the coordinates that poses give."""
+    if section.at_nodes and checker.parts.get("workspace") is None:
+        checker.reporter.report((command, "poses"), "needs the workspace section, whose nodes are meant")
     for index, pose in enumerate(section.poses or ()):
         _given(checker, pose, (command, "poses", index))
     for name in section.sweep or ():
@@ -76,9 +79,17 @@ def rates(checker: Checker, command: str, section: KinematicsSection | Reliabili
             checker.reporter.report((command, key), message, at_key=True)
 
 
+def _of_nodes(checker: Checker) -> list[str]:
+    """What the nodes of the workspace give."""
+    section: WorkspaceSection | None = checker.parts.get("workspace")
+    return [] if section is None else [f"{section.point}.x", f"{section.point}.y", *section.at]
+
+
 def _sets(checker: Checker, section: PoseSection) -> list[set[str]]:
     """The different sets of coordinates that the poses of a section give."""
-    if section.poses is not None:
+    if section.at_nodes:
+        return [set(_of_nodes(checker))]
+    if section.poses:
         return [set(names) for names in dict.fromkeys(frozenset(pose) for pose in section.poses)]
     if section.sweep is not None:
         return [set(section.sweep)]

@@ -9,7 +9,17 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from mechdesign.study.models import Model
-from mechdesign.study.numbers import NUMBER_FORM, Context, CoordinateName, Number, Whole, failure, or_short, read_number
+from mechdesign.study.numbers import (
+    NUMBER_FORM,
+    Context,
+    CoordinateName,
+    Number,
+    OrShort,
+    Whole,
+    failure,
+    or_short,
+    read_number,
+)
 
 
 class Sweep(Model):
@@ -74,18 +84,29 @@ class _PathValues:
 
 def _poses(raw: Any) -> Any:
     if raw == "workspace":
-        raise failure("'workspace' as poses is not available in this version; use poses, sweep or path")
+        return ()
     if isinstance(raw, list) and not raw:
         raise failure("an empty list of poses")
     return raw
 
 
 class PoseSection(Model):
-    """Where a question is asked: listed poses, a sweep, or a path."""
+    """Where a question is asked: listed poses, a sweep, a path, or the nodes of the workspace section.
 
-    poses: Annotated[tuple[dict[CoordinateName, Number], ...], BeforeValidator(_poses)] | None = None
+    The list is empty where the study says ``poses: workspace``.
+    """
+
+    poses: (
+        Annotated[tuple[dict[CoordinateName, Number], ...], BeforeValidator(_poses), OrShort(({"const": "workspace"},))]
+        | None
+    ) = None
     sweep: dict[CoordinateName, Sweep] | None = None
     path: dict[CoordinateName, Annotated[str | tuple[Any, ...], _PathValues()]] | None = None
+
+    @property
+    def at_nodes(self) -> bool:
+        """Whether the poses are the nodes of the workspace section."""
+        return self.poses == ()
 
     @model_validator(mode="after")
     def _one_source(self) -> PoseSection:

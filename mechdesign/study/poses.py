@@ -123,14 +123,14 @@ def sweep_values(sweep: Sweep) -> Floats:
 
 
 def expand(section: PoseSection, folder: Path) -> Poses | None:
-    """Poses of a section, None where it gives none.
+    """Poses of a section, None where it gives none, or those of the workspace.
 
     Raises
     ------
     StudyError
         Where there are too many, or a path's file or lengths are wrong.
     """
-    if section.poses is not None:
+    if section.poses:
         return _listed(section.poses)
     if section.sweep is not None:
         return _grid({name: sweep_values(sweep) for name, sweep in section.sweep.items()})

@@ -24,11 +24,12 @@ from mechdesign.study.numbers import (
     failure,
 )
 
-
 INDEX_NAMES = (
     "inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max", "k_min", "sigma_position",
     "reliability",
 )  # fmt: skip
+# The section of the study that an index needs beside the workspace.
+NEEDED = {"k_min": "stiffness", "sigma_position": "reliability", "reliability": "reliability"}
 
 
 class Scan(Model):

@@ -118,7 +118,7 @@ def test_nothing_is_assumed_without_reason(poses, text, message):
         ("{path: {crank: missing.csv}}", "missing.csv cannot be read: No such file"),
         ("{path: {crank: [1, [2, 3]]}}", "not a mixture"),
         ("{path: {B.x: [[1, 2]]}}", "'B.x' needs a list of numbers"),
-        ("{poses: workspace}", "not available in this version"),
+        ("{poses: workspace}", "kinematics.poses: needs the workspace section"),
     ],
 )
 def test_wrong_poses(poses, section, message):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +18,8 @@ def assembled_only(evaluate: Callable[[Configuration], Floats]) -> Evaluate:
     """An index from what evaluates flat batches of assembled configurations; nan where there is none."""
 
     def everywhere(local: Local) -> Floats:
-        configuration = local.configuration
+        whole = local.configuration
+        configuration = replace(whole, reason=np.broadcast_to(whole.reason, whole.shape))
         finite = np.ones(configuration.shape, dtype=bool)
         for node in configuration.nodes:
             finite &= np.isfinite(node)
