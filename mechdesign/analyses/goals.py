@@ -1,89 +1,35 @@
-"""Results by which designs are compared: workspace indices of whole batches, any other result design by design."""
+"""Goals of designs: one evaluation for every question, of thousands of designs at once wherever that is possible."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mechdesign.analyses import stacked
+from mechdesign.analyses.objectives import Goal, bounds_of, goal
+from mechdesign.analyses.poses import solve_poses
 from mechdesign.analyses.rays import Floats
-from mechdesign.analyses.region import BRISK, GRID_TOLERANCE, Answer, Question, answer, batched, questions
-from mechdesign.errors import MechdesignError, Problem, StudyError
+from mechdesign.analyses.region import BRISK, GRID_TOLERANCE, Question, answer, questions, split
+from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
+from mechdesign.expressions import Number
 from mechdesign.results import Result
-from mechdesign.study import Study, load
-from mechdesign.study.optimize_models import Condition
-from mechdesign.study.sections import COMMANDS
+from mechdesign.rows import UnknownColumnError, choose
+from mechdesign.study import Study
+from mechdesign.study.variants import faults, follows, variant
 
-
-@dataclass(frozen=True)
-class Goal:
-    """A result that is maximised, minimised or bounded: a workspace index, or the worst row of a column.
-
-    Parameters
-    ----------
-    command, column : str
-        Where it is found.
-    smallest : bool
-        Whether the largest row is the worst one.
-    absolute : bool
-        Judge absolute values.
-    """
-
-    name: str
-    command: str
-    column: str
-    smallest: bool = False
-    absolute: bool = False
-    where: tuple[tuple[str, object], ...] = ()
-
-    @property
-    def index(self) -> bool:
-        """Whether it is an index of the workspace, evaluated for many designs at once."""
-        return self.command == "workspace" and batched(self.column) and not self.where
-
-    def worst(self, result: Result) -> float:
-        """The value of the worst row; nan where a row has none.
-
-        Raises
-        ------
-        KeyError
-            If no table has the column.
-        """
-        for table in result.tables.values():
-            if self.column in table:
-                rows = np.ones(len(table), dtype=bool)
-                for column, wanted in self.where:
-                    rows &= np.asarray([str(value) == str(wanted) for value in table[column].tolist()])
-                values = np.asarray(table[self.column], dtype=float)[rows]
-                values = np.abs(values) if self.absolute else values
-                if not values.size:
-                    return float("nan")
-                return float(np.max(values) if self.smallest else np.min(values))
-        raise KeyError(self.column)
-
-
-def goal(name: str, *, smallest: bool = False) -> Goal:
-    """Read a result's name, such as ``GII``, ``workspace.area``, ``stiffness.k_min`` or ``kinematics.C.y_error``.
-
-    Of an error the absolute value counts.
-    """
-    command, _, column = name.partition(".")
-    if command not in COMMANDS:
-        command, column = "workspace", name
-    return Goal(name, command, column, smallest, absolute=column.endswith("_error"))
-
-
-def bounds_of(condition: Condition) -> Iterator[tuple[Goal, float, bool]]:
-    """The worst rows that a condition judges, with the bound and whether it is an upper one."""
-    command, _, column = condition.result.partition(".")
-    if command not in COMMANDS:
-        command, column = "workspace", condition.result
-    for bound, upper in ((condition.at_least, False), (condition.at_most, True)):
-        if bound is not None:
-            name = f"{condition.result} {'at most' if upper else 'at least'} {bound:g}"
-            yield Goal(name, command, column, upper, condition.abs, tuple(condition.where.items())), bound, upper
+EMPTY = "nothing of the workspace can be reached"
+# By `mechdesign.mechanism.Reason`.
+FAILED = (
+    "",
+    "a pose cannot be assembled",
+    "a pose is reached in another assembly only",
+    "a pose is outside the limits",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,78 +42,236 @@ class Evaluated:
 
 
 class Evaluator:
-    """Evaluates goals for designs of one study."""
+    """Evaluates goals for designs of one study, which differ in parameters or single places.
+
+    Three ways lead to the same numbers: the workspaces of all designs, and the tables of all designs, are computed
+    together; what is left is asked of each design by a variant of the study.
+
+    Raises
+    ------
+    StudyError
+        If a goal names what no result has, or the study lacks what it needs.
+    """
 
     def __init__(self, study: Study, goals: Sequence[Goal]) -> None:
+        assert study.optimize is not None
         self.study = study
-        self.goals = list(goals)
+        self.goals = list(dict.fromkeys(goals))
         self.question: Question | None = None
-        if any(goal.index for goal in goals):
-            columns = dict.fromkeys(("area", *(goal.column for goal in goals if goal.index)))
-            asked = questions(study, GRID_TOLERANCE, tuple(columns))
+        self._columns = tuple(dict.fromkeys(("area", *(g.column for g in self.goals if g.regional))))
+        names = study.optimize.variables
+        if any(each.regional for each in self.goals):
+            asked = questions(study, GRID_TOLERANCE, self._columns)
             if len(asked) > 1:
                 message = "an optimisation compares one workspace a design: hold one value of each coordinate"
                 raise StudyError((Problem(message, "workspace.at", str(study.path or "")),))
-            self.question = asked[0]
-        if not all(goal.index for goal in goals):
-            self._check_parameters()
+            if all(each.index for each in self.goals if each.regional) and not follows(study, names, ("workspace",)):
+                self.question = asked[0]
+        # Goals of commands and tables whose answers are found for all designs at once; the others.
+        self._together: dict[str, dict[str, list[Goal]]] = {}
+        self._alone: dict[str, list[Goal]] = {}
+        problems = [problem for command in self._commands() for problem in self._look(command)]
+        if problems:
+            raise StudyError(problems)
 
-    def _check_parameters(self) -> None:
+    def _commands(self) -> list[str]:
+        return list(dict.fromkeys(each.command for each in self.goals if not each.regional))
+
+    def _look(self, command: str) -> Iterator[Problem]:
+        """Find the tables of a command's goals, before anything is computed but the study's own design."""
+        goals = [each for each in self.goals if each.command == command and not each.regional]
+        file = str(self.study.path or "")
+        if command == "optimize":
+            yield Problem("an optimisation cannot judge itself", self._key(goals[0]), file)
+            return
         assert self.study.optimize is not None
-        for name in self.study.optimize.variables:
-            if name not in self.study.parameters.nominal:
-                message = "only parameters can be varied for results other than the workspace's; give it a name there"
-                raise StudyError((Problem(message, f"optimize.variables.{name}", str(self.study.path or "")),))
+        if command in stacked.TABLES:
+            result = stacked.tables(self.study, command, stacked.TABLES[command], 1, {}, {}).result
+            together = stacked.possible(self.study, command, self.study.optimize.variables)
+            for each in list(goals):
+                try:
+                    table = choose(result, each.column, dict(each.where)).table.name
+                except UnknownColumnError:
+                    continue
+                goals.remove(each)
+                if together:
+                    self._together.setdefault(command, {}).setdefault(table, []).append(each)
+                else:
+                    self._alone.setdefault(command, []).append(each)
+        if not goals:
+            return
+        self._alone.setdefault(command, []).extend(goals)
+        try:
+            result = _ask(_quick(self.study), command)
+        except AssemblyError:
+            # The study's own design has no such result; others tell.
+            return
+        for each in goals:
+            try:
+                each.worst(result)
+            except UnknownColumnError as error:
+                yield Problem(str(error), self._key(each), file)
+
+    def _key(self, wanted: Goal) -> str:
+        """Where the study names a goal."""
+        section = self.study.optimize
+        assert section is not None
+        for key, names in (("maximize", section.maximize), ("minimize", section.minimize)):
+            for index, name in enumerate(names):
+                if goal(name, smallest=key == "minimize") == wanted:
+                    return f"optimize.{key}.{index}"
+        for index, condition in enumerate(section.subject_to):
+            if any(judged == wanted for judged, _, _ in bounds_of(condition)):
+                return f"optimize.subject_to.{index}"
+        return "optimize"
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
-        """Evaluate a batch of designs, given by the values of the variables."""
+        """Evaluate a batch of designs, given by the values of the variables in the study's units."""
         count = len(next(iter(designs.values())))
-        values: dict[Goal, Floats] = {}
-        errors: dict[str, Floats] = {}
-        reasons = [""] * count
+        batch = _Batch(self.study, designs, count, self.goals)
         if self.question is not None:
-            places = {
-                name: np.broadcast_to(np.asarray(value, dtype=float), count)
-                for name, value in self.study.parameters.places(designs).items()
-            }
-            given = answer(self.question, places, count, BRISK)
-            values = {goal: given.values[goal.column] for goal in self.goals if goal.index}
-            errors = {goal.name: given.errors[goal.column] for goal in values if goal.column in ("GII", "GRI")}
-            reasons = _why(given)
-        others = [goal for goal in self.goals if not goal.index]
-        values |= {goal: np.full(count, np.nan) for goal in others}
-        for k in range(count if others else 0):
-            if not reasons[k]:
-                reasons[k] = self._one({name: column[k] for name, column in designs.items()}, values, k)
-        return Evaluated(values, errors, reasons)
+            self._workspaces(batch, np.flatnonzero(batch.feasible))
+        for command, tables in self._together.items():
+            rows, size = np.flatnonzero(batch.feasible), stacked.size(self.study, command)
+            for begin in range(0, len(rows), size):
+                self._tables(batch, command, tables, rows[begin : begin + size])
+        if self._alone or (self.question is None and any(each.regional for each in self.goals)):
+            for k in np.flatnonzero(batch.feasible).tolist():
+                batch.reasons[k] = self._one(batch, k)
+        return Evaluated(batch.values, batch.errors, [str(reason) for reason in batch.reasons])
 
-    def _one(self, design: Mapping[str, float], values: Mapping[Goal, Floats], k: int) -> str:
-        """Ask the other questions of one design; returns why it is infeasible."""
-        assert self.study.path is not None
-        changes = [f"mechanism.parameters.{name}={float(value)!r}" for name, value in design.items()]
-        others = [goal for goal in self.goals if not goal.index]
+    def _workspaces(self, batch: _Batch, rows: NDArray[np.intp]) -> None:
+        if not len(rows):
+            return
+        assert self.question is not None
         try:
-            variant = load(self.study.path, [*self.study.overrides, *changes], self.study.seed)
-            for command in dict.fromkeys(goal.command for goal in others):
-                result: Result = getattr(import_module(f"mechdesign.analyses.{command}"), command)(variant)
+            self._regional(batch, rows, self.question, batch.take(batch.places, rows))
+        except AssemblyError as error:
+            # One design's workspace has no end; the others are still to be told.
+            if len(rows) == 1:
+                batch.reasons[rows] = str(error)
+                return
+            for half in np.array_split(rows, 2):
+                self._workspaces(batch, half)
+
+    def _regional(self, batch: _Batch, rows: NDArray[np.intp], question: Question, places: dict[str, Floats]) -> None:
+        given = answer(question, places, len(rows), BRISK)
+        for each in self.goals:
+            if each.regional:
+                batch.values[each][rows] = given.values[each.column]
+                if split(each.column)[1] == "mean":
+                    batch.errors.setdefault(each.name, np.full(len(batch.reasons), np.nan))[rows] = given.errors[
+                        each.column
+                    ]
+        batch.reasons[rows[~(given.panels.closes & (given.values["area"] > 0))]] = EMPTY
+
+    def _tables(
+        self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: NDArray[np.intp]
+    ) -> None:
+        places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
+        stack = stacked.tables(self.study, command, tables.keys(), len(rows), places, parameters)
+        failed = FAILED_ARRAY[_first(stack.reason)]
+        wrong = stack.reason != 0
+        batch.note(rows, wrong.any(axis=1) if stack.listed else wrong.all(axis=1), failed)
+        for each in (each for goals in tables.values() for each in goals):
+            values = each.worst(stack.result, len(rows))
+            batch.values[each][rows] = values
+            batch.note(rows, np.isnan(values), np.where(failed == "", f"{each.name} has no value", failed))
+
+    def _one(self, batch: _Batch, k: int) -> str:
+        """Ask what is left of one design; returns why it is infeasible."""
+        row = np.array([k])
+        command = ""
+        try:
+            other = variant(self.study, {name: float(column[k]) for name, column in batch.designs.items()})
+            if self.question is None and any(each.regional for each in self.goals):
+                self._regional(batch, row, questions(other, GRID_TOLERANCE, self._columns)[0], {})
+                if batch.reasons[k]:
+                    return str(batch.reasons[k])
+            for command, goals in self._alone.items():
+                result = _ask(other, command)
                 if result.failed:
-                    return result.failed
-                for goal in others:
-                    if goal.command == command:
-                        values[goal][k] = goal.worst(result)
-                        if np.isnan(values[goal][k]):
-                            return f"{goal.name} has no value"
-        except KeyError as error:
-            raise StudyError((_unknown(self.study, str(error.args[0])),)) from None
+                    return _pose_reason(other, command)
+                for each in goals:
+                    batch.values[each][k] = each.worst(result)[0]
+                    if np.isnan(batch.values[each][k]):
+                        return _pose_reason(other, command) or f"{each.name} has no value"
+        except UnknownColumnError as error:
+            return str(error)
+        except AssemblyError as error:
+            return (_pose_reason(other, command) if command else "") or str(error)
         except MechdesignError as error:
-            return str(error).splitlines()[0].removeprefix(f"{self.study.path}: ")
+            return _plainly(error)
         return ""
 
 
-def _unknown(study: Study, column: str) -> Problem:
-    return Problem(f"no result has a column '{column}'", "optimize", str(study.path or ""))
+class _Batch:
+    """Designs of one call, and what is found of them."""
+
+    def __init__(self, study: Study, designs: Mapping[str, Floats], count: int, goals: Sequence[Goal]) -> None:
+        self.designs = {name: np.broadcast_to(np.asarray(v, dtype=float), count) for name, v in designs.items()}
+        values = study.parameters.values(self.designs)
+        self.parameters = {name: value for name, value in values.items() if np.ndim(value)}
+        self.places = study.parameters.places(self.designs)
+        self.values: dict[Goal, Floats] = {each: np.full(count, np.nan) for each in goals}
+        self.errors: dict[str, Floats] = {}
+        self.reasons = np.array(faults(study, self.parameters, self.places, count), dtype=object)
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Designs that nothing is said against."""
+        return np.asarray(self.reasons == "", dtype=bool)
+
+    def take(self, values: Mapping[str, Number], rows: NDArray[np.intp]) -> dict[str, Floats]:
+        """Values of some designs."""
+        return {
+            name: np.broadcast_to(np.asarray(value, dtype=float), len(self.reasons))[rows]
+            for name, value in values.items()
+        }
+
+    def note(self, rows: NDArray[np.intp], wrong: NDArray[np.bool_], reasons: NDArray[np.object_]) -> None:
+        """Say what is wrong with some of the rows, where nothing has been said yet."""
+        new = wrong & (self.reasons[rows] == "")
+        self.reasons[rows[new]] = reasons[new]
 
 
-def _why(given: Answer) -> list[str]:
-    closes = given.panels.closes & (given.values["area"] > 0)
-    return ["" if well else "nothing of the workspace can be reached" for well in closes]
+FAILED_ARRAY = np.array(FAILED, dtype=object)
+
+
+def _first(reason: NDArray[np.int8]) -> NDArray[np.intp]:
+    """The first reason of each design's poses, shape (designs,); 0 where none fails."""
+    worst = np.where(reason == 0, len(FAILED), reason).min(axis=1, initial=len(FAILED))
+    return np.where(worst == len(FAILED), 0, worst).astype(np.intp)
+
+
+def _pose_reason(study: Study, command: str) -> str:
+    """Why poses of a command fail; empty where none does, or where it is not asked of poses."""
+    if command == "workspace":
+        return EMPTY
+    found = [solved.configuration.reason for solved in solve_poses(study, study.poses(command))]
+    return FAILED[int(_first(np.concatenate(found)[None])[0])]
+
+
+def _ask(study: Study, command: str) -> Result:
+    result: Result = getattr(import_module(f"mechdesign.analyses.{command}"), command)(study)
+    return result
+
+
+def _quick(study: Study) -> Study:
+    """The study with as few samples as there may be, where only the names of columns are asked."""
+    section = study.reliability
+    few = None if section is None else section.model_copy(update={"samples": 2})
+    return dataclasses.replace(study, reliability=few)
+
+
+def _plainly(error: MechdesignError) -> str:
+    """An error without the file's name and the number at fault, so that designs with one mistake count together."""
+    if isinstance(error, StudyError):
+        first = error.problems[0]
+        text = ": ".join(part for part in (first.key, first.message) if part)
+    else:
+        text = str(error).splitlines()[0]
+    return text.partition(", not ")[0]
+
+
+__all__ = ["Evaluated", "Evaluator", "Goal", "bounds_of", "goal"]

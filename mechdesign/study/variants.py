@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -122,23 +122,29 @@ def moved(study: Study, names: Collection[str]) -> set[str]:
     return found
 
 
-def follows(study: Study, names: Collection[str]) -> bool:
-    """Whether more than numbers of the geometry depends on parameters or places.
+def places_of(study: Study, names: Collection[str]) -> set[str]:
+    """Places that are among the names, or depend on one of them."""
+    parameters = moved(study, names)
+    followers = {place for place, formula in study.parameters.dependent.items() if formula.names & parameters}
+    return {*followers, *(name for name in names if name in study.parameters.factors)}
+
+
+def follows(study: Study, names: Collection[str], sections: Collection[str] = SECTIONS) -> bool:
+    """Whether more than numbers of the geometry depends on parameters or places: numbers of sections, or the sketch's.
 
     A name in any text of a section counts: that it never misses matters more than that it is sometimes wrong.
     """
     parameters = moved(study, names)
     mechanism = study.resolved["mechanism"]
     # An expression of a target is evaluated with the parameters at hand; the numbers of a list are not.
-    read = [study.resolved.get(name) for name in SECTIONS]
+    read = [study.resolved.get(name) for name in sections]
     read += [target for target in (mechanism.get("targets") or {}).values() if not isinstance(target, str)]
     if any(_mentions(part, parameters) for part in read):
         return True
     if not study.parameters.measured:
         return False
-    formulas = study.parameters.dependent
-    places = {*names, *(place for place, formula in formulas.items() if formula.names & parameters)}
-    return _mentions(mechanism.get("sketch"), parameters) or any(_drawn(study, place) for place in places)
+    drawn = any(_drawn(study, place) for place in places_of(study, names))
+    return drawn or _mentions(mechanism.get("sketch"), parameters)
 
 
 def _drawn(study: Study, place: str) -> bool:
@@ -211,12 +217,3 @@ def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[An
 def _long(raw: Any) -> dict[str, Any]:
     """A binary link with its keys."""
     return dict(zip(("from", "to", "length"), raw, strict=False)) if isinstance(raw, list) else dict(raw)
-
-
-def names_in(study: Study, names: Collection[str]) -> Iterator[str]:
-    """Places that depend on any of the names."""
-    parameters = moved(study, names)
-    for place, formula in study.parameters.dependent.items():
-        if place not in names and formula.names & parameters:
-            yield place
-    yield from (name for name in names if name in study.parameters.factors)

@@ -1,0 +1,296 @@
+"""Goals of designs: the same numbers as the commands give for each design, positions of wrong names, reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.analyses.goals import Evaluator, Goal, goal
+from mechdesign.errors import MechdesignError, StudyError
+from mechdesign.study import Study
+from mechdesign.study.optimize_models import Condition
+from mechdesign.study.variants import variant
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+Designs = Mapping[str, np.ndarray]
+
+
+def varied(path: str, names: list[str], *changes: str) -> Study:
+    variables = ", ".join(f"{name}: {{from: -1000, to: 1000, number: 2}}" for name in names)
+    return mechdesign.load(CONFIGS / path, [f"optimize={{variables: {{{variables}}}, maximize: [GII]}}", *changes])
+
+
+def around(study: Study, names: list[str], count: int, width: float, seed: int = 0) -> Designs:
+    """Designs about the study's own, its own first."""
+    rng = np.random.default_rng(seed)
+    nominal = {name: mechdesign_value(study, name) for name in names}
+    shifts = {name: width * (abs(value) or 1.0) * rng.uniform(-1, 1, count) for name, value in nominal.items()}
+    return {name: np.concatenate([[nominal[name]], nominal[name] + shift]) for name, shift in shifts.items()}
+
+
+def mechdesign_value(study: Study, name: str) -> float:
+    if name in study.parameters.nominal:
+        return study.parameters.nominal[name]
+    return study.mechanism.nominal[name] / study.parameters.factors[name]
+
+
+def one_by_one(study: Study, goals: list[Goal], designs: Designs) -> dict[Goal, np.ndarray]:
+    """What the commands say of each design, nan where they fail."""
+    count = len(next(iter(designs.values())))
+    found = {each: np.full(count, np.nan) for each in goals}
+    for k in range(count):
+        for command in {each.command for each in goals}:
+            try:
+                result = getattr(mechdesign, command)(variant(study, {n: float(v[k]) for n, v in designs.items()}))
+            except MechdesignError:
+                continue
+            for each in goals:
+                if each.command == command and not result.failed:
+                    (found[each][k],) = each.worst(result)
+    return found
+
+
+def agree(study: Study, names: list[str], goals: list[Goal], designs: Designs, *, together: bool = True) -> None:
+    evaluator = Evaluator(study, goals)
+    assert bool(evaluator._together) == together
+    found, expected = evaluator(designs), one_by_one(study, goals, designs)
+    feasible = np.array([not reason for reason in found.reasons])
+    assert feasible.any()
+    for each in goals:
+        given = found.values[each][feasible]
+        assert given == pytest.approx(expected[each][feasible], rel=1e-9, abs=1e-9), each.name
+        # Each goal tells designs apart, or this would prove nothing.
+        assert np.ptp(given) > 1e-6 * np.abs(given).max(), each.name
+    lost = np.any([np.isnan(values) for values in expected.values()], axis=0)
+    assert (lost == ~feasible).all()
+
+
+def test_values_ranges_and_errors_of_a_sweep() -> None:
+    """A function generator: parameters that others follow from, targets that depend on them, angles without jumps."""
+    names = ["frame", "p2", "a", "crank.length"]
+    study = varied("gallery/function_generator.yaml", names[:1] + names[3:])
+    goals = [
+        goal("kinematics.mu"),
+        goal("kinematics.follower.angle", smallest=True),
+        goal("kinematics.follower.angle_error", smallest=True),
+        goal("kinematics.targets.rms", smallest=True),
+        goal("kinematics.targets.follower.angle.mean"),
+        goal("kinematics.targets.max_abs", smallest=True),
+        goal("kinematics.extremes.follower.angle.range"),
+        goal("kinematics.extremes.mu.min"),
+        goal("kinematics.extremes.follower.angle_error.max", smallest=True),
+        Goal("at", "kinematics", "mu", where=(("crank", 100),)),
+        Goal("at most", "kinematics", "mu", smallest=True, absolute=True),
+    ]
+    agree(study, names, goals, around(study, ["frame", "crank.length"], 6, 0.03))
+
+
+def test_targets_follow_the_parameters_of_each_design() -> None:
+    study = varied("gallery/function_generator.yaml", ["follower_0"])
+    goals = [goal("kinematics.targets.rms", smallest=True), goal("kinematics.follower.angle_error", smallest=True)]
+    agree(study, ["follower_0"], goals, {"follower_0": np.array([20.0, 25.0, 30.0, 35.0])})
+
+
+def test_full_turns_with_derivatives_and_refined_extremes() -> None:
+    """A crank-rocker, some designs of which no longer turn fully."""
+    names = ["crank.length", "coupler.length", "ground.D.x", "coupler.C.y"]
+    study = varied("gallery/four_bar.yaml", names)
+    goals = [
+        goal("kinematics.C.y"),
+        goal("kinematics.C.x_velocity", smallest=True),
+        goal("kinematics.rocker.angle_acceleration"),
+        goal("kinematics.extremes.rocker.angle.range"),
+        goal("kinematics.extremes.rocker.angle.time_ratio"),
+        goal("kinematics.extremes.C.x.min"),
+        goal("kinematics.extremes.C.x.max_at"),
+    ]
+    designs = around(study, names, 12, 0.3)
+    agree(study, names, goals, designs)
+    reasons = Evaluator(study, goals[:1])(designs).reasons
+    assert "a pose cannot be assembled" in reasons
+
+
+@pytest.mark.parametrize("path", ["gallery/jansen.yaml", "gallery/slider_crank.yaml", "gallery/whitworth.yaml"])
+def test_studies_of_the_gallery(path: str) -> None:
+    names = [name for name in mechdesign.load(CONFIGS / path).mechanism.nominal if name.endswith(".length")][:3]
+    study = varied(path, names)
+    output = mechdesign.kinematics(study).tables["extremes"]["output"].tolist()[0]
+    goals = [goal(f"kinematics.extremes.{output}.range"), goal(f"kinematics.{output}")]
+    agree(study, names, goals, around(study, names, 3, 0.02))
+
+
+def test_groups_without_a_closed_form_start_from_their_own_sketch() -> None:
+    study = mechdesign.load(CONFIGS / "gallery" / "rrr_platform.yaml")
+    names = [name for name in study.mechanism.nominal if name.endswith(".length")][:2]
+    study = varied("gallery/rrr_platform.yaml", names)
+    goals = [goal("kinematics.extremes.P.x.range"), goal("kinematics.extremes.P.y.max")]
+    agree(study, names, goals, around(study, names, 3, 0.02))
+
+
+def test_jacobian_and_limits_of_listed_poses() -> None:
+    study = varied("five_bar.yaml", ["R", "lower_1.length", "limits.0.max"])
+    goals = [goal("kinematics.inverse_condition"), goal("kinematics.det_J"), goal("kinematics.jacobian.C.x_by_q1")]
+    listed = [name for name in mechdesign.kinematics(study).tables["jacobian"].names if "_by_" in name]
+    goals[-1] = goal(f"kinematics.jacobian.{listed[0]}")
+    agree(study, [], goals, around(study, ["R", "lower_1.length"], 5, 0.05))
+
+
+@pytest.mark.parametrize("path", ["planar_3rpr.yaml", "five_bar.yaml"])
+def test_stiffness(path: str) -> None:
+    names = [n for n in mechdesign.load(CONFIGS / path).mechanism.nominal if n.endswith((".x", ".length"))][:4]
+    study = varied(path, names)
+    goals = [goal("stiffness.k_min"), goal("stiffness.C11", smallest=True), goal("stiffness.compliance.C12")]
+    agree(study, names, goals, around(study, names, 5, 0.05))
+
+
+def test_what_has_no_common_tables_is_asked_of_each_design() -> None:
+    """Here a tolerance is a part of what is varied, and so follows it."""
+    tolerance = "reliability.dimensions.r1=0.003*r1"
+    study = varied("two_link_arm.yaml", ["r1", "forearm.length"], "reliability.samples=50", tolerance)
+    goals = [
+        Goal("r", "reliability", "reliability", where=(("method", "analytic"),)),
+        goal("reliability.moments.sigma", smallest=True),
+    ]
+    agree(study, [], goals, around(study, ["r1", "forearm.length"], 3, 0.1), together=False)
+
+
+def test_transmission_angles_of_the_loops() -> None:
+    study = varied("gallery/four_bar.yaml", ["coupler.length"])
+    goals = [goal("kinematics.loops.transmission_min")]
+    agree(study, [], goals, around(study, ["coupler.length"], 3, 0.05), together=False)
+
+
+def test_numbers_of_the_section_that_depend_on_a_variable() -> None:
+    study = varied("gallery/function_generator.yaml", ["crank_turn"])
+    designs = {"crank_turn": np.array([50.0, 60.0, 66.0])}
+    agree(study, [], [goal("kinematics.targets.rms", smallest=True)], designs, together=False)
+
+
+TELESCOPE = """
+mechanism:
+  parameters: {w: 100}
+  links: {ground: {O: [0, 0], D: [w, 0]}, boom: {from: O, to: A, length: 70, points: {T: [90, 5]}},
+          jack: {from: D, to: A, telescopic: true}, wheel: {A: [0, 0], R: [10, 0]}}
+  joints: {weld: {fixed: [boom, wheel], angle: 20}}
+  drives: [jack]
+  limits: [{drive: jack, min: 60, max: 120}]
+  sketch: {A: [40, 55], T: [50, 70]}
+kinematics: {sweep: {jack: {from: 65, to: 110, number: 4}}, outputs: [R, T]}
+"""
+SLIDE = """
+mechanism:
+  parameters: {r: 40}
+  links: {ground: {O: [0, 0], G: [0, -20]}, crank: [O, A, r], rod: {from: A, to: B, length: 120, points: {P: [60, 15]}},
+          slider: {B: [0, 0], S: [3, 4]}}
+  joints: {guide: {prismatic: [ground, slider], through: G, direction: 0, point: B, angle: 0}}
+  drives: [crank]
+  sketch: {A: [0, 40], B: [110, -20]}
+kinematics: {sweep: {crank: {from: 0, to: 300, number: 6}}, outputs: [P, S]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "value", "output"),
+    [
+        (TELESCOPE, "w", 104.0, "T.x"),
+        (TELESCOPE, "ground.D.x", 104.0, "T.x"),
+        (TELESCOPE, "ground.O.y", 3.0, "T.x"),
+        (TELESCOPE, "boom.length", 72.0, "T.x"),
+        (TELESCOPE, "boom.T.y", 9.0, "T.x"),
+        (TELESCOPE, "weld.angle", 50.0, "R.x"),
+        (SLIDE, "r", 42.0, "P.x"),
+        (SLIDE, "rod.P.x", 50.0, "P.x"),
+        (SLIDE, "guide.direction", 10.0, "P.x"),
+        (SLIDE, "guide.angle", 10.0, "S.x"),
+        (SLIDE, "slider.S.x", 5.0, "S.x"),
+        (SLIDE, "ground.G.y", -30.0, "P.x"),
+    ],
+)
+def test_each_kind_of_variable_changes_the_geometry_that_is_evaluated(
+    text: str, name: str, value: float, output: str
+) -> None:
+    section = f"optimize: {{variables: {{{name}: {{from: 0, to: 1, number: 2}}}}, maximize: [kinematics.{output}]}}"
+    study = study_of(text + section)
+    wanted = goal(f"kinematics.extremes.{output}.max")
+    designs = {name: np.array([mechdesign_value(study, name), value])}
+    evaluator = Evaluator(study, [wanted])
+    assert evaluator._together
+    given = evaluator(designs).values[wanted]
+    assert given == pytest.approx(one_by_one(study, [wanted], designs)[wanted], rel=1e-9)
+    assert abs(given[1] - given[0]) > 1e-3 * abs(given[0])
+
+
+def test_a_limit_that_is_varied_makes_designs_infeasible() -> None:
+    section = "optimize: {variables: {limits.0.max: {from: 0, to: 1, number: 2}}, maximize: [kinematics.T.x]}"
+    study = study_of(TELESCOPE + section, "kinematics.sweep=", "kinematics.poses=[{jack: 65}, {jack: 110}]")
+    found = Evaluator(study, [goal("kinematics.T.x")])({"limits.0.max": np.array([120.0, 100.0, 50.0])})
+    assert found.reasons == ["", "a pose is outside the limits", "limits.0: the maximum is below the minimum"]
+
+
+def test_designs_that_make_no_mechanism_are_told_and_leave_the_others_alone() -> None:
+    study = study_of(SLIDE + "optimize: {variables: {r: {from: 0, to: 1, number: 2}}, maximize: [kinematics.P.x]}")
+    wanted = goal("kinematics.P.x")
+    found = Evaluator(study, [wanted])({"r": np.array([40.0, -1.0, np.nan, 500.0, 41.0])})
+    assert found.reasons == [
+        "",
+        "crank.length is not positive",
+        "r has no finite value",
+        "a pose cannot be assembled",
+        "",
+    ]
+    assert np.isnan(found.values[wanted]).tolist() == [False, True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("goals", "message"),
+    [
+        ("maximize: [kinematics.Q.x]", r"optimize\.maximize\.0: .*no column 'Q\.x'"),
+        ("minimize: [kinematics.P.x, kinematics.extremes.span]", r"optimize\.minimize\.1: .*extremes\.span"),
+        ("maximize: [kinematics.extremes.output]", r"optimize\.maximize\.0: .*holds words"),
+        ("maximize: [optimize.score]", r"cannot judge itself"),
+        (
+            "maximize: [kinematics.P.x], subject_to: [{result: kinematics.P.y, at_least: 0, where: {thta: 1}}]",
+            r"optimize\.subject_to\.0: where: no column 'thta'",
+        ),
+    ],
+)
+def test_names_that_no_result_has_are_told_before_anything_is_computed(goals: str, message: str) -> None:
+    from mechdesign.analyses.goals import bounds_of
+
+    study = study_of(SLIDE + f"optimize: {{variables: {{r: {{from: 0, to: 1, number: 2}}}}, {goals}}}")
+    section = study.optimize
+    assert section is not None
+    asked = [*(goal(n) for n in section.maximize), *(goal(n, smallest=True) for n in section.minimize)]
+    asked += [judged for condition in section.subject_to for judged, _, _ in bounds_of(condition)]
+    with pytest.raises(StudyError, match=message):
+        Evaluator(study, asked)
+
+
+def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    from mechdesign.analyses import stacked
+
+    study = varied("gallery/four_bar.yaml", ["crank.length", "coupler.C.x"])
+    goals = [goal("kinematics.extremes.C.y.range"), goal("kinematics.C.x")]
+    designs = around(study, ["crank.length", "coupler.C.x"], 9, 0.1)
+    whole = Evaluator(study, goals)(designs)
+    monkeypatch.setattr(stacked, "BLOCK", 150)
+    parts = Evaluator(study, goals)(designs)
+    for each in goals:
+        assert parts.values[each].tobytes() == whole.values[each].tobytes()
+
+
+def test_conditions_with_rows() -> None:
+    from mechdesign.analyses.goals import bounds_of
+
+    condition = Condition.model_validate(
+        {"result": "kinematics.extremes.max", "where": {"output": "P.x"}, "at_most": 3}
+    )
+    ((judged, bound, upper),) = bounds_of(condition)
+    assert (judged.command, judged.column, judged.where, bound, upper) == (
+        "kinematics", "extremes.max", (("output", "P.x"),), 3, True,
+    )  # fmt: skip
