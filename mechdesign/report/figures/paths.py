@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
-from mechdesign.report.figures.framing import framed
+from mechdesign.report.figures.framing import ABOVE, framed
 from mechdesign.report.figures.scene import link_points
 from mechdesign.report.figures.sweep import Sweep, ranks
 
@@ -22,11 +22,14 @@ _LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
 _MARKS = 240  # places of a path that names keep off
 
 
-def paths_figure(sweep: Sweep) -> Figure:
-    """The first valid pose with its names, ghosts of later ones, and the path of every moving point."""
+def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
+    """The first valid pose with its names, ghosts of later ones, and the path of every moving point.
+
+    `above` it, inches are left for a title.
+    """
     wanted = _wanted(sweep)
     places = np.concatenate([sweep.extent, *wanted])
-    figure, axes = framed(places, sweep.study.units.label("length"), height=TALLEST)
+    figure, axes = framed(places, sweep.study.units.label("length"), height=TALLEST, above=above)
     for path in wanted:
         axes.plot(
             path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,

@@ -125,11 +125,13 @@ def outline(axes: Axes, region: Region, *, width: float = 1.5) -> set[str]:
     """Draw the boundary, coloured by what ends it; returns the fates that occur."""
     seen = set()
     boundary = region.boundary
-    for rows in curves(boundary):
+    pieces = list(curves(boundary))
+    # White below keeps the gaps of dashes clean.
+    for rows in pieces:
+        axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=width + 0.6, zorder=2.9)
+    for rows in pieces:
         found = fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]]))
         color, dashes, _ = FATES[found]
-        # White below keeps the gaps of dashes clean.
-        axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=width + 0.6, zorder=3)
         axes.plot(boundary["x"][rows], boundary["y"][rows], color=color, linestyle=dashes, linewidth=width,
                   solid_capstyle="round", zorder=3)  # fmt: skip
         seen.add(found)
@@ -137,12 +139,20 @@ def outline(axes: Axes, region: Region, *, width: float = 1.5) -> set[str]:
 
 
 def loci(axes: Axes, region: Region) -> set[str]:
-    """Draw the singularities inside the region, with a pale edge that shows on every colour; returns their kinds."""
+    """Draw the singularities inside the region, with a pale edge that shows on every colour; returns their kinds.
+
+    Those that end the region are drawn by `outline`.
+    """
     table = region.singularities
     if table is None:
         return set()
     seen = set()
+    edge = region.boundary["x"] + 1j * region.boundary["y"]
+    near = 1e-7 * float(np.abs(region.places()).max())
     for rows in curves(table):
+        middle = complex(table["x"][rows[len(rows) // 2]], table["y"][rows[len(rows) // 2]])
+        if len(edge) and np.abs(edge - middle).min() < near:
+            continue
         kind = str(table["kind"][rows[0]])
         axes.plot(table["x"][rows], table["y"][rows], color=LOCI[kind][0], linewidth=1.8, zorder=3.2,
                   path_effects=[withStroke(linewidth=3.4, foreground="white")])  # fmt: skip

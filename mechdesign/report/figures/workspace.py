@@ -33,7 +33,7 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
     found = regions(study, result)
     if not found:
         return {}
-    drawn = {**map_figures(study, found), "workspace": _workspace(study, found[0])}
+    drawn = {**map_figures(study, found), "workspace": workspace_figure(study, found[0])}
     shapes = inscribed_figure(study, result, found)
     if shapes is not None:
         drawn["inscribed"] = shapes
@@ -42,7 +42,7 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
     return drawn
 
 
-def _workspace(study: Study, region: Region) -> Figure:
+def workspace_figure(study: Study, region: Region, title: str = "") -> Figure:
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
     boundary, section = region.boundary, study.workspace
     assert section is not None
@@ -58,8 +58,8 @@ def _workspace(study: Study, region: Region) -> Figure:
     reached += [np.atleast_1d(mechanism.sketch_configuration.point(point)) for point in mechanism.points]
     extent = np.concatenate([region.places(), *(place[np.isfinite(place)] for place in reached)])
     where = f" at {region.title}" if region.title else ""
-    page = sheet(study, extent, [""], f"workspace of point {section.point}{where}, the mechanism along its boundary",
-                 bar=False)  # fmt: skip
+    title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
+    page = sheet(study, extent, [""], title, bar=False)
     (axes,) = page.axes
     fill(axes, region)
     page.legend(keys(outline(axes, region), loci(axes, region)))
