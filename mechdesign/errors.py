@@ -7,6 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mechdesign.results import Result
 
 
 class MechdesignError(Exception):
@@ -62,3 +66,14 @@ class OutputError(MechdesignError):
     """Results could not be written."""
 
     exit_code = 4
+
+
+class Interrupted(KeyboardInterrupt):
+    """A long computation was interrupted; what was finished of it is a result.
+
+    Not a `MechdesignError`: who expects those does not expect to be interrupted.
+    """
+
+    def __init__(self, result: Result) -> None:
+        self.result = result
+        super().__init__(result.interrupted)

@@ -9,6 +9,7 @@ import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 from itertools import islice
 from typing import Any, TypeVar
 
@@ -37,7 +38,16 @@ def worker_count(jobs: int | None) -> int:
 def map_chunks(
     function: Callable[[Item], Value], items: Iterable[Item], jobs: int | None = 1, *, processes: bool = False
 ) -> Iterator[Value]:
-    """Yield ``function(item)`` in the order of `items`, computed by `jobs` workers.
+    """Yield ``function(item)`` in the order of `items`, computed by `jobs` workers; see `workers`."""
+    with workers(function, jobs, processes=processes) as compute:
+        yield from compute(items)
+
+
+@contextmanager
+def workers(
+    function: Callable[[Item], Value], jobs: int | None = 1, *, processes: bool = False
+) -> Iterator[Callable[[Iterable[Item]], Iterator[Value]]]:
+    """Give a map of `function` over items, in their order, whose workers live until the context ends.
 
     At most ``3 * jobs`` chunks are under way or waiting to be consumed, whatever the number of items. An exception or
     an interrupt (also of the consumer) drops the chunks not begun and waits for those under way.
@@ -51,30 +61,33 @@ def map_chunks(
         its kernels, so threads gain on few operations of some thousand elements and share memory; many operations of
         less need processes, whose items and values are pickled.
     """
-    workers = worker_count(jobs)
-    if workers == 1:
-        yield from map(function, items)
+    count = worker_count(jobs)
+    if count == 1:
+        yield lambda items: map(function, items)
         return
     pool: Executor
     call: Callable[[Item], Value]
     if processes and sys.platform == "linux":
         fork = multiprocessing.get_context("fork")
-        pool = ProcessPoolExecutor(workers, mp_context=fork, initializer=_adopt, initargs=(function,))
+        pool = ProcessPoolExecutor(count, mp_context=fork, initializer=_adopt, initargs=(function,))
         call = _call
     else:
-        pool = ThreadPoolExecutor(workers, thread_name_prefix="mechdesign")
+        pool = ThreadPoolExecutor(count, thread_name_prefix="mechdesign")
         call = function
-    source = iter(items)
     with pool:
-        pending: deque[Future[Value]] = deque()
         try:
-            pending.extend(pool.submit(call, item) for item in islice(source, _LOOK_AHEAD * workers))
-            while pending:
-                value = pending.popleft().result()
-                pending.extend(pool.submit(call, item) for item in islice(source, 1))
-                yield value
+            yield lambda items: _in_order(pool, call, items, _LOOK_AHEAD * count)
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _in_order(pool: Executor, call: Callable[[Item], Value], items: Iterable[Item], ahead: int) -> Iterator[Value]:
+    source = iter(items)
+    pending: deque[Future[Value]] = deque(pool.submit(call, item) for item in islice(source, ahead))
+    while pending:
+        value = pending.popleft().result()
+        pending.extend(pool.submit(call, item) for item in islice(source, 1))
+        yield value
 
 
 # The function of a forked worker: inherited, not pickled, so that it may close over a whole study.

@@ -85,6 +85,10 @@ class Result:
         Poses, samples, designs, and how many of them were invalid.
     failed : str
         Message where a pose that a person asked for could not be assembled (exit code 3); tables are whole.
+    files : mapping of str to str
+        Texts to be written beside the tables, by the names of their files.
+    interrupted : str
+        How far it came, where it is the finished part of an interrupted computation.
     """
 
     command: str
@@ -92,6 +96,8 @@ class Result:
     warnings: Sequence[str] = ()
     counts: Mapping[str, int] = field(default_factory=dict)
     failed: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
+    interrupted: str = ""
 
     @property
     def main(self) -> Table:

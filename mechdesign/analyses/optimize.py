@@ -1,77 +1,103 @@
-"""Which dimensions are best? Every design of a grid, compared by normalised and weighted indices."""
+"""Which dimensions are best? A grid, a search or a Pareto front of designs, compared by normalised, weighted goals."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.designs import best, grid, in_words, most_common, normalised
-from mechdesign.analyses.goals import Evaluated, Evaluator, Goal, bounds_of, goal
+from mechdesign.analyses import search as searching
+from mechdesign.analyses.cube import from_cube
+from mechdesign.analyses.designs import grid, in_words
+from mechdesign.analyses.explorer import Explorer
+from mechdesign.analyses.goals import Evaluated, Evaluator, Goal, goal
+from mechdesign.analyses.judging import Batch, Designs, Judge
+from mechdesign.analyses.optimum_files import optimum_files
+from mechdesign.analyses.optimum_tables import Comparison, best_table, bounds_table, designs_table, optimum_table
 from mechdesign.analyses.rays import Floats
 from mechdesign.analyses.region import GRID_TOLERANCE, questions
+from mechdesign.analyses.sensitivity import active_bounds, neighbours, sensitivity_table
 from mechdesign.analyses.workspace import index_meanings
-from mechdesign.errors import AssemblyError, Problem, StudyError
-from mechdesign.parallel import map_chunks
+from mechdesign.errors import AssemblyError, Interrupted, Problem, StudyError
+from mechdesign.journal import Journal
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
-CHUNK = 384
+CHUNK, SMALL_CHUNK = 384, 8
+MOST_REASONS = 10
+# The command line tells how to go on.
+Compute = Callable[[Iterable[Batch]], Iterator[Evaluated]]
 
 
-@dataclass(frozen=True, eq=False)
-class _Designs:
-    """All designs: the variables, the values of goals and bounds, and which designs are feasible."""
-
-    variables: dict[str, Floats]
-    goals: tuple[Goal, ...]
-    values: dict[Goal, Floats]
-    errors: dict[str, Floats]
-    feasible: NDArray[np.bool_]
-    reasons: list[str]
-
-
-def optimize(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
-    """Evaluate every design of the grid, and find the best one for each set of weights [S1, eqs. 27, 28].
+def optimize(
+    study: Study,
+    *,
+    seed: int | None = None,
+    jobs: int | None = 1,
+    progress: Progress = NULL,
+    journal: Journal | None = None,
+) -> Result:
+    """Evaluate designs, and find the best one for each set of weights [S1, eqs. 27, 28].
 
     Parameters
     ----------
     study : Study
         With an optimize section.
-    seed
-        Not used: a grid is not random.
+    seed : int, optional
+        Of the search and the front, in place of the study's; a grid is not random.
     jobs : int or None
-        Threads; the result does not depend on their number.
+        Workers; the result does not depend on their number.
+    journal : Journal, optional
+        Where finished designs are kept when the computation is interrupted, and found when it is begun anew.
 
     Raises
     ------
     StudyError
         If there is nothing to vary or to compare.
     AssemblyError
-        If no design is feasible; the message says why.
+        If no design is feasible; the message says why, what most designs fail by first.
+    Interrupted
+        On Ctrl-C, with the designs that are finished.
     """
     goals = _goals(study)
-    designs = _evaluate(study, goals, jobs, progress)
-    if not designs.feasible.any():
-        told = "; ".join(f"{reason} ({count} designs)" for reason, count in most_common(designs.reasons))
-        raise AssemblyError(f"no design of {len(designs.reasons)} is feasible: {told}")
-    shares = np.stack([normalised(designs.values[g], designs.feasible, smallest=g.smallest) for g in goals])
-    weights = _weights(study, len(goals))
-    cpi, scores = shares.sum(axis=0), weights @ shares
-    winners = [best(score) for score in scores]
-    meanings = _meanings(study, goals)
+    assert study.optimize is not None
+    judge = Judge(study, goals, jobs, progress, journal)
+    try:
+        with judge.open() as compute:
+            _ask(study, judge, compute, study.seed if seed is None else seed)
+            designs = judge.designs()
+            if not designs.feasible.any():
+                raise AssemblyError(_none_feasible(designs))
+            compared = Comparison.of(study, designs, _weights(study, len(goals)), _meanings(study, goals))
+            near = neighbours(study, compared)
+            progress.start(len(near), "neighbours of the optimum")
+            found = judge.evaluate(compute, _chunks(near.designs, SMALL_CHUNK))
+    except KeyboardInterrupt:
+        if journal is not None:
+            journal.save()
+        partial = judge.designs()
+        if not len(partial):
+            raise
+        raise Interrupted(_finished_part(study, partial, _meanings(study, goals))) from None
     tables = [
-        Table("optimum", tuple(_optimum(study, designs, weights, winners, cpi, scores, meanings)),
-              "the best design for each set of weights"),
-        Table("designs", tuple(_all(study, designs, cpi, meanings)), "every design of the grid"),
-        Table("bounds", tuple(_bounds(study, designs, cpi)), "extremes of each index over the feasible designs"),
-    ]  # fmt: skip
-    return Result("optimize", {table.name: table for table in tables}, tuple(_warnings(study, designs)),
-                  {"designs": len(designs.reasons), "infeasible": int((~designs.feasible).sum())})  # fmt: skip
+        optimum_table(compared, active_bounds(study, compared)),
+        designs_table(compared),
+        bounds_table(compared),
+        best_table(study, compared),
+        sensitivity_table(study, compared, near, found),
+    ]
+    marked: dict[str, int] = {}
+    if study.optimize.method == "pareto":
+        from mechdesign.analyses.pareto_table import pareto_table
+
+        table, marked = pareto_table(compared)
+        tables.insert(0, table)
+    files, doubts = optimum_files(study, compared, marked)
+    counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
+    return Result("optimize", {table.name: table for table in tables}, (*_warnings(study, designs), *doubts), counts,
+                  files=files)  # fmt: skip
 
 
 def _goals(study: Study) -> tuple[Goal, ...]:
@@ -92,41 +118,48 @@ def _weights(study: Study, goals: int) -> Floats:
     return np.array(rows if rows else [[1.0] * goals], dtype=float).reshape(-1, goals)
 
 
-def _evaluate(study: Study, goals: tuple[Goal, ...], jobs: int | None, progress: Progress) -> _Designs:
+def _ask(study: Study, judge: Judge, compute: Compute, seed: int) -> None:
+    """Evaluate the designs of the study's method."""
     assert study.optimize is not None
-    conditions = [bound for condition in study.optimize.subject_to for bound in bounds_of(condition)]
-    wanted = [*goals, *(judged for judged, _, _ in conditions)]
-    evaluator = Evaluator(study, wanted)
-    variables = grid(study)
-    count = len(next(iter(variables.values())))
-    progress.start(count, "designs")
-    values = {each: np.empty(count) for each in wanted}
-    errors: dict[str, Floats] = {}
-    reasons: list[str] = []
+    section, goals = study.optimize, judge.goals
+    if section.method == "grid":
+        variables = grid(study)
+        judge.progress.start(len(next(iter(variables.values()))), "designs")
+        judge.evaluate(compute, _chunks(variables, CHUNK))
+        return
+    dimensions, smallest = len(section.variables), [each.smallest for each in goals]
 
-    def chunks() -> Iterator[dict[str, Floats]]:
-        for k in range(0, count, CHUNK):
-            yield {name: column[k : k + CHUNK] for name, column in variables.items()}
+    def evaluate(u: Floats) -> tuple[Floats, Floats]:
+        designs, given = from_cube(study, u)
+        rows = np.full((len(u), len(judge.wanted) + 1), np.nan)
+        if given.any():
+            rows[given] = judge.evaluate(compute, _chunks({k: v[given] for k, v in designs.items()}, SMALL_CHUNK))
+        rows[rows[:, -1] > 0] = np.nan
+        column = {each: k for k, each in enumerate(judge.wanted)}
+        margins = [(bound - rows[:, column[each]]) * (1 if upper else -1) for each, bound, upper in judge.conditions]
+        return rows[:, : len(goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0))
 
-    found: Evaluated
-    for found in map_chunks(evaluator, chunks(), jobs, processes=True):
-        at = slice(len(reasons), len(reasons) + len(found.reasons))
-        for each, column in found.values.items():
-            values[each][at] = column
-        for name, column in found.errors.items():
-            errors.setdefault(name, np.empty(count))[at] = column
-        reasons += found.reasons
-        progress.update(len(found.reasons))
-    feasible = np.array([not reason for reason in reasons])
-    for judged, bound, upper in conditions:
-        met = values[judged] <= bound if upper else values[judged] >= bound
-        for k in np.flatnonzero(feasible & ~met):
-            reasons[k] = f"not {judged.name}"
-        feasible &= met
-    return _Designs(variables, goals, values, errors, feasible, reasons)
+    if section.method == "search":
+        rows = _weights(study, len(goals)).tolist()
+        budget = section.evaluations or searching.allowance(dimensions, searching.objectives(len(goals), rows))
+        judge.progress.start(budget, "designs")
+        searching.search(Explorer(evaluate, dimensions, budget), smallest, rows, seed)
+        return
+    from mechdesign.analyses import pareto
+
+    budget = section.evaluations or pareto.allowance(len(goals))
+    judge.progress.start(budget, "designs")
+    first = searching.sample(dimensions, np.random.default_rng(seed), pareto.population(budget), budget)
+    pareto.evolve(Explorer(evaluate, dimensions, budget), np.where(smallest, 1.0, -1.0), first, seed)
 
 
-def _meanings(study: Study, goals: Sequence[Goal]) -> dict[str, tuple[str, str]]:
+def _chunks(designs: Batch, size: int) -> Iterator[Batch]:
+    count = len(next(iter(designs.values())))
+    for k in range(0, count, size):
+        yield {name: column[k : k + size] for name, column in designs.items()}
+
+
+def _meanings(study: Study, goals: tuple[Goal, ...]) -> dict[str, tuple[str, str]]:
     if not any(each.index for each in goals):
         return {}
     question = Evaluator(study, [each for each in goals if each.index]).question
@@ -134,89 +167,34 @@ def _meanings(study: Study, goals: Sequence[Goal]) -> dict[str, tuple[str, str]]
     return index_meanings(study, question)
 
 
-def _unit(study: Study, name: str) -> str:
-    for place in study.mechanism.description.places.values():
-        if place.name == name:
-            return study.units.label(place.quantity)
-    return ""
+def _none_feasible(designs: Designs) -> str:
+    reasons = designs.reasons()
+    if not reasons:
+        return "no design can be made: the bounds of the variables leave no value"
+    told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MOST_REASONS])
+    return f"no design of {len(designs)} is feasible: {told}"
 
 
-def _variables(study: Study, designs: _Designs, rows: NDArray[np.intp]) -> Iterator[Column]:
-    for name, column in designs.variables.items():
-        yield Column(name, column[rows], _unit(study, name), "design variable")
+def _finished_part(study: Study, designs: Designs, meanings: dict[str, tuple[str, str]]) -> Result:
+    weights = np.ones((1, len(designs.goals)))
+    compared = Comparison.of(study, designs, weights, meanings)
+    table: Table = designs_table(compared)
+    told = f"interrupted after {len(designs)} designs; --resume goes on"
+    return Result("optimize", {table.name: table}, (told,), {"designs": len(designs)}, interrupted=told)
 
 
-def _values(designs: _Designs, rows: NDArray[np.intp], meanings: Mapping[str, tuple[str, str]]) -> Iterator[Column]:
-    for each in designs.goals:
-        unit, meaning = meanings.get(each.column, ("", f"worst row of {each.name}")) if each.index else (
-            "", f"worst row of {each.name}")  # fmt: skip
-        yield Column(each.name, designs.values[each][rows], unit, meaning)
-
-
-def _optimum(
-    study: Study,
-    designs: _Designs,
-    weights: Floats,
-    winners: Sequence[int],
-    cpi: Floats,
-    scores: Floats,
-    meanings: Mapping[str, tuple[str, str]],
-) -> Iterator[Column]:
-    rows = np.array(winners, dtype=np.intp)
-    for each, column in zip(designs.goals, weights.T, strict=True):
-        yield Column(f"w_{each.name}", column, "", f"weight of {each.name}")
-    yield from _variables(study, designs, rows)
-    yield from _values(designs, rows, meanings)
-    yield Column("CPI", cpi[rows], "", "sum of the normalised indices")
-    yield Column("score", scores[np.arange(len(rows)), rows], "", "weighted sum of the normalised indices")
-    parameters = {name: column[rows] for name, column in designs.variables.items() if name in study.parameters.nominal}
-    for name, value in study.parameters.values(parameters).items():
-        if name not in designs.variables and np.ndim(value):
-            yield Column(name, np.asarray(value), "", "parameter that follows from the variables")
-
-
-def _all(study: Study, designs: _Designs, cpi: Floats, meanings: Mapping[str, tuple[str, str]]) -> Iterator[Column]:
-    every = np.arange(len(designs.reasons))
-    yield from _variables(study, designs, every)
-    yield from _values(designs, every, meanings)
-    for name, column in designs.errors.items():
-        yield Column(f"{name}_error", column, meanings[goal(name).column][0], f"estimated error of {name}")
-    yield Column("CPI", cpi, "", "sum of the normalised indices")
-    yield Column("feasible", designs.feasible, "", "1 where the design can be built and meets every requirement")
-    yield Column("reason", np.array(designs.reasons, dtype=object), "", "why it is not feasible")
-
-
-def _bounds(study: Study, designs: _Designs, cpi: Floats) -> Iterator[Column]:
-    named = {**{each.name: designs.values[each] for each in designs.goals}, "CPI": cpi}
-    lowest, highest = [], []
-    for column in named.values():
-        inside = np.where(designs.feasible, column, np.nan)
-        lowest.append(int(np.nanargmin(inside)))
-        highest.append(int(np.nanargmax(inside)))
-    low, high = np.array(lowest, dtype=np.intp), np.array(highest, dtype=np.intp)
-    columns = list(named.values())
-    yield Column("index", np.array(list(named)), "", "index")
-    yield Column("min", np.array([c[k] for c, k in zip(columns, low, strict=True)]), "", "smallest value")
-    yield Column("max", np.array([c[k] for c, k in zip(columns, high, strict=True)]), "", "largest value")
-    for name, column in designs.variables.items():
-        unit = _unit(study, name)
-        yield Column(f"{name}_at_min", column[low], unit, f"{name} of the design with the smallest value")
-        yield Column(f"{name}_at_max", column[high], unit, f"{name} of the design with the largest value")
-
-
-def _warnings(study: Study, designs: _Designs) -> Iterator[str]:
-    for reason, count in most_common(designs.reasons):
-        first = designs.reasons.index(reason)
+def _warnings(study: Study, designs: Designs) -> Iterator[str]:
+    reasons = designs.reasons()
+    for reason, count, first in reasons[:MOST_REASONS]:
         row = {name: float(column[first]) for name, column in designs.variables.items()}
-        yield f"{count} of {len(designs.reasons)} designs are infeasible: {reason} (first at {in_words(row)})"
+        yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {in_words(row)})"
+    if len(reasons) > MOST_REASONS:
+        yield f"designs are infeasible for {len(reasons) - MOST_REASONS} more reasons; see designs.csv"
     if study.workspace is None or study.workspace.integrate.rule != "gauss":
         return
     tolerance = questions(study, GRID_TOLERANCE)[0].tolerance
     for name, error in designs.errors.items():
-        value = next(designs.values[each] for each in designs.goals if each.name == name)
+        value = next(designs.values[each] for each in designs.values if each.name == name)
         loose = designs.feasible & (error > 2 * tolerance * np.abs(value))
         if loose.any():
             yield f"{name} of {int(loose.sum())} designs is not known to the tolerance asked for; see {name}_error"
-
-
-__all__ = ["optimize"]

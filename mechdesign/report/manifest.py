@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mechdesign.study import Study
 
 NAME = "manifest.json"
-_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "pydantic", "pint", "pyyaml")
+_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "pydantic", "pint", "pyyaml", "pymoo")
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,13 @@ def origin(study: Study, command: str, asked: Asked) -> dict[str, Any]:
     }
 
 
-def compose(
-    study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, bytes], asked: Asked
-) -> bytes:
-    """The manifest of a result whose files have these contents."""
+def compose(study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, str], asked: Asked) -> bytes:
+    """The manifest of a result whose files have these SHA-256."""
     content = origin(study, result.command, asked) | {
         "counts": plain(dict(result.counts)),
         "warnings": list(result.warnings),
         "failed": result.failed,
+        **({"interrupted": result.interrupted} if result.interrupted else {}),
         "requirements": [plain(asdict(verdict)) for verdict in verdicts],
         "tables": {
             f"{table.name}.csv": {
@@ -63,7 +62,7 @@ def compose(
             }
             for table in result.tables.values()
         },
-        "files": {name: hashlib.sha256(data).hexdigest() for name, data in files.items()},
+        "files": dict(files),
     }
     return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
 
@@ -95,7 +94,7 @@ def is_current(directory: Path, study: Study, command: str, asked: Asked) -> dic
         if not expected[pictures]:
             expected[pictures] = content.get(pictures)
     files = recorded_files(content)
-    if not files or any(content.get(key) != value for key, value in expected.items()):
+    if not files or "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):
         return None
     return content if all(_digest(directory / name) == digest for name, digest in files.items()) else None
 

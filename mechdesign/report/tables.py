@@ -6,17 +6,20 @@ import csv
 import io
 import json
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 
 _DIGITS = 12
+_BLOCK = 20_000
 
 
-def _texts(column: Column, digits: int) -> list[str]:
-    values = np.asarray(column.values)
+def _texts(values: NDArray[Any], digits: int) -> list[str]:
+    values = np.asarray(values)
     if values.dtype.kind == "f":
         # Adding zero turns -0.0 into 0.0: the sign of a zero is an accident of rounding.
         return [format(value, f".{digits}g") for value in (values + 0.0).tolist()]
@@ -27,16 +30,26 @@ def _texts(column: Column, digits: int) -> list[str]:
 
 def cells(table: Table, digits: int = _DIGITS) -> list[list[str]]:
     """Text of every cell, column by column; booleans as 1 and 0."""
-    return [_texts(column, digits) for column in table.columns]
+    return [_texts(column.values, digits) for column in table.columns]
 
 
 def to_csv(table: Table) -> str:
     """The table as CSV: a header, then a line a row, quoted as RFC 4180 asks, ``nan`` and ``inf`` as they are."""
+    return "".join(csv_blocks(table))
+
+
+def csv_blocks(table: Table) -> Iterator[str]:
+    """The text of `to_csv` in blocks of some thousand rows, for tables whose text would fill the memory."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(table.names)
-    writer.writerows(zip(*cells(table), strict=True))
-    return stream.getvalue()
+    yield stream.getvalue()
+    for start in range(0, len(table), _BLOCK):
+        stream.seek(0)
+        stream.truncate()
+        rows = slice(start, start + _BLOCK)
+        writer.writerows(zip(*(_texts(column.values[rows], _DIGITS) for column in table.columns), strict=True))
+        yield stream.getvalue()
 
 
 def plain(value: Any) -> Any:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError
+from mechdesign.files import replace
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Asked
 from mechdesign.report.requirements import Verdict
-from mechdesign.report.tables import to_csv
+from mechdesign.report.tables import csv_blocks
 from mechdesign.results import Result
 
 if TYPE_CHECKING:
@@ -48,25 +48,28 @@ def check_writable(directory: Path) -> None:
 def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Asked) -> tuple[str, ...]:
     """Write a result into a directory and return the names of the files.
 
-    Each file appears whole or not at all. The manifest comes last; files of an older result that the new one does not
-    have are removed, so that the directory never shows two results at once.
+    Each file appears whole or not at all; of an interrupted computation no pictures are drawn. The manifest comes
+    last; files of an older result that the new one does not have are removed, so that the directory never shows two
+    results at once.
 
     Raises
     ------
     OutputError
         If the directory or a file cannot be written.
     """
-    files = {f"{table.name}.csv": to_csv(table).encode() for table in result.tables.values()}
-    if asked.plots:
-        files |= pictures(study, result, animate=asked.animate)
+    files: dict[str, Iterable[bytes]] = {
+        f"{table.name}.csv": map(str.encode, csv_blocks(table)) for table in result.tables.values()
+    }
+    files |= {name: (text.encode(),) for name, text in result.files.items()}
+    if asked.plots and not result.interrupted:
+        files |= {name: (data,) for name, data in pictures(study, result, animate=asked.animate).items()}
     stale = manifest.recorded_files(manifest.read(directory) or {}).keys() - files.keys()
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        for name, data in files.items():
-            _replace(directory / name, data)
+        digests = {name: replace(directory / name, blocks) for name, blocks in files.items()}
         for name in stale:
             (directory / name).unlink(missing_ok=True)
-        _replace(directory / manifest.NAME, manifest.compose(study, result, verdicts, files, asked))
+        replace(directory / manifest.NAME, [manifest.compose(study, result, verdicts, digests, asked)])
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
     return (*files, manifest.NAME)
@@ -125,17 +128,6 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> dict[str
 def _write(path: Path, data: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _replace(path, data)
+        replace(path, [data])
     except OSError as error:
         raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
-
-
-def _replace(path: Path, data: bytes) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(data)
-        os.replace(temporary, path)
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink()
-        raise

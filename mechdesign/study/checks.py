@@ -164,6 +164,12 @@ class Checker:
                 for key in ("from", "to", "step"):
                     self.kind((*path, key), quantity)
             above.append(name)
+            if section.method == "grid" and variable.step is None and variable.number is None:
+                self.reporter.report(path, "a variable of a grid needs either 'step' or 'number'")
+        if section.method == "pareto" and len(section.maximize + section.minimize) == 1:
+            self.reporter.report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
+        if section.method == "grid" and section.evaluations is not None:
+            self.reporter.report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
         for key, goals in (("maximize", section.maximize), ("minimize", section.minimize)):
             for index, goal in enumerate(goals):
                 self._result(goal, (*root, key, index))

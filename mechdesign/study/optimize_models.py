@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
-from mechdesign.study.lists import CoordinateNames, as_list
+from mechdesign.study.lists import CoordinateNames
 from mechdesign.study.models import Model
 from mechdesign.study.numbers import (
     NUMBER_FORM,
@@ -25,7 +25,10 @@ from mechdesign.study.numbers import (
 
 
 class Variable(Model):
-    """A design variable; its bounds are expressions over parameters and the variables above it."""
+    """A design variable; its bounds are expressions over parameters and the variables above it.
+
+    The step is that of a grid, and of the sensitivities told with an optimum.
+    """
 
     from_: Bound = Field(alias="from")
     to: Bound
@@ -34,8 +37,8 @@ class Variable(Model):
 
     @model_validator(mode="after")
     def _spacing(self) -> Variable:
-        if (self.step is None) == (self.number is None):
-            raise failure("a variable of a grid needs either 'step' or 'number'")
+        if self.step is not None and self.number is not None:
+            raise failure("either 'step' or 'number', not both")
         return self
 
 
@@ -57,38 +60,48 @@ class Condition(Model):
         return self
 
 
+def _weight_row(raw: Any, info: ValidationInfo) -> Any:
+    """Bring ``{GII: 1, SUI: 1}`` to a list in the order maximize then minimize; say what is wrong with a row."""
+    if "maximize" not in info.data or "minimize" not in info.data:
+        # What is wrong with the goals is told; their weights cannot be judged.
+        return ()
+    goals: tuple[str, ...] = info.data["maximize"] + info.data["minimize"]
+    if isinstance(raw, Mapping):
+        for name in raw:
+            if name not in goals:
+                raise failure(f"{name!r} is neither maximised nor minimised{suggestion(str(name), goals)}")
+        return [raw.get(goal, 0) for goal in goals]
+    if isinstance(raw, list) and len(raw) != len(goals):
+        raise failure(f"{len(raw)} weights for {len(goals)} goals: {', '.join(goals)}")
+    return raw
+
+
+def _weights_that_choose(row: tuple[float, ...]) -> tuple[float, ...]:
+    if any(weight < 0 for weight in row):
+        raise failure("a weight is not negative: name the goal under 'minimize' instead of 'maximize', or the reverse")
+    if row and not any(row):
+        raise failure("all weights are zero: no design would be better than another")
+    return row
+
+
+WeightRow = Annotated[
+    tuple[Pure, ...],
+    BeforeValidator(_weight_row),
+    AfterValidator(_weights_that_choose),
+    OrShort(({"type": "object", "additionalProperties": NUMBER_FORM},)),
+]
+
+
 class OptimizeSection(Model):
     """Which dimensions are best?"""
 
+    method: Annotated[str, Choice(("grid", "search", "pareto"))] = "grid"
     variables: dict[CoordinateName, Variable]
     maximize: CoordinateNames = ()
     minimize: CoordinateNames = ()
-    weights: (
-        tuple[Annotated[tuple[Pure, ...], OrShort(({"type": "object", "additionalProperties": NUMBER_FORM},))], ...]
-        | None
-    ) = None
+    weights: tuple[WeightRow, ...] | None = None
     subject_to: tuple[Condition, ...] = ()
-    method: Annotated[str, Choice(("grid",), later=("search", "pareto"))] = "grid"
-
-    @model_validator(mode="before")
-    @classmethod
-    def _weights_by_name(cls, raw: Any) -> Any:
-        """Bring ``{GII: 1, SUI: 1}`` to a list in the order maximize then minimize."""
-        if not isinstance(raw, dict) or not isinstance(raw.get("weights"), list):
-            return raw
-        goals = [goal for key in ("maximize", "minimize") for goal in as_list(raw.get(key))]
-        rows = []
-        for index, row in enumerate(raw["weights"]):
-            if isinstance(row, Mapping):
-                unknown = [name for name in row if name not in goals]
-                if unknown:
-                    hint = suggestion(unknown[0], [str(goal) for goal in goals])
-                    raise failure(f"weights, row {index + 1}: {unknown[0]!r} is neither maximised nor minimised{hint}")
-                row = [row.get(goal, 0) for goal in goals]
-            elif isinstance(row, list) and len(row) != len(goals):
-                raise failure(f"weights, row {index + 1}: {len(row)} weights for {len(goals)} goals")
-            rows.append(row)
-        return {**raw, "weights": rows}
+    evaluations: Annotated[int, Whole(10, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _goals(self) -> OptimizeSection:

@@ -1,0 +1,32 @@
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+
+def replace(path: Path, blocks: Iterable[bytes]) -> str:
+    """Write a file block by block, put it in place when it is whole, and return its SHA-256.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; an older file of that name is then as it was.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    digest = hashlib.sha256()
+    try:
+        with temporary.open("wb") as stream:
+            for block in blocks:
+                stream.write(block)
+                digest.update(block)
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
+    return digest.hexdigest()
