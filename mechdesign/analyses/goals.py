@@ -135,8 +135,9 @@ class Evaluator:
             rows, size = np.flatnonzero(batch.feasible), stacked.size(self.study, command)
             for begin in range(0, len(rows), size):
                 self._tables(batch, command, tables, rows[begin : begin + size])
-        if self._alone or (self.question is None and any(each.regional for each in self.goals)):
-            for k in np.flatnonzero(batch.feasible).tolist():
+        alone = bool(self._alone) or (self.question is None and any(each.regional for each in self.goals))
+        for k in np.flatnonzero(batch.feasible).tolist():
+            if alone or k in batch.left:
                 batch.reasons[k] = self._one(batch, k)
         return Evaluated(batch.values, batch.errors, [str(reason) for reason in batch.reasons])
 
@@ -173,10 +174,15 @@ class Evaluator:
         failed = FAILED_ARRAY[_first(stack.reason)]
         wrong = stack.reason != 0
         batch.note(rows, wrong.any(axis=1) if stack.listed else wrong.all(axis=1), failed)
-        for each in (each for goals in tables.values() for each in goals):
-            values = each.worst(stack.result, len(rows))
-            batch.values[each][rows] = values
-            batch.note(rows, np.isnan(values), np.where(failed == "", f"{each.name} has no value", failed))
+        for table, goals in tables.items():
+            left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
+            for each in goals:
+                values = each.worst(stack.result, len(rows))
+                batch.values[each][rows] = values
+                lost = np.isnan(values) & ~left
+                batch.note(rows, lost, np.where(failed == "", f"{each.name} has no value", failed))
+            for k in rows[left].tolist():
+                batch.left.setdefault(k, {}).setdefault(command, []).extend(goals)
 
     def _one(self, batch: _Batch, k: int) -> str:
         """Ask what is left of one design; returns why it is infeasible."""
@@ -188,11 +194,12 @@ class Evaluator:
                 self._regional(batch, row, questions(other, GRID_TOLERANCE, self._columns)[0], {})
                 if batch.reasons[k]:
                     return str(batch.reasons[k])
-            for command, goals in self._alone.items():
+            left = batch.left.get(k, {})
+            for command in dict.fromkeys((*self._alone, *left)):
                 result = _ask(other, command)
                 if result.failed:
                     return _pose_reason(other, command)
-                for each in goals:
+                for each in (*self._alone.get(command, ()), *left.get(command, ())):
                     batch.values[each][k] = each.worst(result)[0]
                     if np.isnan(batch.values[each][k]):
                         return _pose_reason(other, command) or f"{each.name} has no value"
@@ -215,6 +222,8 @@ class _Batch:
         self.places = study.parameters.places(self.designs)
         self.values: dict[Goal, Floats] = {each: np.full(count, np.nan) for each in goals}
         self.errors: dict[str, Floats] = {}
+        # What is still to be asked of single designs, by their row and by command.
+        self.left: dict[int, dict[str, list[Goal]]] = {}
         self.reasons = np.array(faults(study, self.parameters, self.places, count), dtype=object)
 
     @property

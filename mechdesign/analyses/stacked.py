@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.analyses import kinematics, stiffness
 from mechdesign.analyses.motion import Motion, asked, move
+from mechdesign.analyses.transmission import transmission_table
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
@@ -26,7 +27,7 @@ _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
     "jacobian": kinematics.jacobian_table,
 }
 TABLES: Mapping[str, Collection[str]] = {
-    "kinematics": _OF_MOTION.keys(),
+    "kinematics": (*_OF_MOTION, "loops"),
     "stiffness": ("stiffness", "compliance", "deflections"),
 }
 # Sections whose numbers a command reads.
@@ -46,11 +47,14 @@ class Stack:
         See `mechdesign.mechanism.Reason`.
     listed : bool
         Whether a person listed the poses, so that each of them must be valid.
+    open : mapping of str to bool array, shape (designs,)
+        By table, the designs that it does not answer for.
     """
 
     result: Result
     reason: NDArray[np.int8]
     listed: bool
+    open: Mapping[str, NDArray[np.bool_]]
 
 
 def possible(study: Study, command: str, names: Collection[str]) -> bool:
@@ -114,7 +118,8 @@ def tables(
         held = stiffness.solve(study, question, poses)
         found, reason = stiffness.tables(study, question, poses, held), held.reason
         found = {name: table for name, table in found.items() if name in TABLES[command]}
-    return Stack(Result(command, found), reason.reshape(designs, one.count), one.listed)
+    reason = reason.reshape(designs, one.count)
+    return Stack(Result(command, found), reason, one.listed, {"loops": np.asarray(reason.any(axis=1))})
 
 
 def _motion(study: Study, wanted: Collection[str], poses: Poses) -> tuple[dict[str, Table], NDArray[np.int8]]:
@@ -125,4 +130,9 @@ def _motion(study: Study, wanted: Collection[str], poses: Poses) -> tuple[dict[s
         made.pop("targets", None)
     if not question.square:
         made.pop("jacobian", None)
-    return {name: make(motion) for name, make in made.items()}, motion.reason
+    found = {name: make(motion) for name, make in made.items()}
+    if "loops" in wanted:
+        failed = np.asarray(motion.reason.reshape(poses.designs, -1).any(axis=1))
+        loops = transmission_table(study, poses, kinematics.swept_of(poses), ~failed)
+        found |= {} if loops is None else {"loops": loops}
+    return found, motion.reason

@@ -159,10 +159,21 @@ def test_what_has_no_common_tables_is_asked_of_each_design() -> None:
     agree(study, [], goals, around(study, ["r1", "forearm.length"], 3, 0.1), together=False)
 
 
-def test_transmission_angles_of_the_loops() -> None:
-    study = varied("gallery/four_bar.yaml", ["coupler.length"])
-    goals = [goal("kinematics.loops.transmission_min")]
-    agree(study, [], goals, around(study, ["coupler.length"], 3, 0.05), together=False)
+@pytest.mark.parametrize(
+    "changes",
+    [
+        (),
+        ("kinematics.sweep.crank={from: -47, to: 130, number: 9}",),
+        ("kinematics.sweep=", "kinematics.poses=[{crank: 20}, {crank: 70}]"),
+    ],
+)
+def test_transmission_angles_of_the_loops(changes: tuple[str, ...]) -> None:
+    """Also where a design does not turn fully, and its smallest angle lies at a limit of motion."""
+    names = ["coupler.length", "crank.length"]
+    study = varied("gallery/four_bar.yaml", names, *changes)
+    designs = {"coupler.length": np.array([3.5, 3.3, 3.7, 2.2]), "crank.length": np.array([1, 0.9, 1.1, 1.25])}
+    goals = [goal("kinematics.loops.transmission_min"), goal("kinematics.loops.transmission_max")]
+    agree(study, names, goals if "kinematics.sweep=" in changes else goals[:1], designs)
 
 
 def test_numbers_of_the_section_that_depend_on_a_variable() -> None:

@@ -1,0 +1,63 @@
+"""Speed of evaluating designs: path and function synthesis, stiffness, and what is asked of each design alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mechdesign
+from mechdesign.analyses.goals import Evaluator, goal
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+# A coupler point is to follow a rounded triangle, with a point every five degrees of the crank.
+PATH = "mechanism.targets.C=[[0.6, 1.9], [1.6, 1.2], [2.6, 1.6], [2.4, 2.4], [1.2, 2.5], [0.6, 1.9]]"
+
+
+def measure(
+    benchmark: Any, path: str, variables: Sequence[str], result: str, designs: int, width: float, *changes: str
+) -> None:
+    """Designs a second on one processor, about the study's own."""
+    ranges = ", ".join(f"{name}: {{from: 0, to: 1, number: 2}}" for name in variables)
+    section = f"optimize={{variables: {{{ranges}}}, minimize: [{result}]}}"
+    study = mechdesign.load(CONFIGS / path, [section, *changes])
+    evaluator = Evaluator(study, [goal(result, smallest=True)])
+    rng = np.random.default_rng(1)
+    nominal = {name: study.parameters.nominal.get(name, study.mechanism.nominal.get(name)) for name in variables}
+    batch = {name: value * (1 + width * rng.uniform(-1, 1, designs)) for name, value in nominal.items()}
+    found = benchmark.pedantic(evaluator, (batch,), rounds=3, warmup_rounds=1)
+    assert sum(not reason for reason in found.reasons) > designs / 2
+    benchmark.extra_info["designs_per_second"] = designs / benchmark.stats.stats.min
+
+
+@pytest.mark.parametrize("result", ["kinematics.targets.rms", "kinematics.C_error", "kinematics.extremes.C.x.range"])
+def test_path_synthesis_designs_a_second(benchmark: Any, result: str) -> None:
+    variables = ["crank.length", "coupler.length", "rocker.length", "coupler.C.x", "coupler.C.y"]
+    changes = (PATH, "kinematics.rates=", "kinematics.outputs=[C]")
+    measure(benchmark, "gallery/four_bar.yaml", variables, result, 10_000, 0.05, *changes)
+
+
+def test_function_synthesis_designs_a_second(benchmark: Any) -> None:
+    variables = ["crank.length", "coupler.length", "follower.length"]
+    result = "kinematics.follower.angle_error"
+    measure(benchmark, "gallery/function_generator.yaml", variables, result, 10_000, 0.01)
+
+
+def test_transmission_angles_designs_a_second(benchmark: Any) -> None:
+    variables = ["coupler.length", "rocker.length"]
+    result = "kinematics.loops.transmission_min"
+    measure(benchmark, "gallery/four_bar.yaml", variables, result, 2_000, 0.05, "kinematics.rates=")
+
+
+@pytest.mark.parametrize("path", ["planar_3rpr.yaml", "five_bar.yaml"])
+def test_stiffness_designs_a_second(benchmark: Any, path: str) -> None:
+    places = [name for name in mechdesign.load(CONFIGS / path).mechanism.nominal if name.endswith((".length", "B1.x"))]
+    measure(benchmark, path, places[:2], "stiffness.k_min", 20_000, 0.05)
+
+
+def test_first_order_reliability_designs_a_second(benchmark: Any) -> None:
+    result = "reliability.moments.sigma"
+    measure(benchmark, "two_link_arm.yaml", ["r1", "r2"], result, 100, 0.05, "reliability.methods=analytic")
