@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.panels import Panels
-from mechdesign.analyses.rays import Designs, Floats, Ints, trace
+from mechdesign.analyses.rays import SAME, Designs, Floats, Intervals, Ints, trace
 
 SLACK = 1e-9
 # Nodes of a map along each ray, from boundary to boundary.
@@ -38,10 +38,12 @@ class Patch:
 
     def grid(self, about: complex) -> NDArray[np.complex128]:
         """Nodes, shape (rays, GRID), denser towards both curves."""
-        fraction = 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID)))
-        fraction = np.clip(fraction, INSET, 1 - INSET)
-        radius = self.inner[:, None] + fraction * (self.outer - self.inner)[:, None]
+        radius = self.inner[:, None] + self.fractions() * (self.outer - self.inner)[:, None]
         return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
+
+    def fractions(self) -> Floats:
+        """Places of a ray's nodes between both curves."""
+        return np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
 
 
 def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterator[Patch]:
@@ -53,11 +55,25 @@ def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterat
         theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
         zero = np.zeros(number, dtype=np.intp)
         traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
-        counts = traced.counts
-        usual = counts[number // 2]
-        first = np.searchsorted(traced.ray, np.nonzero(counts == usual)[0])
-        for slot in range(int(usual)):
+        ray, inner, outer, enters, leaves = _whole(traced, SAME * float(panels.reach[0]))
+        counts = np.bincount(ray, minlength=number)
+        usual = int(np.argmax(np.bincount(counts)))
+        kept = np.flatnonzero(counts == usual)
+        first = np.searchsorted(ray, kept)
+        for slot in range(usual):
             at: Ints = first + slot
-            middle = at[len(at) // 2]
-            yield Patch(theta[counts == usual], traced.inner[at], traced.outer[at],
-                        int(traced.enters[middle]), int(traced.leaves[middle]))  # fmt: skip
+            yield Patch(theta[kept], inner[at], outer[at], _most(enters[at]), _most(leaves[at]))
+
+
+def _whole(traced: Intervals, near: float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
+    """Intervals with those made one that a single point divides, such as where a leg has no length."""
+    ray = traced.ray
+    meets = (ray[1:] == ray[:-1]) & (traced.inner[1:] - traced.outer[:-1] <= near)
+    begins, ends = np.append(True, ~meets)[: len(ray)], np.append(~meets, True)[: len(ray)]
+    return ray[begins], traced.inner[begins], traced.outer[ends], traced.enters[begins], traced.leaves[ends]
+
+
+def _most(margins: Ints) -> int:
+    """The margin that most rays name: single rays may meet another (a corner)."""
+    names, counts = np.unique(margins, return_counts=True)
+    return int(names[np.argmax(counts)])

@@ -153,9 +153,10 @@ def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints,
         roots = np.stack([half / c, a / half])
         margin_of = (roots > SAME) & (roots < 1)
     which, margin, ray = np.nonzero(margin_of)
-    x = roots[which, margin, ray]
-    rising = (b[margin, ray] + 2 * c[margin, ray] * x) > 0
-    return margin, ray, np.where(rising, 1, -1), x, (a + SAME * (b + SAME * c) <= 0).sum(axis=0)
+    # The slope at the first of the two roots has the sign of -b, at the other that of b: also where they are one.
+    rising = np.signbit(b[margin, ray]) == (which == 0)
+    x, start = roots[which, margin, ray], (a + SAME * (b + SAME * c) <= 0).sum(axis=0)
+    return margin, ray, np.where(rising, 1, -1), x, start
 
 
 def _others(

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.curves import Patch, patches
 from mechdesign.analyses.indices import INDICES, prepare
 from mechdesign.analyses.indices.index import determinant_power, power_of_length
-from mechdesign.analyses.poses import in_study_units
-from mechdesign.analyses.rays import Designs, Floats
+from mechdesign.analyses.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
+from mechdesign.analyses.rays import Designs
 from mechdesign.analyses.region import CLOSE, COLUMNS, RAYS, Answer, Question, answer, questions, split
+from mechdesign.analyses.workspace_tables import held_columns, inscribed_columns, outlines, stacked
 from mechdesign.errors import AssemblyError
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
@@ -40,7 +40,8 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     progress.start(len(asked), "regions")
     answers: list[Answer] = []
     local: list[list[Column]] = []
-    boundary: list[list[Column]] = []
+    regions: list[tuple[Study, Question, list[Patch]]] = []
+    shapes: list[tuple[Circle, Rectangle]] = []
     warnings: list[str] = []
     for question in asked:
         given = answer(question, {}, 1, CLOSE)
@@ -50,15 +51,19 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             designs = Designs(question.field, {}, 1, question.about)
             found = list(patches(designs, given.panels, question.rays or RAYS, CLOSE.samples))
             local.append(_local(study, question, found))
-            boundary.append(_boundary(study, question, found))
+            shapes.append(inscribed(question.field, question.about, question.scan, found))
+            regions.append((study, question, found))
+        else:
+            shapes.append((NO_CIRCLE, NO_RECTANGLE))
         progress.update(1)
     if not local:
         raise AssemblyError(_unreachable(study, asked[0]))
     tables = [
-        Table("indices", tuple(_indices(study, asked, answers)), "performance indices over the region"),
-        Table("local", _stack(local), "local indices on a grid that follows the boundary"),
-        Table("boundary", _stack(boundary), "boundary of the region, curve by curve"),
-    ]
+        Table("indices", (*_indices(study, asked, answers), *inscribed_columns(study, shapes)),
+              "performance indices over the region"),
+        Table("local", stacked(local), "local indices on a grid that follows the boundary"),
+        *outlines(regions),
+    ]  # fmt: skip
     empty = sum(not given.panels.closes[0] for given in answers)
     return Result("workspace", {table.name: table for table in tables}, tuple(warnings),
                   {"regions": len(asked), "empty": empty})  # fmt: skip
@@ -124,21 +129,6 @@ def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str
 _STATISTICS = {"mean": "mean", "min": "infimum", "max": "supremum", "std": "standard deviation"}
 
 
-def _stack(parts: Sequence[Sequence[Column]]) -> tuple[Column, ...]:
-    return tuple(
-        Column(columns[0].name, np.concatenate([column.values for column in columns]), columns[0].unit,
-               columns[0].meaning)
-        for columns in zip(*parts, strict=True)
-    )  # fmt: skip
-
-
-def _held(study: Study, question: Question, rows: int) -> list[Column]:
-    return [
-        Column(name, np.full(rows, value), study.units.label(study.mechanism.quantity(name)), "held coordinate")
-        for name, value in question.held.items()
-    ]
-
-
 def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
     grids = [patch.grid(question.about) for patch in found]
     z = np.concatenate([grid.ravel() for grid in grids])
@@ -148,14 +138,13 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
     patch = np.repeat(np.arange(len(grids)), [grid.size for grid in grids])
     length, determinant = study.units.label("length"), power_of_length(study, determinant_power(question.field))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        columns = [
-            Column(index.name, np.broadcast_to(index.values(local), z.shape), index.index.unit(study, question.field),
-                   index.index.meaning)
-            for index in prepare(study, list(names))
-        ]  # fmt: skip
+    columns = [
+        Column(index.name, np.broadcast_to(index.values(local), z.shape), index.index.unit(study, question.field),
+               index.index.meaning)
+        for index in prepare(study, list(names))
+    ]  # fmt: skip
     return [
-        *_held(study, question, len(z)),
+        *held_columns(study, question, len(z)),
         Column("x", z.real, length, "place of the point"),
         Column("y", z.imag, length, "place of the point"),
         *columns[:2],
@@ -167,63 +156,3 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
         Column("ray", ray, "", "ray of the patch's grid"),
         Column("node", node, "", "node along the ray, from the inner to the outer boundary"),
     ]
-
-
-def _boundary(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
-    field = question.field
-    curves = [
-        (patch.theta, radius, margin, side)
-        for side, names in (("inner", ("inner", "enters")), ("outer", ("outer", "leaves")))
-        for patch in found
-        for radius, margin in [(getattr(patch, names[0]), getattr(patch, names[1]))]
-        if margin >= 0
-    ]
-    theta = np.concatenate([curve[0] for curve in curves])
-    radius = np.concatenate([curve[1] for curve in curves])
-    lengths = [len(curve[0]) for curve in curves]
-    labels = [field.labels[curve[2]] for curve in curves]
-    z = np.asarray(question.about + radius * np.exp(1j * theta))
-    inside = np.concatenate([np.full(n, 1.0 if curve[3] == "inner" else -1.0)
-                             for n, curve in zip(lengths, curves, strict=True)])  # fmt: skip
-    within = np.asarray(question.about + radius * (1 + 1e-12 * inside) * np.exp(1j * theta))
-    drives = _drives(question, z, within, np.flatnonzero(np.diff(inside)) + 1)
-    length, angle = study.units.label("length"), study.units.label("angle")
-    columns = [
-        *_held(study, question, len(z)),
-        Column("x", z.real, length, "place of the point"),
-        Column("y", z.imag, length, "place of the point"),
-        Column(
-            "kind", np.repeat([kind for kind, _ in labels], lengths), "", "what ends the region: limit or singularity"
-        ),
-    ]
-    for drive, value in zip(field.mechanism.forward.structure.given, drives, strict=True):
-        shown = np.asarray(in_study_units(study, drive, value))
-        columns.append(Column(drive.name, shown, study.units.label(drive.quantity), "drive's value there"))
-    return [
-        *columns,
-        Column("at", np.repeat([name for _, name in labels], lengths), "", "which limit or singularity"),
-        Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
-        Column("side", np.repeat([curve[3] for curve in curves], lengths), "", "which end of the ray's interval"),
-        Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth piece of the boundary"),
-    ]  # fmt: skip
-
-
-def _drives(
-    question: Question, z: NDArray[np.complex128], within: NDArray[np.complex128], sides: NDArray[np.intp]
-) -> list[Floats]:
-    """Drives on the boundary, or just inside where rounding opens the mechanism; angles continuous along each side.
-
-    Of the turns of an angle that is shown which is nearest to the sketch.
-    """
-    exact, near = question.field.configuration(z, {}), question.field.configuration(within, {})
-    found = []
-    for drive in question.field.mechanism.forward.structure.given:
-        here, beside = (np.broadcast_to(c.value(drive), z.shape) for c in (exact, near))
-        values = np.where(np.isfinite(here), here, beside)
-        if drive.quantity == "angle":
-            drawn = float(question.field.mechanism.sketch_configuration.value(drive))
-            parts = [np.unwrap(part) for part in np.split(values, sides)]
-            turns = [2 * np.pi * np.round((np.mean(part) - drawn) / (2 * np.pi)) for part in parts]
-            values = np.concatenate([part - turn for part, turn in zip(parts, turns, strict=True)])
-        found.append(values)
-    return found
