@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,7 +35,7 @@ STILL = 1e-12
 
 def extremes(
     study: Study, outputs: Sequence[Coordinate], errors: Sequence[Error], arrays: Mapping[str, Array], poses: Poses,
-    swept: str | None, reason: NDArray[np.int8],
+    swept: str | None, reason: NDArray[np.int8], asked: Collection[str] | None = None,
 ) -> Table:  # fmt: skip
     """Smallest and largest value of each output and error over the valid poses, and the ratio of the times between.
 
@@ -52,6 +52,8 @@ def extremes(
         The one coordinate that moves.
     reason : int8 array, shape (poses,)
         See `mechdesign.mechanism.Reason`.
+    asked : collection of str, optional
+        Outputs and errors whose extremes between the poses are wanted; all where left out.
     """
     mechanism = study.mechanism
     shape = (poses.designs, poses.count // poses.designs)
@@ -83,7 +85,8 @@ def extremes(
             index[end, :, k] = rows
             found[end, some, k, 0], found[end, some, k, 1] = values.ravel()[rows[some]], at[rows[some]]
     if swept is not None:
-        design, which = np.nonzero(moving)
+        some = np.array([asked is None or name in asked for name in names])
+        design, which = np.nonzero(moving & some)
         for k, sign in enumerate((1, -1)):
             for of_errors in (False, True):
                 mine = (which >= len(outputs)) == of_errors

@@ -70,6 +70,8 @@ class Evaluator:
         # Goals of commands and tables whose answers are found for all designs at once; the others.
         self._together: dict[str, dict[str, list[Goal]]] = {}
         self._alone: dict[str, list[Goal]] = {}
+        # Outputs whose extremes are asked.
+        self._outputs: set[str] = set()
         problems = [problem for command in self._commands() for problem in self._look(command)]
         if problems:
             raise StudyError(problems)
@@ -90,10 +92,13 @@ class Evaluator:
             together = stacked.possible(self.study, command, self.study.optimize.variables)
             for each in list(goals):
                 try:
-                    table = choose(result, each.column, dict(each.where)).table.name
+                    chosen = choose(result, each.column, dict(each.where))
                 except UnknownColumnError:
                     continue
                 goals.remove(each)
+                table = chosen.table.name
+                if table == "extremes":
+                    self._outputs.update(chosen.table["output"][chosen.counts].tolist())
                 if together:
                     self._together.setdefault(command, {}).setdefault(table, []).append(each)
                 else:
@@ -170,7 +175,7 @@ class Evaluator:
         self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: NDArray[np.intp]
     ) -> None:
         places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
-        stack = stacked.tables(self.study, command, tables.keys(), len(rows), places, parameters)
+        stack = stacked.tables(self.study, command, tables.keys(), len(rows), places, parameters, self._outputs)
         failed = FAILED_ARRAY[_first(stack.reason)]
         wrong = stack.reason != 0
         batch.note(rows, wrong.any(axis=1) if stack.listed else wrong.all(axis=1), failed)

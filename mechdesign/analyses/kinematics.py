@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -120,11 +120,11 @@ def motion_table(motion: Motion) -> Table:
     return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
 
 
-def extremes_table(motion: Motion) -> Table:
-    """Smallest and largest values; see `mechdesign.analyses.extremes.extremes`."""
+def extremes_table(motion: Motion, names: Collection[str] | None = None) -> Table:
+    """Smallest and largest values, exact for some outputs or all; see `mechdesign.analyses.extremes.extremes`."""
     question, poses = motion.asked, motion.asked.poses
     swept = swept_of(poses)
-    return extremes(question.study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason)
+    return extremes(question.study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason, names)
 
 
 def targets_table(motion: Motion) -> Table:

@@ -22,12 +22,11 @@ BLOCK = 65536
 
 _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
     "motion": kinematics.motion_table,
-    "extremes": kinematics.extremes_table,
     "targets": kinematics.targets_table,
     "jacobian": kinematics.jacobian_table,
 }
 TABLES: Mapping[str, Collection[str]] = {
-    "kinematics": (*_OF_MOTION, "loops"),
+    "kinematics": (*_OF_MOTION, "extremes", "loops"),
     "stiffness": ("stiffness", "compliance", "deflections"),
 }
 # Sections whose numbers a command reads.
@@ -100,7 +99,7 @@ def size(study: Study, command: str) -> int:
 
 def tables(
     study: Study, command: str, wanted: Collection[str], designs: int,
-    places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike],
+    places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike], outputs: Collection[str] | None = None,
 ) -> Stack:  # fmt: skip
     """Answers of a command for designs whose places and parameters have the given values, of shape (designs,).
 
@@ -108,11 +107,13 @@ def tables(
     ----------
     wanted : collection of str
         Names of tables.
+    outputs : collection of str, optional
+        Of the extremes; all where left out.
     """
     one = study.poses(command)
     poses = stacked(one, designs, places, parameters)
     if command == "kinematics":
-        found, reason = _motion(study, wanted, poses)
+        found, reason = _motion(study, wanted, poses, outputs)
     else:
         question = stiffness.ask(study)
         held = stiffness.solve(study, question, poses)
@@ -122,7 +123,9 @@ def tables(
     return Stack(Result(command, found), reason, one.listed, {"loops": np.asarray(reason.any(axis=1))})
 
 
-def _motion(study: Study, wanted: Collection[str], poses: Poses) -> tuple[dict[str, Table], NDArray[np.int8]]:
+def _motion(
+    study: Study, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None
+) -> tuple[dict[str, Table], NDArray[np.int8]]:
     question = dataclasses.replace(asked(study), poses=poses)
     motion = move(question)
     made = {name: make for name, make in _OF_MOTION.items() if name in wanted}
@@ -131,6 +134,8 @@ def _motion(study: Study, wanted: Collection[str], poses: Poses) -> tuple[dict[s
     if not question.square:
         made.pop("jacobian", None)
     found = {name: make(motion) for name, make in made.items()}
+    if "extremes" in wanted:
+        found["extremes"] = kinematics.extremes_table(motion, outputs)
     if "loops" in wanted:
         failed = np.asarray(motion.reason.reshape(poses.designs, -1).any(axis=1))
         loops = transmission_table(study, poses, kinematics.swept_of(poses), ~failed)
