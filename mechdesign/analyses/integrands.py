@@ -8,7 +8,7 @@ import numpy as np
 
 from mechdesign.analyses.indices import Local, Prepared
 from mechdesign.analyses.rays import Floats
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, quiet
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,21 +25,20 @@ class Integrand:
 
     def values(self, local: Local) -> Floats:
         """Values at points; 0 where there is none: on the boundary itself rounding leaves an interval of no width."""
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            found = self.index.values(local)
-            return _finite(local, found if self.power == 1 else found * found)
+        found = self.index.values(local)
+        return _finite(local, found if self.power == 1 else found * found)
 
+    @quiet
     def __call__(self, local: Local) -> tuple[Floats, Floats | None]:
         """Values at points, and k where the integrand is a smooth function plus k sqrt(w); None without a kink."""
         kink = self.index.index.kink
         # Where more than two singular values may meet, the kinks are not of that form.
         if kink is None or (len(local.homogeneous) > 2 and self.index.name != "inverse_condition"):
             return self.values(local), None
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            slope = kink(local)
-            if self.power == 2:
-                # (s + k sqrt w)^2 = s^2 + k^2 w + 2 s k sqrt w
-                slope = 2 * slope * (self.index.values(local) - slope * np.sqrt(local.roundness))
+        slope = kink(local)
+        if self.power == 2:
+            # (s + k sqrt w)^2 = s^2 + k^2 w + 2 s k sqrt w
+            slope = 2 * slope * (self.index.values(local) - slope * np.sqrt(local.roundness))
         return self.values(local), _finite(local, slope)
 
 

@@ -242,7 +242,6 @@ def _values(
     z = designs.about + spread(inner, outer, vs, cosine)[0] * np.exp(1j * theta.reshape(shape))
     local = designs.field.local(z, designs.of(at.design))
     found = np.full(z.shape, np.nan)
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        for k in np.unique(which):
-            found = np.where(which == k, indices[k].values(local), found)
+    for k in np.unique(which):
+        found = np.where(which == k, indices[k].values(local), found)
     return found

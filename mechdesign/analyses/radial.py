@@ -33,8 +33,9 @@ NEWTON_STEPS = 3
 # A singularity nearer to an interval than this share of its width needs the interval in two halves.
 NEAR = 0.5
 
-# Integrals and their estimated errors (integrands, pieces), and the place of the ridge, in [-1, 1] (pieces).
-Integrals = tuple[Floats, Floats, Floats]
+# Integrals and their estimated errors (integrands, pieces); the place of the kink, in [-1, 1], and whether that is a
+# forward singularity (pieces).
+Integrals = tuple[Floats, Floats, Floats, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,13 +132,13 @@ def along(
     pilot : Integrals
         Of `parts`, as evaluated by `evaluate`.
     allowed : ndarray, shape (integrands, rays)
-        Error that a piece may have; those with a larger one are split, at the ridge where singular values meet where
-        this is what errs, else in the middle.
+        Error that a piece may have; those with a larger one are split: at a forward singularity, at the ridge where
+        singular values meet where this is what errs, else in the middle.
     """
     count = len(integrands)
     kinked = np.array([integrand.kinked for integrand in integrands])
     value, error = np.zeros((count, len(theta))), np.zeros((count, len(theta)))
-    found, doubt, ridge = pilot
+    found, doubt, place, crossed = pilot
     low, high = parts.limits
     with np.errstate(divide="ignore", invalid="ignore"):
         # What an inverse square root has within `NEAREST` of the boundary.
@@ -151,16 +152,19 @@ def along(
             error[k] += np.bincount(ray[~split], doubt[k, ~split], len(theta))
         if not split.any():
             break
-        share = np.where(rough[kinked].any(axis=0) & (np.abs(ridge) < INSIDE), ridge, 0.0)[split]
+        at = crossed | (rough[kinked].any(axis=0) & (np.abs(place) < INSIDE))
+        share = np.where(at, place, 0.0)[split]
         parts = parts.pick(split)
-        parts = parts.split(_refined(designs, design[parts.ray], theta[parts.ray], parts, share))
+        parts = parts.split(_refined(designs, design[parts.ray], theta[parts.ray], parts, share, crossed[split]))
         noise = np.concatenate([noise[:, split]] * 2, axis=1)
-        found, doubt, ridge = evaluate(designs, integrands, design[parts.ray], theta[parts.ray], parts)
+        found, doubt, place, crossed = evaluate(designs, integrands, design[parts.ray], theta[parts.ray], parts)
     return value, error
 
 
-def _refined(designs: Designs, design: Ints, theta: Floats, parts: Pieces, share: Floats) -> Floats:
-    """Where to split: the ridges near `share` (of [-1, 1]) of pieces by a parabola; the middle where that is 0."""
+def _refined(
+    designs: Designs, design: Ints, theta: Floats, parts: Pieces, share: Floats, crossed: NDArray[np.bool_]
+) -> Floats:
+    """Where to split: the ridge or singularity near `share` (of [-1, 1]) of pieces; the middle where that is 0."""
     at = 0.5 * (parts.start + parts.stop) + 0.5 * (parts.stop - parts.start) * share
     ridges = np.flatnonzero(share)
     if not ridges.size:
@@ -169,8 +173,11 @@ def _refined(designs: Designs, design: Ints, theta: Floats, parts: Pieces, share
     around = at[ridges] + step * np.array([-1.0, 0.0, 1.0])[:, None]
     z = designs.about + parts.pick(ridges).radius(around)[0] * np.exp(1j * theta[ridges])
     with np.errstate(divide="ignore", invalid="ignore"):
-        low, middle, high = designs.field.local(z, designs.of(design[ridges])).roundness
+        local = designs.field.local(z, designs.of(design[ridges]))
+        low, middle, high = local.roundness
         shift = 0.5 * (low - high) / (low + high - 2 * middle)
+        low, middle, high = np.broadcast_to(1 / local.determinant, z.shape)
+        shift = np.where(crossed[ridges], 2 * middle / (low - high), shift)
     at[ridges] += step * np.where(np.abs(shift) < 1, shift, 0.0)
     return at
 
@@ -180,7 +187,7 @@ def evaluate(
 ) -> Integrals:
     """Integrals of indices times radius over pieces, their errors (integrands, pieces), and where to split."""
     found, doubt = np.empty((2, len(integrands), len(theta)))
-    ridges = np.zeros(len(theta))
+    places, crossed = np.zeros(len(theta)), np.zeros(len(theta), dtype=bool)
     for k in range(0, len(theta), BLOCK):
         at = slice(k, k + BLOCK)
         part = parts.pick(at)
@@ -200,9 +207,29 @@ def evaluate(
                 continue
             if ridge is None:
                 ridge = _Ridge.of(local.roundness)
-                ridges[at] = ridge.place
+                places[at] = ridge.place
             found[j, at], doubt[j, at] = ridge.integral(value, kink, measure)
-    return found, doubt, ridges
+        if not designs.field.same_assembly:
+            grip = np.broadcast_to(local.determinant, r.shape)
+            crossed[at] = (grip > 0).any(axis=0) & (grip < 0).any(axis=0)
+            mixed = np.flatnonzero(crossed[at])
+            places[k + mixed] = _sign_change(1 / grip[:, mixed])
+    return found, doubt, places, crossed
+
+
+def _sign_change(values: Floats) -> Floats:
+    """A root of the polynomials through `values` at the nodes, by Newton's method from between two nodes."""
+    first = np.argmax(np.signbit(values[1:]) != np.signbit(values[:-1]), axis=0)
+    lane = np.arange(values.shape[1])
+    a, b = values[first, lane], values[first + 1, lane]
+    low, high = RADII.nodes[first], RADII.nodes[first + 1]
+    spectrum = RADII.spectrum @ values
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = low + (high - low) * a / (a - b)
+        for _ in range(NEWTON_STEPS):
+            value, slope = _series(spectrum, x, 1)
+            x = np.clip(x - value / slope, low, high)
+    return np.asarray(np.where(np.isfinite(x), x, 0.5 * (low + high)))
 
 
 @dataclass(frozen=True, eq=False)

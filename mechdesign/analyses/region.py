@@ -198,18 +198,24 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
     integrands, peaks = _integrands(question), _peaks(question, designs, panels, samples)
     endless = _endless(question, integrands, peaks, count)
+    means, doubts = np.full(endless.shape, np.inf), np.zeros(endless.shape)
+    means[:, ~panels.closes] = np.nan
+    # What is infinite for every design need not be looked at.
+    some = np.flatnonzero(~endless[:, panels.closes].all(axis=1))
+    finite = [integrands[k] for k in some]
     integral = integrate(
         designs,
         panels,
         tolerance,
         samples,
         question.counted,
-        integrands if gauss else (),
-        endless[: gauss * len(endless)],
+        finite if gauss else (),
+        endless[some[: len(some) * gauss]],
     )
-    means, doubts = integral.mean, integral.mean_error
-    if not gauss:
-        means, doubts = _simple(question, designs, panels, samples, integrands), np.zeros((len(integrands), count))
+    if gauss:
+        means[some], doubts[some] = integral.mean, integral.mean_error
+    else:
+        means[some] = _simple(question, designs, panels, samples, finite)
     values: dict[str, Floats] = {"area": integral.area}
     errors: dict[str, Floats] = {"area": integral.area_error}
     if {"SUI", "box_area"} & set(question.wanted):
@@ -294,5 +300,6 @@ def _simple(
 
 
 __all__ = [
-    "BRISK", "CLOSE", "COLUMNS", "RAYS", "Answer", "Integral", "Question", "answer", "batched", "columns", "questions", "split",
+    "BRISK", "CLOSE", "COLUMNS", "RAYS", "Answer", "Integral", "Question", "answer", "batched", "columns", "questions",
+    "split",
 ]  # fmt: skip

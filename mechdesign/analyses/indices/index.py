@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mechdesign.analyses.indices.local import Local
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, quiet
 
 if TYPE_CHECKING:
     from mechdesign.analyses.field import Field
@@ -61,6 +61,7 @@ class Prepared:
         """Name of the index."""
         return self.index.name
 
+    @quiet
     def values(self, local: Local) -> Value:
         """Values at points, computed once."""
         if self.name not in local.found:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses import jacobians
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
 
 Floats = NDArray[np.float64]
@@ -40,6 +40,7 @@ class Local:
     found: dict[str, Value] = field(default_factory=dict)
 
     @cached_property
+    @quiet
     def determinant(self) -> Value:
         """Determinant of the Jacobian."""
         if len(self.jacobian) == 2:
@@ -48,6 +49,7 @@ class Local:
         return jacobians.determinant(_matrix(self.jacobian))
 
     @cached_property
+    @quiet
     def twice(self) -> Value:
         """||J||_F^2 / |det J| of two rows: sigma_max/sigma_min and its inverse added [S1, eq. 8]; 2 at isotropy."""
         (a, b), (c, d) = self.homogeneous
@@ -55,15 +57,16 @@ class Local:
         return (a * a + b * b + c * c + d * d) / np.abs(size)
 
     @cached_property
+    @quiet
     def inverse_condition(self) -> Value:
         """Smallest over largest singular value."""
         if len(self.homogeneous) == 2:
             return jacobians.of_two(self.twice)
         least, largest = self.singular_values
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(largest > 0, least / largest, 0.0 * largest)
+        return np.where(largest > 0, least / largest, 0.0 * largest)
 
     @cached_property
+    @quiet
     def singular_values(self) -> tuple[Value, Value]:
         """Smallest and largest singular value; nan where an entry is."""
         if len(self.homogeneous) == 2:
@@ -78,6 +81,7 @@ class Local:
         return np.where(finite, values[..., -1], np.nan), np.where(finite, values[..., 0], np.nan)
 
     @cached_property
+    @quiet
     def roundness(self) -> Value:
         """w = ((sigma_max - sigma_min)/(sigma_max + sigma_min))^2, which is smooth where the two meet (w = 0)."""
         if len(self.homogeneous) == 2:
