@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -23,6 +24,7 @@ from mechdesign.study import Study
 from mechdesign.study.variants import faults, follows, variant
 
 EMPTY = "nothing of the workspace can be reached"
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 # By `mechdesign.mechanism.Reason`.
 FAILED = (
     "",
@@ -64,7 +66,7 @@ class Evaluator:
             asked = questions(study, GRID_TOLERANCE, self._columns)
             if len(asked) > 1:
                 message = "an optimisation compares one workspace a design: hold one value of each coordinate"
-                raise StudyError((Problem(message, "workspace.at", str(study.path or "")),))
+                raise StudyError([study.problem(message, "workspace", "at")])
             if all(each.index for each in self.goals if each.regional) and not follows(study, names, ("workspace",)):
                 self.question = asked[0]
         # Goals of commands and tables whose answers are found for all designs at once; the others.
@@ -82,9 +84,8 @@ class Evaluator:
     def _look(self, command: str) -> Iterator[Problem]:
         """Find the tables of a command's goals, before anything is computed but the study's own design."""
         goals = [each for each in self.goals if each.command == command and not each.regional]
-        file = str(self.study.path or "")
         if command == "optimize":
-            yield Problem("an optimisation cannot judge itself", self._key(goals[0]), file)
+            yield self.study.problem("an optimisation cannot judge itself", *self._key(goals[0]))
             return
         assert self.study.optimize is not None
         if command in stacked.TABLES:
@@ -115,20 +116,20 @@ class Evaluator:
             try:
                 each.worst(result)
             except UnknownColumnError as error:
-                yield Problem(str(error), self._key(each), file)
+                yield self.study.problem(str(error), *self._key(each))
 
-    def _key(self, wanted: Goal) -> str:
+    def _key(self, wanted: Goal) -> tuple[str | int, ...]:
         """Where the study names a goal."""
         section = self.study.optimize
         assert section is not None
         for key, names in (("maximize", section.maximize), ("minimize", section.minimize)):
             for index, name in enumerate(names):
                 if goal(name, smallest=key == "minimize") == wanted:
-                    return f"optimize.{key}.{index}"
+                    return "optimize", key, index
         for index, condition in enumerate(section.subject_to):
             if any(judged == wanted for judged, _, _ in bounds_of(condition)):
-                return f"optimize.subject_to.{index}"
-        return "optimize"
+                return "optimize", "subject_to", index
+        return ("optimize",)
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
@@ -155,7 +156,7 @@ class Evaluator:
         except AssemblyError as error:
             # One design's workspace has no end; the others are still to be told.
             if len(rows) == 1:
-                batch.reasons[rows] = str(error)
+                batch.reasons[rows] = _plainly(error)
                 return
             for half in np.array_split(rows, 2):
                 self._workspaces(batch, half)
@@ -211,7 +212,7 @@ class Evaluator:
         except UnknownColumnError as error:
             return str(error)
         except AssemblyError as error:
-            return (_pose_reason(other, command) if command else "") or str(error)
+            return (_pose_reason(other, command) if command else "") or _plainly(error)
         except MechdesignError as error:
             return _plainly(error)
         return ""
@@ -279,13 +280,12 @@ def _quick(study: Study) -> Study:
 
 
 def _plainly(error: MechdesignError) -> str:
-    """An error without the file's name and the number at fault, so that designs with one mistake count together."""
+    """An error without its numbers and the file's name, so that designs with one mistake count together."""
+    text = str(error).splitlines()[0]
     if isinstance(error, StudyError):
         first = error.problems[0]
         text = ": ".join(part for part in (first.key, first.message) if part)
-    else:
-        text = str(error).splitlines()[0]
-    return text.partition(", not ")[0]
+    return NUMBER.sub("...", text)
 
 
 __all__ = ["Evaluated", "Evaluator", "Goal", "bounds_of", "goal"]

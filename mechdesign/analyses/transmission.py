@@ -37,8 +37,8 @@ def transmission_table(study: Study, poses: Poses, swept: str | None, whole: NDA
     values = np.moveaxis(angle.reshape(len(loops), poses.designs, line), 0, 1).reshape(-1, line)
     keep = np.repeat(whole, len(loops))
     found = np.full((2, len(values)), np.nan)
-    for row, sign in zip(found, (1, -1), strict=True):
-        row[keep] = _extremes(study, loops, poses, swept, np.flatnonzero(keep), values[keep], sign)
+    if keep.any():
+        found[:, keep] = _extremes(study, loops, poses, swept, np.flatnonzero(keep), values[keep])
     words = [np.tile(np.array(names), poses.designs) for names in (
         [loop.kind for loop in loops],
         *([loop.links[k] for loop in loops] for k in range(4)),
@@ -59,27 +59,32 @@ def _angles(loops: tuple[FourBar, ...], configuration: Configuration) -> Floats:
 
 
 def _extremes(
-    study: Study, loops: tuple[FourBar, ...], poses: Poses, swept: str | None, lanes: Indices, values: Floats, sign: int
+    study: Study, loops: tuple[FourBar, ...], poses: Poses, swept: str | None, lanes: Indices, values: Floats
 ) -> Floats:
-    """Smallest (`sign` 1) or largest (-1) value of each lane, also between poses; see `mechdesign.analyses.loops`."""
-    values = sign * values
-    best = (values <= values.min(axis=1, keepdims=True) + BEYOND).argmax(axis=1)
-    found = values[np.arange(len(values)), best]
-    last = values.shape[1] - 1
-    if swept is not None and last > 0 and len(lanes):
+    """Smallest and largest value of each lane, shape (2, lanes), also between poses; as `mechdesign.analyses.loops`."""
+    signs = np.array([1.0, -1.0])[:, None]
+    values = signs[:, :, None] * values
+    best = (values <= values.min(axis=2, keepdims=True) + BEYOND).argmax(axis=2)
+    found = np.take_along_axis(values, best[:, :, None], axis=2)[:, :, 0]
+    last = values.shape[2] - 1
+    if swept is not None and last > 0:
         # Beside the best pose, and beside the ends of the sweep, which may be the two sides of one.
-        for middle in (best, np.zeros_like(best), np.full_like(best, last)):
-            between = _golden(study, loops, poses, swept, lanes, middle, last, sign)
-            found = np.where(between < found - BEYOND, between, found)
+        middle = np.stack([best, np.zeros_like(best), np.full_like(best, last)])
+        shape = middle.shape
+        which, sign = (np.broadcast_to(x, shape).ravel() for x in (lanes, signs))
+        between = _golden(study, loops, poses, swept, which, middle.ravel(), last, sign).reshape(shape).min(axis=0)
+        found = np.where(between < found - BEYOND, between, found)
+    found = signs * found
     for corner in (0.0, np.pi / 2):
-        found = np.where(np.abs(sign * found - corner) <= SQUARE, sign * corner, found)
-    return np.asarray(sign * found)
+        found = np.where(np.abs(found - corner) <= SQUARE, corner, found)
+    return np.asarray(found)
 
 
 def _golden(
     study: Study, loops: tuple[FourBar, ...], poses: Poses, swept: str, lanes: Indices, middle: Indices, last: int,
-    sign: int,
+    sign: Floats,
 ) -> Floats:  # fmt: skip
+    """Smallest value of each lane, times its sign, beside a pose of its sweep."""
     group = poses.groups[0]
     plan = study.mechanism.plan(group.names)
     loop, row = lanes % len(loops), lanes // len(loops) * (last + 1) + middle
@@ -93,16 +98,21 @@ def _golden(
     start = None
     if plan.iterative:
         start = plan.solve(given, places, start=starts(study.mechanism, poses, row))
+    every = np.arange(len(lanes))
 
     def angle(x: Floats) -> Floats:
         held = list(given)
         held[which] = x
-        value = sign * _angles(loops, plan.solve(held, places, start=start))[loop, np.arange(len(lanes))]
+        value = sign * _angles(loops, plan.solve(held, places, start=start))[loop, every]
         return np.where(np.isnan(value), np.inf, value)
 
     a, b = at[row - (middle > 0)], at[row + (middle < last)]
+    left, right = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+    at_left, at_right = angle(left), angle(right)
     for _ in range(SECTIONS):
-        left, right = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-        lower = angle(left) < angle(right)
+        lower = at_left < at_right
         a, b = np.where(lower, a, left), np.where(lower, right, b)
+        left, right = np.where(lower, b - GOLDEN * (b - a), right), np.where(lower, left, a + GOLDEN * (b - a))
+        new = angle(np.where(lower, left, right))
+        at_left, at_right = np.where(lower, new, at_right), np.where(lower, at_left, new)
     return angle(a + (b - a) / 2)

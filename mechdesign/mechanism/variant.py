@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
@@ -12,6 +14,9 @@ from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.plan import Plan
+
+# Poses among which one is sought that can be assembled, where the drawn one cannot.
+TRIES = 512
 
 
 class Variant(Mechanism):
@@ -60,12 +65,25 @@ class Variant(Mechanism):
         before = self.original.nominal
         changed = {name: value for name, value in self.nominal.items() if value != before[name]}
         found = drawn(self.original, changed)
-        if found.valid:
-            return replace(found, places={})
-        if self.forward.iterative:
-            raise AssemblyError("the sketch cannot be assembled with these dimensions")
-        # Closed forms need no start: the original's drawing stays for what is measured from it.
-        return self.original.sketch_configuration
+        if not found.valid:
+            if self.forward.iterative:
+                raise AssemblyError("the sketch cannot be assembled with these dimensions")
+            found = self._elsewhere(changed)
+        return replace(found, places={})
+
+    def _elsewhere(self, changed: Mapping[str, float]) -> Configuration:
+        """A pose with the drives near to where they were drawn; the original's drawing where there is none."""
+        sketch, random = self.original.sketch_configuration, np.random.default_rng(0)
+        given = []
+        away = np.zeros(TRIES)
+        for coordinate in self.forward.structure.given:
+            part = random.uniform(-1, 1, TRIES)
+            away += part**2
+            given.append(sketch.value(coordinate) + part * (np.pi if coordinate.quantity == "angle" else self.size))
+        poses = self.original.forward.solve(given, changed, limits=False)
+        if not poses.valid.any():
+            return sketch
+        return poses.take(int(np.argmin(np.where(poses.valid, away, np.inf))))
 
 
 def drawn(mechanism: Mechanism, places: Mapping[str, Value]) -> Configuration:

@@ -97,6 +97,17 @@ class Study:
 
         return workspace_nodes(self)
 
+    def problem(self, message: str, *keys: str | int) -> Problem:
+        """A mistake at a path of the data, with its place in the text as long as the file is what was read."""
+        content = self.path.read_bytes() if self.path is not None and self.path.is_file() else b""
+        if hashlib.sha256(content).hexdigest() != self.text_sha256:
+            return Problem(message, ".".join(map(str, keys)), str(self.path or ""))
+        document = read(content, str(self.path))
+        overrides.apply(document, self.overrides)
+        reporter = Reporter(document)
+        reporter.report(keys, message)
+        return reporter.problems[-1]
+
     def poses(self, section: str) -> poses.Poses:
         """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
 

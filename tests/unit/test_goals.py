@@ -176,6 +176,31 @@ def test_transmission_angles_of_the_loops(changes: tuple[str, ...]) -> None:
     agree(study, names, goals if "kinematics.sweep=" in changes else goals[:1], designs)
 
 
+def test_workspaces_where_the_section_depends_on_a_variable() -> None:
+    """Asked of each design then, with the same numbers as all at once."""
+    study, other = (varied("two_rrr.yaml", ["l_min"], f"workspace.scan.about=[{x}, 0]") for x in ("0", "0*l_min"))
+    goals = [goal("GII"), goal("workspace.area"), goal("sigma_min_mean")]
+    designs = {"l_min": np.array([1.5, 2.0, 40.0])}
+    one, two = Evaluator(study, goals), Evaluator(other, goals)
+    assert one.question is not None
+    assert two.question is None
+    found, alone = one(designs), two(designs)
+    assert found.reasons == alone.reasons
+    assert found.reasons[0] == ""
+    for each in goals:
+        # Where a mechanism is solved in a batch or alone, its numbers differ by rounding.
+        assert alone.values[each] == pytest.approx(found.values[each], rel=1e-7, nan_ok=True)
+        assert np.ptp(found.values[each][:2]) > 0
+
+
+def test_stiffness_as_an_index_of_the_workspace() -> None:
+    study = varied("five_bar.yaml", ["lower_1.length"], "workspace={point: C, integrate: {tolerance: 1e-2}}")
+    wanted = goal("workspace.k_min_mean")
+    found = Evaluator(study, [wanted])({"lower_1.length": np.array([100.0, 104.0])})
+    assert found.reasons == ["", ""]
+    assert found.values[wanted][0] != found.values[wanted][1]
+
+
 def test_numbers_of_the_section_that_depend_on_a_variable() -> None:
     study = varied("gallery/function_generator.yaml", ["crank_turn"])
     designs = {"crank_turn": np.array([50.0, 60.0, 66.0])}
@@ -280,6 +305,21 @@ def test_names_that_no_result_has_are_told_before_anything_is_computed(goals: st
     asked += [judged for condition in section.subject_to for judged, _, _ in bounds_of(condition)]
     with pytest.raises(StudyError, match=message):
         Evaluator(study, asked)
+
+
+def test_a_wrong_name_is_told_with_its_place_in_the_file(tmp_path: Path) -> None:
+    section = "optimize:\n  variables: {r: {from: 1, to: 2, number: 2}}\n  maximize:\n"
+    section += "    - kinematics.P.x\n    - kinematics.W.x\n"
+    file = tmp_path / "wrong.yaml"
+    file.write_text(SLIDE + section, encoding="utf-8")
+    study = mechdesign.load(file)
+    line = SLIDE.count("\n") + 5
+    with pytest.raises(StudyError, match=rf"wrong\.yaml:{line}:7: optimize\.maximize\.1: .*no column 'W\.x'"):
+        Evaluator(study, [goal("kinematics.P.x"), goal("kinematics.W.x")])
+    # As an override gives it.
+    study = mechdesign.load(file, ["optimize.maximize=[kinematics.V.x]"])
+    with pytest.raises(StudyError, match=r"--set optimize\.maximize=.*no column 'V\.x'"):
+        Evaluator(study, [goal("kinematics.V.x")])
 
 
 def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import MechanismError, StudyError
+from mechdesign.mechanism.variant import drawn
 from mechdesign.study import Study
 from mechdesign.study.variants import variant
 
@@ -227,3 +228,15 @@ def test_a_closed_chain_of_slides_whose_angles_contradict() -> None:
     assert mechdesign.kinematics(found).main["F.y"] == pytest.approx(np.array([30, 20]) * np.tan(np.radians(30)))
     with pytest.raises(MechanismError, match="contradict"):
         variant(study_of(WEDGE), {"incline.direction": 30.0})
+
+
+def test_dimensions_with_which_the_drawn_pose_cannot_be_assembled() -> None:
+    """A long crank: the four-bar moves elsewhere, and its links are those of the variant."""
+    study = mechdesign.load(CONFIGS / "gallery" / "four_bar.yaml")
+    changed = {"crank.length": 2.0, "coupler.length": 0.4}
+    assert not drawn(study.mechanism, changed).valid
+    found = variant(study, changed)
+    tables = mechdesign.kinematics(found).tables
+    assert 0 < tables["motion"]["valid"].sum() < len(tables["motion"])
+    loop = next(tables["loops"].rows())
+    assert [loop[f"{part}_length"] for part in ("frame", "input", "coupler", "output")] == pytest.approx([4, 2, 0.4, 3])
