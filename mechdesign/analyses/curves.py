@@ -12,6 +12,9 @@ from mechdesign.analyses.panels import Panels
 from mechdesign.analyses.rays import SAME, Designs, Floats, Intervals, Ints, trace
 
 SLACK = 1e-9
+# Rays of the narrowest panel; and how far inside its ends it is traced where the ends themselves are degenerate.
+FEWEST = 25
+BESIDE = 1e-9
 # Nodes of a map along each ray, from boundary to boundary.
 GRID = 33
 # An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
@@ -50,11 +53,15 @@ def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterat
     """Patches of a single design, with about `rays` rays over all panels (both ends of each included)."""
     total = float(np.sum(panels.high - panels.low))
     for low, high in zip(panels.low, panels.high, strict=True):
-        number = max(3, round(rays * (high - low) / total) + 1)
+        number = max(FEWEST, round(rays * (high - low) / total) + 1)
         # Denser towards the ends, where cusps are thin and corners sharp.
         theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
         zero = np.zeros(number, dtype=np.intp)
         traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
+        if (traced.counts[[0, -1]] != traced.counts[number // 2]).any():
+            # At its very ends a panel meets its neighbour, or an interval vanishes.
+            theta = np.clip(theta, low + BESIDE * (high - low), high - BESIDE * (high - low))
+            traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
         ray, inner, outer, enters, leaves = _whole(traced, SAME * float(panels.reach[0]))
         counts = np.bincount(ray, minlength=number)
         usual = int(np.argmax(np.bincount(counts)))

@@ -35,6 +35,8 @@ LOCI: Mapping[str, tuple[str, str]] = {
     "forward": (style.VERMILION, "parallel singularity"),
     "inverse": (style.GREEN, "leg in line (serial singularity)"),
 }
+# Of the region itself; opaque, so that patches leave no seams.
+PALE = "#D5EBF8"
 _LEFT, _RIGHT, _TOP, _BELOW, _BAR, _LEGEND = 0.72, 0.12, 0.34, 0.52, 0.95, 0.24
 _TALLEST = 6.5
 _PAD = 0.03
@@ -164,7 +166,7 @@ def fill(axes: Axes, region: Region) -> None:
     """Fill the region in a pale colour."""
     for x, y, _ in region.grids("det_J"):
         edge = [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
-        axes.fill(*edge, color=style.SKY, alpha=0.25, linewidth=0)
+        axes.fill(*edge, color=PALE, linewidth=0, antialiased=False)
 
 
 def keys(fates: set[str], kinds: set[str]) -> list[Line2D]:

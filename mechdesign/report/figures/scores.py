@@ -5,61 +5,72 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.tri import Triangulation
+from numpy.typing import NDArray
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.designs import Designs
+from mechdesign.report.figures.designs import Designs, Floats
 
 LEVELS = 14
 MARKERS = "osD^vP*X<>"
 
 
 def score_curves(designs: Designs) -> Figure:
-    """The best score for each value of each variable, with the goals of that design [S1, Fig. 3(a)]."""
+    """The best score for each value of each variable, with the goals of that design [S1, Fig. 3(a)].
+
+    Of scattered designs each is a dot.
+    """
     names, many = designs.names, len(designs.goals) > 1
-    figure = style.new_figure(style.WIDTH, 0.4 + 2.9 * len(names))
-    total, winner = designs.total(), designs.chosen()
-    for row, name in enumerate(names):
-        axes = figure.add_subplot(len(names), 1, row + 1)
-        values, best = _best_each(designs, name)
+    across = min(len(names), 3) if len(names) > 2 else 1
+    down = -(-len(names) // across)
+    figure = style.new_figure(style.WIDTH, 0.9 + (2.9 if across == 1 else 2.5) * down)
+    winner = designs.chosen()
+    score = designs.total() if many else designs[next(iter(designs.goals))]
+    column = "CPI" if many else next(iter(designs.goals))
+    for number, name in enumerate(names):
+        axes = figure.add_subplot(down, across, number + 1)
         where = float(designs.optimum[name][winner])
-        if many:
-            axes.plot(values, total[best], color=style.INK, linewidth=2.2, label="CPI")
-            for goal, color in zip(designs.goals, style.PALETTE, strict=False):
-                axes.plot(values, designs.share(goal)[best], color=color, label=f"{goal}, normalised")
-            height = float(designs.optimum["CPI"][winner])
-            axes.set_ylabel("index")
+        values = np.unique(designs[name][designs.feasible])
+        if len(names) > 1 and 2 * len(values) > designs.feasible.sum():
+            axes.plot(designs[name][designs.feasible], score[designs.feasible], ".", color=style.FAINT, markersize=4,
+                      markeredgewidth=0, label="designs")  # fmt: skip
         else:
-            (goal,) = designs.goals
-            axes.plot(values, designs[goal][best], color=style.INK, linewidth=2.0, label=goal)
-            height = float(designs.optimum[goal][winner])
-            axes.set_ylabel(designs.label(goal))
-        axes.plot(
-            where, height, "o", color=style.VERMILION, markersize=7, label=f"best: {name} = {where:.4g}", zorder=4
-        )
+            best = _best_each(designs, name, values)
+            axes.plot(values, score[best], color=style.INK, linewidth=2.0, label=column)
+            for goal, color in zip(designs.goals if many else (), style.PALETTE, strict=False):
+                axes.plot(values, designs.share(goal)[best], color=color, label=f"{goal}, normalised")
+        height = float(designs.optimum[column][winner])
+        axes.plot(where, height, "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
+        axes.set_title(f"best: {name} = {where:.4g}", loc="right", fontsize=9, color=style.VERMILION)
         axes.set_xlabel(designs.label(name))
-        axes.margins(x=0.01)
-        if row == 0:
-            what = "Composite performance index" if many else next(iter(designs.goals))
-            among = "" if len(names) == 1 else ": the best design for each value of a variable"
-            axes.set_title(what + among, loc="left")
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+        axes.set_ylabel("" if number % across else "index" if many else designs.label(column))
+        axes.margins(x=0.02)
+        if not many and _steep(score[designs.feasible]):
+            axes.set_yscale("log")
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes.yaxis.set_minor_formatter(NullFormatter())
+    what = "Composite performance index" if many else column
+    among = "" if len(names) == 1 else ": the best design for each value of a variable"
+    figure.suptitle(what + among, x=0.01, ha="left", fontsize=11)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
     return figure
 
 
-def _best_each(designs: Designs, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Values of a variable, and the best design of each; of scattered values, those of about sixty classes."""
-    column, total = designs[name], np.where(designs.feasible, designs.total(), -np.inf)
-    values = np.unique(column[designs.feasible])
-    if len(values) > 400:
-        edges = np.linspace(values[0], values[-1], 61)
-        kind = np.clip(np.searchsorted(edges, column, side="right") - 1, 0, 59)
-    else:
-        kind = np.searchsorted(values, column)
-    groups = [np.flatnonzero(designs.feasible & (kind == k)) for k in np.unique(kind[designs.feasible])]
-    best = np.array([rows[np.argmax(total[rows])] for rows in groups])
-    return column[best], best
+def _best_each(designs: Designs, name: str, values: Floats) -> NDArray[np.intp]:
+    """The best design for each value of a variable."""
+    total = np.where(designs.feasible, designs.total(), -np.inf)
+    rows = [np.flatnonzero(designs.feasible & (designs[name] == value)) for value in values]
+    return np.array([found[np.argmax(total[found])] for found in rows], dtype=np.intp)
+
+
+def _steep(values: Floats) -> bool:
+    """Whether values are told apart on a logarithmic scale only."""
+    finite = values[np.isfinite(values)]
+    return bool((finite > 0).all() and finite.max() > 30 * finite.min())
 
 
 def score_surface(designs: Designs) -> Figure:
@@ -69,7 +80,8 @@ def score_surface(designs: Designs) -> Figure:
     figure = style.new_figure(style.WIDTH, 5.2)
     axes = figure.add_subplot()
     filled = _fill(axes, designs, designs.total() if many else designs[next(iter(designs.goals))])
-    bar = figure.colorbar(filled, ax=axes, pad=0.02)
+    bar = figure.colorbar(filled, ax=axes, pad=0.02, format=FuncFormatter(lambda value, _: f"{value:.3g}"))
+    bar.minorticks_off()
     bar.set_label("composite performance index CPI" if many else designs.label(next(iter(designs.goals))))
     bar.outline.set_visible(False)
     shown: dict[tuple[float, float], list[str]] = {}
@@ -110,7 +122,7 @@ def goal_maps(designs: Designs) -> Figure:
     return figure
 
 
-def _fill(axes: Axes, designs: Designs, values: np.ndarray) -> ScalarMappable:
+def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
     """Filled contours over two variables whose bounds may depend on each other; dots where designs are scattered."""
     inside = designs.feasible & np.isfinite(values)
     x, y, z = (column[inside] for column in (*(designs[name] for name in designs.names), values))
@@ -125,8 +137,13 @@ def _fill(axes: Axes, designs: Designs, values: np.ndarray) -> ScalarMappable:
     mesh = Triangulation(*scaled)
     corners = np.stack([mesh.x[mesh.triangles], mesh.y[mesh.triangles]])
     mesh = Triangulation(x, y, mesh.triangles, mask=(np.ptp(corners, axis=2) > 2.01).any(axis=0))
-    levels = np.linspace(z.min(), z.max(), LEVELS + 1) if np.ptp(z) > 0 else np.array([z[0] - 0.5, z[0] + 0.5])
-    filled = axes.tricontourf(mesh, z, levels=levels, cmap=style.COLORMAP)
+    if np.ptp(z) == 0:
+        levels, norm = np.array([z[0] - 0.5, z[0] + 0.5]), None
+    elif _steep(z) and len(designs.goals) == 1:
+        levels, norm = np.geomspace(z.min(), z.max(), LEVELS + 1), LogNorm(z.min(), z.max())
+    else:
+        levels, norm = MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(z.min(), z.max()), None
+    filled = axes.tricontourf(mesh, z, levels=levels, cmap=style.COLORMAP, norm=norm)
     axes.tricontour(mesh, z, levels=levels, colors="white", linewidths=0.4, alpha=0.6)
     axes.margins(0.02)
     return filled
