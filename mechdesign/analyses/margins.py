@@ -123,7 +123,7 @@ class Margins:
                 found.append(np.where(good, 1.0, np.where(open_, np.nan, -1.0)))
                 lost, open_ = ~good, open_ | ~good
         found += self._lengths(configuration, place)
-        found += [np.where(np.isinf(m), 1.0, m) for _, m in self.mechanism.margins(configuration)]
+        found += [m for _, m in self.mechanism.margins(configuration)]
         return np.stack([np.broadcast_to(np.asarray(m, dtype=float), place.shape) for m in found])
 
     def _lengths(self, configuration: Configuration, place: Floats) -> list[Value]:

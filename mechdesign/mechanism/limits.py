@@ -51,7 +51,8 @@ class Bound:
             if self.coordinate.quantity == "angle" and low is not None and high is not None:
                 half = (high - low) / 2
                 margin = half - np.abs(wrap(value - (low + half)))
-                return [(self.label, np.where(half >= np.pi, np.inf, margin))]
+                # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
+                return [(self.label, np.where(half >= np.pi, np.pi, margin))]
         found = []
         if low is not None:
             found.append((f"{self.label} min", value - low))
