@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Expression, ExpressionError, Number
+from mechdesign.mechanism.model import Fixed
 from mechdesign.mechanism.variant import Variant
 from mechdesign.study.document import Document, Mark, plain
 from mechdesign.study.loading import Study, load_document
 from mechdesign.study.models import LINK_KEYS
+from mechdesign.study.names import GROUND
 from mechdesign.study.parameters import Parameters
 
 Floats = NDArray[np.float64]
@@ -143,17 +145,22 @@ def follows(study: Study, names: Collection[str], sections: Collection[str] = SE
         return True
     if not study.parameters.measured:
         return False
-    drawn = any(_drawn(study, place) for place in places_of(study, names))
-    return drawn or _mentions(mechanism.get("sketch"), parameters)
+    return _mentions(mechanism.get("sketch"), parameters) or not _drawing(study).isdisjoint(places_of(study, names))
 
 
-def _drawn(study: Study, place: str) -> bool:
-    """Whether a place has a part in how links lie on the sketch."""
-    owner, _, last = place.rpartition(".")
-    link = study.mechanism.description.links.get(owner)
-    if link is not None:
-        return last == "length" and len(link.points) > 2
-    return last in ("x", "y")
+def _drawing(study: Study) -> set[str]:
+    """Places that have a part in how links lie on the sketch, of links of which something is measured there."""
+    links, joints = study.mechanism.description.links, study.mechanism.description.joints
+    owners: set[str] = set()
+    for place in study.parameters.measured:
+        joint = joints.get(place.rpartition(".")[0])
+        owners.update(joint.links if isinstance(joint, Fixed) else (place.partition(".")[0],))
+    points = {point for name in owners for point in (*links[name].points, *(links[name].ends or ()))}
+    found = {f"{name}.length" for name in owners if len(links[name].points) > 2}
+    # The ground's points lie on the sketch where its numbers say.
+    placed = [(name, point) for name in owners for point in links[name].points]
+    placed += [(GROUND, point) for point in links[GROUND].points if point in points]
+    return found | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
 
 
 def _mentions(data: Any, names: Collection[str]) -> bool:
