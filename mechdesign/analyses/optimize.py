@@ -25,7 +25,7 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
-CHUNK, SMALL_CHUNK = 384, 8
+CHUNK, SMALL_CHUNK = 384, 16
 MOST_REASONS = 10
 # The command line tells how to go on.
 Compute = Callable[[Iterable[Batch]], Iterator[Evaluated]]

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from mechdesign.analyses.designs import in_words
 from mechdesign.analyses.optimum_tables import Comparison
@@ -11,6 +14,7 @@ from mechdesign.errors import MechdesignError
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
 from mechdesign.study.rewriting import rewritten
+from mechdesign.study.variants import changed_data, variant
 
 
 def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
@@ -34,14 +38,32 @@ def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int])
     doubts = []
     for name, (k, heading) in wanted.items():
         numbers = {variable: float(column[k]) for variable, column in compared.designs.variables.items()}
-        found = rewritten(study, numbers, f"{heading}: {in_words(numbers)}")
-        if found is None:
-            doubts.append(f"no {name}.yaml: a variable has no number of its own in the study; give it one there")
-            continue
-        text, beside = found
-        files |= {f"{name}.yaml": text, **beside}
+        heading = f"{heading}: {in_words(numbers)}"
+        text, beside = rewritten(study, changed_data(study, numbers), heading)
         try:
-            load_bytes(text.encode(), (study.path or Path()).parent / f"{name}.yaml")
+            if not _assembles_alike(study, numbers, text):
+                text, beside = rewritten(study, _drawn_anew(study, numbers), heading)
+                if not _assembles_alike(study, numbers, text):
+                    doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
         except MechdesignError as error:
-            doubts.append(f"{name}.yaml needs a hand: {str(error).splitlines()[0]}")
+            doubts.append(f"{name}.yaml: {str(error).splitlines()[0]}")
+        files |= {f"{name}.yaml": text, **beside}
     return files, doubts
+
+
+def _assembles_alike(study: Study, numbers: Mapping[str, float], text: str) -> bool:
+    """Whether the study of this text has the assembly in which the design was evaluated."""
+    try:
+        alone = load_bytes(text.encode(), study.path or Path("study.yaml"))
+    except MechdesignError:
+        return False
+    return alone.mechanism.forward.modes == variant(study, numbers).mechanism.forward.modes
+
+
+def _drawn_anew(study: Study, numbers: Mapping[str, float]) -> dict[str, Any]:
+    """The data of a design with the sketch as it assembles."""
+    data = changed_data(study, numbers)
+    assembled = variant(study, numbers).mechanism.sketch_configuration
+    points = {name: np.asarray(assembled.point(name)).item() for name in data["mechanism"]["sketch"]}
+    data["mechanism"]["sketch"] = {name: [point.real, point.imag] for name, point in points.items()}
+    return data

@@ -7,6 +7,7 @@ Derivative-Free Optimization, 2009, ch. 10.]
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from mechdesign.analyses.rays import Floats
 
 WIDTH, NARROWEST, SHRINK = 0.1, 5e-4, 4.0
 MOST_ROUNDS = 60
+ROUNDING = 1e-9
 # A step shorter than this fraction of the box narrows it, one longer than this widens it again.
 SHORT, LONG = 0.3, 0.9
 # With more variables the mixed terms of the model come from what lies near by chance.
@@ -38,13 +40,13 @@ class Quadratic:
         return np.asarray(self.slope + self.curvature @ z)
 
 
-def polish(explorer: Explorer, objective: Objective, start: int, *, width: float = WIDTH) -> int:
-    """Descend from a known point; returns the row of the point reached.
+def polish(explorer: Explorer, descents: Sequence[tuple[Objective, int]], width: float = WIDTH) -> None:
+    """Descend from known points, all at once: a batch of designs costs little more than one.
 
     Parameters
     ----------
-    start : int
-        Row of `explorer.known`.
+    descents : sequence of (Objective, int)
+        What is made small, and the row of `explorer.known` from which.
     width : float
         Half the first box's width, in the unit cube.
 
@@ -53,20 +55,29 @@ def polish(explorer: Explorer, objective: Objective, start: int, *, width: float
     Spent
         If the evaluations are used up.
     """
+    under_way = [_descent(explorer, objective, start, width) for objective, start in descents]
+    while under_way:
+        asked = [(each, next(each, None)) for each in under_way]
+        under_way = [each for each, points in asked if points is not None]
+        if under_way:
+            explorer(np.concatenate([points for _, points in asked if points is not None]))
+
+
+def _descent(explorer: Explorer, objective: Objective, start: int, width: float) -> Iterator[Floats]:
+    """Points to be evaluated before the next ones are asked for."""
     centre = start
     for _ in range(MOST_ROUNDS):
         if width < NARROWEST:
             break
         at = explorer.known.u[centre]
-        explorer(_stencil(at, width))
+        yield _stencil(at, width)
         steps = _steps(explorer, objective, centre, width)
         if steps:
-            explorer(at + width * np.array(steps))
+            yield at + width * np.array(steps)
         reached = _best_near(explorer, objective, centre, 2 * width)
         moved = np.abs(explorer.known.u[reached] - at).max()
         centre = reached
         width = width / SHRINK if moved < SHORT * width else min(2 * width, WIDTH) if moved > LONG * width else width
-    return centre
 
 
 def _stencil(at: Floats, width: float) -> Floats:
@@ -111,27 +122,35 @@ def _steps(explorer: Explorer, objective: Objective, centre: int, width: float) 
     target = _fit(z, objective(known.values[near]))
     conditions = [_fit(z, column) for column in known.margins[near].T]
     low, high = np.maximum(-at / width, -1.0), np.minimum((1 - at) / width, 1.0)
-    limits = [{"type": "ineq", "fun": each.value, "jac": each.gradient} for each in conditions]
     found: list[Floats] = []
-    for begin in (np.zeros(n), np.clip(-target.slope, low, high)):
-        answer = minimize(
-            target.value, begin, jac=target.gradient, method="SLSQP", bounds=list(zip(low, high, strict=True)),
-            constraints=limits, options={"maxiter": 60},
-        )  # fmt: skip
-        step = np.clip(answer.x, low, high)
-        if np.isfinite(step).all() and not any(np.abs(step - other).max() < 1e-3 for other in (np.zeros(n), *found)):
-            found.append(step)
+    # What a quadratic leaves out of a curved condition is of this order: another point keeps clear of it by as much.
+    for slack in (ROUNDING, width**2) if conditions else (0.0,):
+        limits = [{"type": "ineq", "fun": _shifted(each, slack), "jac": each.gradient} for each in conditions]
+        for begin in (np.zeros(n), np.clip(-target.slope, low, high)):
+            answer = minimize(
+                target.value, begin, jac=target.gradient, method="SLSQP", bounds=list(zip(low, high, strict=True)),
+                constraints=limits, options={"maxiter": 60, "ftol": 1e-12},
+            )  # fmt: skip
+            step = np.clip(answer.x, low, high)
+            if np.isfinite(step).all() and all(np.abs(step - other).max() > 1e-3 for other in (np.zeros(n), *found)):
+                found.append(step)
     return found
 
 
+def _shifted(condition: Quadratic, slack: float) -> Callable[[Floats], float]:
+    return lambda z: condition.value(z) - slack
+
+
 def _fit(z: Floats, values: Floats) -> Quadratic:
-    """The quadratic nearest to values at points (of least coefficients, where they leave a choice)."""
+    """The quadratic nearest to values at points, up to a factor (of least coefficients, where they leave a choice)."""
     n = z.shape[1]
     first, second = np.tril_indices(n)
     mixed = z[:, first] * z[:, second] * np.where(first == second, 0.5, 1.0)
     columns = np.column_stack([np.ones(len(z)), z, mixed])
     weight = 1 / (1 + (z**2).sum(axis=1))
     found = np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=None)[0]
+    # Brought to order one, for whoever minimises it to a tolerance.
+    found /= max(float(np.abs(found[1:]).max()), np.finfo(float).tiny)
     curvature = np.zeros((n, n))
     curvature[first, second] = curvature[second, first] = found[n + 1 :]
     return Quadratic(float(found[0]), found[1 : n + 1], curvature)

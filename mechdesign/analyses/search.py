@@ -12,18 +12,20 @@ from typing import Any
 import numpy as np
 
 from mechdesign.analyses.explorer import Explorer, Known, Objective, Spent
-from mechdesign.analyses.polish import polish
+from mechdesign.analyses.polish import WIDTH, polish
 from mechdesign.analyses.rays import Floats
 
 # Points of the first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
 SAMPLE = 16
 MOST_VERTICES = 4
 POPULATION, SMALLEST_POPULATION = 5, 12
-GENERATIONS, PATIENCE = 40, 4
+GENERATIONS, PATIENCE = 40, 3
 # An improvement below this fraction of the objective's range is left to the last stage.
 ENOUGH = 1e-3
 # How far apart the starts of two descents are, and how much worse than the best a start may be, of the range.
 APART, PROMISING = 0.2, 0.1
+# Half the width of the first box of descents that repeat others.
+NEAR = 2e-3
 
 
 def allowance(dimensions: int, objectives: int) -> int:
@@ -49,14 +51,17 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
     rng = np.random.default_rng(seed)
     try:
         explorer(sample(explorer.dimensions, rng, SAMPLE * (explorer.dimensions + 1), explorer.left // 2))
+        ends = [_single(goal, sign) for goal in range(len(smallest)) for sign in (1.0, -1.0)]
         for goal, down in enumerate(smallest):
-            minimise(explorer, _single(goal, 1.0 if down else -1.0), rng)
-            descend(explorer, _single(goal, -1.0 if down else 1.0), starts=2)
-        for row in rows:
-            if np.count_nonzero(row) > 1 and explorer.known.feasible.any():
-                minimise(explorer, _weighted(explorer.known, smallest, row), rng)
-                # Normalised by what has been found meanwhile.
-                descend(explorer, _weighted(explorer.known, smallest, row), width=0.02)
+            evolve(explorer, ends[2 * goal + (not down)], rng)
+        descend(explorer, ends, starts=2)
+        several = [row for row in rows if np.count_nonzero(row) > 1]
+        if several and explorer.known.feasible.any():
+            for row in several:
+                evolve(explorer, _weighted(explorer.known, smallest, row), rng)
+            # Normalised by what has been found meanwhile, and once more where the descents have found more.
+            for width in (WIDTH, NEAR):
+                descend(explorer, [_weighted(explorer.known, smallest, row) for row in several], width=width)
     except Spent:
         return
 
@@ -94,25 +99,25 @@ def minimise(explorer: Explorer, objective: Objective, rng: np.random.Generator)
         If the evaluations are used up.
     """
     evolve(explorer, objective, rng)
-    return descend(explorer, objective)
-
-
-def descend(explorer: Explorer, objective: Objective, *, starts: int = 1, width: float = 0.1) -> int:
-    """Polish the best known points that lie apart; returns the row of the best of all."""
-    merit = explorer.known.merit(objective)
-    finite = merit[np.isfinite(merit)]
-    if not finite.size:
-        return 0
-    enough = merit.min() + PROMISING * np.ptp(finite)
-    begun: list[int] = []
-    for row in np.argsort(merit, kind="stable"):
-        if len(begun) == starts or merit[row] > enough:
-            break
-        u = explorer.known.u[row]
-        if all(np.abs(u - explorer.known.u[other]).max() > APART for other in begun):
-            begun.append(int(row))
-            polish(explorer, objective, int(row), width=width)
+    descend(explorer, [objective])
     return int(np.argmin(explorer.known.merit(objective)))
+
+
+def descend(explorer: Explorer, objectives: Sequence[Objective], *, starts: int = 1, width: float = WIDTH) -> None:
+    """Polish each objective's best known points that lie apart."""
+    descents: list[tuple[Objective, int]] = []
+    for objective in objectives:
+        merit = explorer.known.merit(objective)
+        finite = merit[np.isfinite(merit)]
+        enough = finite.min() + PROMISING * np.ptp(finite) if finite.size else -np.inf
+        begun: list[int] = []
+        for row in np.argsort(merit, kind="stable").tolist():
+            if len(begun) == starts or not merit[row] <= enough:
+                break
+            if all(np.abs(explorer.known.u[row] - explorer.known.u[other]).max() > APART for other in begun):
+                begun.append(row)
+        descents += [(objective, row) for row in begun]
+    polish(explorer, descents, width)
 
 
 def evolve(explorer: Explorer, objective: Objective, rng: np.random.Generator) -> None:

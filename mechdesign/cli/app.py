@@ -85,8 +85,28 @@ def kinematics(
         raise typer.Exit(ask(study, "kinematics", options))
 
 
+@app.command("optimize", short_help=COMMANDS["optimize"][0], help=" ".join(COMMANDS["optimize"]))
+def optimize(
+    study: given.StudyArgument = None,
+    out: given.Out = None,
+    overrides: given.Overrides = None,
+    seed: given.Seed = None,
+    jobs: given.Jobs = None,
+    json: given.Json = False,
+    quiet: given.Quiet = False,
+    no_plots: given.NoPlots = False,
+    resume: given.ResumeDesigns = False,
+) -> None:
+    """The question of the best dimensions, which may take long and be gone on with."""
+    with guard():
+        from mechdesign.cli.execution import ask
+
+        options = Options(out, tuple(overrides or ()), seed, jobs, json, quiet, not no_plots, resume=resume)
+        raise typer.Exit(ask(study, "optimize", options))
+
+
 for _name, _words in COMMANDS.items():
-    if _name != "kinematics":
+    if _name not in ("kinematics", "optimize"):
         _add_question(_name, *_words)
 
 

@@ -6,12 +6,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mechdesign.cli import terminal
 from mechdesign.cli.options import Options
 
 if TYPE_CHECKING:
+    from mechdesign.journal import Journal
+    from mechdesign.report.manifest import Asked
     from mechdesign.report.requirements import Verdict
     from mechdesign.results import Result
     from mechdesign.study import Study
@@ -108,24 +110,33 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         Whatever the analysis, the requirements or the files run into.
     """
     import mechdesign
-    from mechdesign.errors import StudyError
-    from mechdesign.report import manifest, requirements, writer
+    from mechdesign.errors import Interrupted
+    from mechdesign.report import manifest, writer
 
     begun = time.perf_counter()
     writer.check_writable(directory)
-    more = {"all_modes": True} if options.all_modes else {}
-    with terminal.Bar(quiet=options.quiet) as bar:
-        result: Result = getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar, **more)
+    more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
+    journal = _journal(study, directory, options) if command == "optimize" else None
+    if journal is not None:
+        more["journal"] = journal
     asked = manifest.Asked(options.plots, options.animate and command == "kinematics", options.all_modes)
     try:
-        verdicts = requirements.judge(
-            result, study.requirements, file=str(study.path or ""), freedom=study.mechanism.mobility
-        )
-    except StudyError:
-        # A misspelt requirement should not cost the computation.
-        writer.write(directory, study, result, (), asked)
+        with terminal.Bar(quiet=options.quiet) as bar:
+            result: Result = getattr(mechdesign, command)(
+                study, seed=options.seed, jobs=options.jobs, progress=bar, **more
+            )
+    except Interrupted as interrupt:
+        writer.write(directory, study, interrupt.result, (), asked)
+        terminal.say(f"{study_label(study)}: {command}: {interrupt}")
         raise
-    files = writer.write(directory, study, result, verdicts, asked)
+    try:
+        verdicts, files = _judged_and_written(directory, study, result, asked)
+    except KeyboardInterrupt:
+        if journal is not None:
+            journal.save()
+        raise
+    if journal is not None:
+        journal.discard()
     warnings = list(result.warnings)
     if asked.animate and writer.ANIMATION not in files:
         warnings.append("no animation: it needs a sweep of one coordinate or a path")
@@ -142,6 +153,36 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         seconds=time.perf_counter() - begun,
         result=result,
     )
+
+
+def _judged_and_written(
+    directory: Path, study: Study, result: Result, asked: Asked
+) -> tuple[Sequence[Verdict], Sequence[str]]:
+    """Judge a result by the study's requirements and write it; the verdicts and the names of the files."""
+    from mechdesign.errors import StudyError
+    from mechdesign.report import requirements, writer
+
+    try:
+        verdicts = requirements.judge(
+            result, study.requirements, file=str(study.path or ""), freedom=study.mechanism.mobility
+        )
+    except StudyError:
+        # A misspelt requirement should not cost the computation.
+        writer.write(directory, study, result, (), asked)
+        raise
+    return verdicts, writer.write(directory, study, result, verdicts, asked)
+
+
+def _journal(study: Study, directory: Path, options: Options) -> Journal:
+    """Where finished designs are kept, with those of an earlier run if this one is to go on from there."""
+    from mechdesign.journal import NAME, Journal
+    from mechdesign.report import manifest
+
+    journal = Journal(directory / NAME, manifest.computed_from(study, "optimize"), resume=options.resume)
+    if options.resume and not journal.usable:
+        there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
+        terminal.say(f"{study_label(study)}: optimize: {there}; begins anew", quiet=options.quiet)
+    return journal
 
 
 def tell(given: Answer, options: Options) -> None:

@@ -95,7 +95,15 @@ Junit = Annotated[
 ]
 FailFast = Annotated[bool, typer.Option("--fail-fast", help="Stop at the first question that fails.")]
 Resume = Annotated[
-    bool, typer.Option("--resume", help="Skip questions whose results are there, whole, from the same study and seed.")
+    bool,
+    typer.Option(
+        "--resume",
+        help="Skip questions whose results are there, whole, from the same study and seed; go on with unfinished ones.",
+    ),
+]
+
+ResumeDesigns = Annotated[
+    bool, typer.Option("--resume", help="Go on with what an interrupted run of the same study and seed had finished.")
 ]
 
 

@@ -31,6 +31,15 @@ class Asked:
     all_modes: bool = False
 
 
+def computed_from(study: Study, command: str) -> dict[str, Any]:
+    """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
+    from mechdesign.study.rewriting import inputs
+
+    files = {file.name: hashlib.sha256(text.encode()).hexdigest() for _, file, text in inputs(study)}
+    found = origin(study, command, Asked())
+    return {key: value for key, value in found.items() if key not in asdict(Asked())} | {"inputs": files}
+
+
 def origin(study: Study, command: str, asked: Asked) -> dict[str, Any]:
     """Everything that decides the bytes of the results: versions, study, overrides, seed, what was asked."""
     return {

@@ -12,7 +12,6 @@ import yaml
 
 from mechdesign.errors import StudyError
 from mechdesign.study import document
-from mechdesign.study.document import plain
 
 if TYPE_CHECKING:
     from mechdesign.study.loading import Study
@@ -23,36 +22,28 @@ _MOST_BYTES = 1_000_000
 _INPUT = "input_"
 
 
-def rewritten(study: Study, numbers: Mapping[str, float], heading: str) -> tuple[str, dict[str, str]] | None:
-    """The study's text with other numbers for parameters and dimensions, and the files it needs beside it.
+def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, dict[str, str]]:
+    """A study's text where it says other values, and the files it needs beside it, by their names.
 
     Overrides are part of the new text, as is the seed. Comments are kept where no more than single values change.
 
     Parameters
     ----------
-    numbers : mapping of str to float
-        By the names of parameters and places, in the study's units.
+    data : dict
+        The study as plain data, `Study.resolved` with other values; its names of files are brought up to date.
     heading : str
         What the first line says, as a comment.
-
-    Returns
-    -------
-    (str, dict of str to str) or None
-        None where the study has no place of its own for a number, as for a point that is measured from the sketch.
     """
-    data = plain(study.resolved)
-    try:
-        for name, value in numbers.items():
-            _set(data, _keys(study, data, name), float(value))
-    except (KeyError, IndexError, TypeError, ValueError):
-        return None
     files: dict[str, str] = {}
     for keys, file, content in inputs(study):
         beside = _INPUT + file.name
         while files.get(beside, content) != content:
             beside = "_" + beside
         files[beside] = content
-        _set(data, keys, beside)
+        holder: Any = data
+        for key in keys[:-1]:
+            holder = holder[key]
+        holder[keys[-1]] = beside
     text = _edited(study, data)
     if text is None:
         text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
@@ -80,38 +71,6 @@ def _leaves(data: Any, keys: Keys) -> Iterator[tuple[Keys, Any]]:
             yield from _leaves(value, (*keys, index))
     else:
         yield keys, data
-
-
-def _set(data: Any, keys: Keys, value: Any) -> None:
-    last: Any = keys[-1]
-    for key in keys[:-1]:
-        data = data[key]
-    if isinstance(data, list) and last == len(data):
-        data.append(value)
-    elif isinstance(data, list | dict):
-        data[last] = value
-    else:
-        raise TypeError(keys)
-
-
-def _keys(study: Study, data: Any, name: str) -> Keys:
-    """Where the number of a parameter or a place stands, or would stand."""
-    if name in study.parameters.nominal:
-        return ("mechanism", "parameters", name)
-    owner, _, rest = name.partition(".")
-    section = data["mechanism"]
-    if owner == "limits":
-        index, _, key = rest.partition(".")
-        return ("mechanism", "limits", int(index), key)
-    if owner in section.get("joints", {}):
-        return ("mechanism", "joints", owner, rest)
-    link: Keys = ("mechanism", "links", owner)
-    given = section["links"][owner]
-    if rest == "length":
-        return (*link, 2) if isinstance(given, list) else (*link, "length")
-    point, _, axis = rest.rpartition(".")
-    holder: Keys = (*link, "points") if "points" in given and point not in given else link
-    return (*holder, point, "xy".index(axis))
 
 
 def _edited(study: Study, data: Mapping[str, Any]) -> str | None:

@@ -1,0 +1,121 @@
+"""Pareto fronts: known fronts of functions and of an arm, the knee, crowding, repeatability."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.analyses.explorer import Explorer
+from mechdesign.analyses.pareto import crowding, evolve, front, knee
+from mechdesign.analyses.search import sample
+
+# x = r1 cos 30 + r2 cos 60 is small and y = r1 sin 30 + r2 sin 60 large: first r2 grows, then r1.
+ARM = """\
+mechanism:
+  parameters: {r1: 5, r2: 5}
+  links: {ground: {O: [0, 0]}, upper: [O, E, r1], fore: [E, P, r2]}
+  drives: {theta1: {angle: upper}, theta2: {angle: fore}}
+  sketch: {E: [4, 3], P: [6, 8]}
+kinematics: {poses: [{theta1: 30, theta2: 60}], outputs: [P]}
+optimize:
+  method: pareto
+  evaluations: 2000
+  variables: {r1: {from: 1, to: 11}, r2: {from: 1, to: 11}}
+  maximize: kinematics.P.y
+  minimize: kinematics.P.x
+"""
+
+
+def zdt1(u):
+    """The front is f2 = 1 - sqrt(f1) [Zitzler, Deb & Thiele, 2000]."""
+    g = 1 + 9 * u[:, 1:].mean(axis=1)
+    return np.column_stack([u[:, 0], g * (1 - np.sqrt(u[:, 0] / g))])
+
+
+def spread(function, margins=lambda u: np.empty((len(u), 0)), seed=0):
+    explorer = Explorer(lambda u: (function(u), margins(u)), 3, 3000)
+    evolve(explorer, np.ones(2), sample(3, np.random.default_rng(seed), 100, 100), seed)
+    return explorer.known
+
+
+def test_front_of_zdt1():
+    known = spread(zdt1)
+    assert len(known.u) <= 3000
+    values = known.values[front(known.values)]
+    assert values[:, 1] == pytest.approx(1 - np.sqrt(values[:, 0]), abs=0.02)
+    assert np.ptp(values[:, 0]) > 0.98
+    assert np.diff(np.sort(values[:, 0])).max() < 0.05
+    # Where the front is parallel to the line between its ends.
+    assert values[knee(values)] == pytest.approx([0.25, 0.5], abs=0.03)
+
+
+def test_a_condition_cuts_the_front():
+    known = spread(zdt1, lambda u: (u[:, 0] - 0.3)[:, None])
+    values = known.values[known.feasible]
+    values = values[front(values)]
+    assert values[:, 0].min() == pytest.approx(0.3, abs=0.01)
+    # A design that is on the front for being nearest to the condition alone may be far from it in the other goal.
+    inside = values[values[:, 0] > 0.31]
+    assert inside[:, 1] == pytest.approx(1 - np.sqrt(inside[:, 0]), abs=0.02)
+
+
+def test_points_without_a_value_do_not_reach_the_front():
+    known = spread(lambda u: np.where(u[:, [0]] < 0.2, np.nan, zdt1(u)))
+    values = known.values[known.feasible]
+    assert np.isfinite(values).all()
+    assert values[front(values)][:, 0].min() == pytest.approx(0.2, abs=0.02)
+
+
+def test_front_against_the_definition():
+    values = np.random.default_rng(3).integers(0, 12, (300, 3)).astype(float)
+    found = set(front(values).tolist())
+    seen = set()
+    for k, row in enumerate(values):
+        beaten = ((values <= row).all(axis=1) & (values < row).any(axis=1)).any()
+        first = tuple(row) not in seen
+        seen.add(tuple(row))
+        assert (k in found) == (first and not beaten)
+
+
+def test_knee_is_farthest_from_the_plane_through_the_extremes():
+    bent = np.array([[0.0, 10.0], [1.0, 2.0], [5.0, 1.5], [10.0, 0.0]])
+    assert knee(bent) == 1
+    # Scales of the goals do not matter.
+    assert knee(bent * [1e6, 1e-3]) == 1
+    ball = np.array([[0, 1, 1], [1, 0, 1], [1, 1, 0], [0.2, 0.3, 0.2], [0.9, 0.5, 0.5]])
+    assert knee(ball) == 3
+
+
+def test_crowding_is_the_gap_between_neighbours():
+    values = np.array([[0.0, 1.0], [0.25, 0.5], [0.5, 0.25], [1.0, 0.0]])
+    assert crowding(values) == pytest.approx([np.inf, 0.5 + 0.75, 0.75 + 0.5, np.inf])
+
+
+def test_front_of_an_arm_and_its_knee():
+    result = mechdesign.optimize(study_of(ARM))
+    table = result.main
+    assert table.name == "pareto"
+    r1, r2 = table["r1"], table["r2"]
+    # The front bends where the forearm is longest and the upper arm shortest.
+    on_front = np.minimum(np.abs(r1 - 1), np.abs(r2 - 11))
+    assert np.quantile(on_front, 0.9) < 0.1
+    knee_row = np.flatnonzero(table["knee"])
+    assert len(knee_row) == 1
+    assert (r1[knee_row[0]], r2[knee_row[0]]) == pytest.approx((1, 11), abs=0.15)
+    # The best of the first goal comes first, and no design evaluated surpasses one of the front.
+    assert (np.diff(table["kinematics.P.y"]) <= 0).all()
+    designs = result.tables["designs"]
+    for x, y in zip(table["kinematics.P.x"], table["kinematics.P.y"], strict=True):
+        better = (designs["kinematics.P.x"] <= x) & (designs["kinematics.P.y"] >= y)
+        assert not (better & ((designs["kinematics.P.x"] < x) | (designs["kinematics.P.y"] > y))).any()
+    assert f"r1: {float(r1[knee_row[0]])!r}" in result.files["knee.yaml"]
+    assert len(designs) <= 2000
+
+
+def test_same_seed_same_bits():
+    study = study_of(ARM, "optimize.evaluations=150")
+    one, two, other = (mechdesign.optimize(study, seed=seed, jobs=jobs).main for seed, jobs in ((4, 1), (4, 2), (5, 1)))
+    assert one["kinematics.P.x"].tobytes() == two["kinematics.P.x"].tobytes()
+    assert one["kinematics.P.x"].tobytes() != other["kinematics.P.x"].tobytes()

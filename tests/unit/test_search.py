@@ -1,0 +1,230 @@
+"""Continuous search: the algorithm on functions with known minima, then mechanisms with known optima."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.analyses.cube import from_cube
+from mechdesign.analyses.explorer import Explorer, Spent
+from mechdesign.analyses.search import minimise, sample, search
+from mechdesign.errors import AssemblyError, StudyError
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+# x = r1 cos 30 + r2 cos 60, y = r1 sin 30 + r2 sin 60.
+ARM = """\
+mechanism:
+  parameters: {r1: 5, r2: 5}
+  links: {ground: {O: [0, 0]}, upper: [O, E, r1], fore: [E, P, r2]}
+  drives: {theta1: {angle: upper}, theta2: {angle: fore}}
+  sketch: {E: [4, 3], P: [6, 8]}
+kinematics: {poses: [{theta1: 30, theta2: 60}], outputs: [P]}
+optimize:
+  method: search
+  variables: {r1: {from: 1, to: 11}, r2: {from: 1, to: 11}}
+  minimize: kinematics.P.x
+  subject_to: [{result: kinematics.P.y, at_least: 12}]
+"""
+C30, S30 = np.sqrt(3) / 2, 0.5
+
+
+def branin(u):
+    """Three equal minima 0.397887 [Dixon & Szego, 1978]."""
+    x, y = 15 * u[:, 0] - 5, 15 * u[:, 1]
+    return (y - 5.1 / (4 * np.pi**2) * x**2 + 5 / np.pi * x - 6) ** 2 + 10 * (1 - 1 / (8 * np.pi)) * np.cos(x) + 10
+
+
+def rastrigin(u):
+    """A minimum 0 at 0.43, among a hundred others that are not so low."""
+    z = 10 * (u - 0.43)
+    return (z**2 - 10 * np.cos(2 * np.pi * z) + 10).sum(axis=1)
+
+
+def explorer(function, dimensions, margins=None, budget=3000):
+    return Explorer(
+        lambda u: (function(u).reshape(len(u), -1), np.empty((len(u), 0)) if margins is None else margins(u)),
+        dimensions, budget,
+    )  # fmt: skip
+
+
+def least(function, dimensions, margins=None, seed=0):
+    known = explorer(function, dimensions, margins)
+    rng = np.random.default_rng(seed)
+    known(sample(dimensions, rng, 16 * (dimensions + 1), 1000))
+    row = minimise(known, lambda values: values[:, 0], rng)
+    return known.known.u[row], known.known.values[row, 0]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_minimum_of_branin(seed):
+    assert least(branin, 2, seed=seed)[1] == pytest.approx(0.39788735773, abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_lowest_of_many_minima(seed):
+    at, value = least(rastrigin, 2, seed=seed)
+    assert at == pytest.approx([0.43, 0.43], abs=1e-4)
+    assert value < 1e-4
+
+
+def test_a_condition_that_holds_the_minimum():
+    at, value = least(lambda u: u.sum(axis=1), 2, lambda u: (u[:, 0] * u[:, 1] - 0.25)[:, None])
+    assert value == pytest.approx(1, abs=1e-5)
+    assert at == pytest.approx([0.5, 0.5], abs=1e-2)
+    assert at[0] * at[1] >= 0.25
+
+
+def test_points_without_a_value_are_avoided():
+    """The minimum lies at the edge of where there is a value."""
+
+    def holed(u):
+        return np.where(u[:, 0] < 0.3, np.nan, u[:, 0] + (u[:, 1] - 0.5) ** 2)
+
+    at, _ = least(holed, 2)
+    assert at[0] == pytest.approx(0.3, abs=2e-3)
+
+
+def test_noise_of_a_millionth_does_not_mislead():
+    """As integrals to a tolerance have it: the same each time, but rough."""
+
+    def rough(u):
+        return ((u - [0.3, 0.6, 0.8]) ** 2).sum(axis=1) + 1e-6 * np.sin(1e7 * u.sum(axis=1))
+
+    at, value = least(rough, 3)
+    assert value < 1e-5
+    assert at == pytest.approx([0.3, 0.6, 0.8], abs=2e-3)
+
+
+def test_no_point_is_evaluated_twice_nor_more_than_allowed():
+    asked = []
+    known = explorer(lambda u: asked.append(u.copy()) or u.sum(axis=1), 2, budget=60)
+    search(known, [True], [[1.0]], 0)
+    points = np.concatenate(asked)
+    assert len(points) == len(known.known.u) <= 60
+    assert len(np.unique(points, axis=0)) == len(points)
+    with pytest.raises(Spent):
+        known(np.random.default_rng(9).random((61, 2)))
+
+
+def test_extremes_and_weighted_sum_of_two_goals():
+    """Of (x, 1 - x^2), normalised, the equal-weight best is where 1 = 2 x."""
+    known = explorer(lambda u: np.column_stack([u[:, 0], 1 - u[:, 0] ** 2]), 1)
+    search(known, [False, False], [[1.0, 1.0]], 0)
+    values = known.known.values
+    assert values.min(axis=0) == pytest.approx([0, 0], abs=1e-12)
+    assert values.max(axis=0) == pytest.approx([1, 1], abs=1e-12)
+    assert known.known.u[np.argmax(values.sum(axis=1))] == pytest.approx([0.5], abs=1e-3)
+
+
+def test_bounds_that_depend_on_variables_above():
+    study = mechdesign.load(CONFIGS / "two_rrr.yaml")
+    designs, given = from_cube(study, np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.25]]))
+    assert given.all()
+    assert designs["l_min"] == pytest.approx([1, 5, 3])
+    assert designs["l_a"] == pytest.approx([1, 3, 1.25])
+
+
+def test_bounds_that_leave_no_value():
+    study = study_of(ARM, "optimize.variables.r2={from: 4, to: r1}", "optimize.subject_to=[]")
+    assert from_cube(study, np.array([[0.0, 0.5], [0.5, 0.5]]))[1].tolist() == [False, True]
+    designs = mechdesign.optimize(study).tables["designs"]
+    assert (designs["r1"] >= 4).all()
+    with pytest.raises(AssemblyError, match="leave no value"):
+        mechdesign.optimize(study_of(ARM, "optimize.variables.r2={from: 40, to: r1}"))
+
+
+def test_optimum_at_a_bound_and_a_condition():
+    """Turned less to the x axis, the forearm is as long as may be; the upper arm makes up what the height lacks."""
+    result = mechdesign.optimize(study_of(ARM))
+    r1 = (12 - 11 * C30) / S30
+    assert result.main["r2"][0] == pytest.approx(11, abs=1e-3)
+    assert result.main["r1"][0] == pytest.approx(r1, abs=1e-3)
+    assert result.main["kinematics.P.x"][0] == pytest.approx(r1 * C30 + 11 * S30, rel=1e-5)
+    assert result.main["active"][0] == "r2 to, kinematics.P.y at least 12"
+    bounds = result.tables["bounds"]
+    # The farthest reach is not bounded by the condition.
+    assert bounds["max"][0] == pytest.approx(11 * (C30 + S30), rel=1e-6)
+    designs = result.tables["designs"]
+    assert ((designs["r1"] * S30 + designs["r2"] * C30 >= 12) == designs["feasible"]).all()
+    assert result.counts["designs"] == len(designs)
+
+
+def test_sensitivity_is_the_change_of_the_score_a_step():
+    changes = ("optimize.subject_to=[]", "optimize.variables.r1.step=0.5", "optimize.variables.r2={from: 2, to: 4}")
+    result = mechdesign.optimize(study_of(ARM, *changes))
+    table, bounds = result.tables["sensitivity"], result.tables["bounds"]
+    span = bounds["max"][0] - bounds["min"][0]
+    assert table["variable"].tolist() == ["r1", "r2"]
+    assert table["step"] == pytest.approx([0.5, 0.02])
+    assert np.isnan(table["score_down"]).all()
+    assert table["score_up"] == pytest.approx([-0.5 * C30 / span, -0.02 * S30 / span])
+    assert result.main["active"][0] == "r1 from, r2 from"
+
+
+def test_best_designs_are_apart():
+    best = mechdesign.optimize(study_of(ARM)).tables["best"]
+    assert best["rank"].tolist() == list(range(1, 11))
+    assert (np.diff(best["score"]) <= 0).all()
+    for k in range(10):
+        for other in range(k):
+            apart = max(abs(best[name][k] - best[name][other]) for name in ("r1", "r2"))
+            assert apart > 0.05 * 9
+
+
+def test_same_seed_same_bits_whatever_the_jobs():
+    study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.method=search", "optimize.evaluations=60"])
+    one, two = (mechdesign.optimize(study, jobs=jobs).tables["designs"] for jobs in (1, 2))
+    other = mechdesign.optimize(study, seed=1).tables["designs"]
+    assert len(one) <= 60
+    for name in ("l_min", "l_a", "GII", "CPI"):
+        assert one[name].tobytes() == two[name].tobytes()
+    assert one["l_min"].tobytes() != other["l_min"].tobytes()
+
+
+def test_no_feasible_design_says_which_requirement_kills_most():
+    """A design that misses two conditions counts under both."""
+    changes = (
+        "optimize.subject_to=[{result: kinematics.P.y, at_least: 1000}, {result: kinematics.P.x, at_most: 4}]",
+        "optimize.method=grid", "optimize.variables={r1: {from: 1, to: 5, number: 2}, r2: {from: 1, to: 2, number: 2}}",
+    )  # fmt: skip
+    with pytest.raises(AssemblyError) as told:
+        mechdesign.optimize(study_of(ARM, *changes))
+    assert "P.y at least 1000 (4 designs); not kinematics.P.x at most 4 (2 designs)" in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("weights", "told"),
+    [
+        ("[[1, 0, 0], [1, 1]]", r"optimize\.weights\.1: 2 weights for 3 goals"),
+        ("[[1, 0, 0], {GIL: 1}]", r"optimize\.weights\.1: 'GIL' is neither .* did you mean 'GRI'"),
+        ("[[0, 0, 0]]", r"optimize\.weights\.0: all weights are zero"),
+        ("[[1, -1, 0]]", r"optimize\.weights\.0: a weight is not negative"),
+    ],
+)
+def test_wrong_weights_are_told_at_their_row(weights, told):
+    with pytest.raises(StudyError, match=told):
+        mechdesign.load(CONFIGS / "two_rrr.yaml", [f"optimize.weights={weights}"])
+
+
+def test_wrong_weights_in_a_file_are_told_with_line_and_column():
+    text = ARM + "  weights:\n    - [1]\n    - [1, 2]\n"
+    with pytest.raises(StudyError, match=r"study\.yaml:14:7: optimize\.weights\.1: 2 weights for 1 goals"):
+        study_of(text)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ("optimize.method=grid", "needs either 'step' or 'number'"),
+        ("optimize.method=pareto", "between two goals or more"),
+        ("optimize.evaluations=3", "at least 10"),
+    ],
+)
+def test_what_a_method_needs(change, told):
+    with pytest.raises(StudyError, match=told):
+        study_of(ARM, change)
