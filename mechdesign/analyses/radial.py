@@ -212,7 +212,8 @@ def evaluate(
         if not designs.field.same_assembly:
             grip = np.broadcast_to(local.determinant, r.shape)
             crossed[at] = (grip > 0).any(axis=0) & (grip < 0).any(axis=0)
-            mixed = np.flatnonzero(crossed[at])
+            # Where rounding leaves nothing of the determinant, at a cusp, its sign tells no place.
+            mixed = np.flatnonzero(crossed[at] & (grip != 0).all(axis=0))
             places[k + mixed] = _sign_change(1 / grip[:, mixed])
     return found, doubt, places, crossed
 

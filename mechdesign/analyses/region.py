@@ -257,7 +257,8 @@ def _endless(question: Question, integrands: Sequence[Integrand], peaks: Peaks |
     if peaks is None:
         return np.zeros((len(integrands), count), dtype=bool)
     order = dict(zip((index.name for index in question.indices), peaks.order, strict=True))
-    return np.array([integrand.power * order[integrand.index.name] >= 1 for integrand in integrands]).reshape(-1, count)
+    grows = [integrand.power * order[integrand.index.name] >= 1 for integrand in integrands]
+    return np.array(grows, dtype=bool).reshape(-1, count)
 
 
 def _statistic(
