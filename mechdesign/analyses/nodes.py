@@ -46,14 +46,13 @@ def workspace_nodes(study: Study) -> Poses:
 
 
 def _grid(question: Question, most: int) -> Value:
-    """Nodes of one region, shape (rays, GRID), with at most `most` rays where the panels leave the choice."""
+    """Nodes of one region, shape (rays, GRID), on at most `most` rays."""
     designs = Designs(question.field, {}, 1, question.about)
     panels = find_panels(designs, question.scan, CLOSE)
     if not panels.closes[0]:
         return np.zeros((0, GRID), dtype=complex)
-    rays = question.rays or RAYS
-    while True:
-        grid = np.concatenate([patch.grid(question.about) for patch in patches(designs, panels, rays, CLOSE.samples)])
-        if len(grid) <= max(most, 1) or rays <= 2:
-            return grid
-        rays = max(2, min(rays - 1, int(rays * most / len(grid))))
+    found = patches(designs, panels, min(question.rays or RAYS, most), CLOSE.samples)
+    grid = np.concatenate([patch.grid(question.about) for patch in found])
+    # Every panel has a fewest number of rays: of too many, some are left out.
+    kept = np.unique(np.linspace(0, len(grid) - 1, min(max(most, 1), len(grid))).round().astype(int))
+    return np.asarray(grid[kept])

@@ -9,9 +9,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.analyses.region import BRISK, answer, questions
 
 STUDY = Path(__file__).parents[2] / "configs" / "two_rrr.yaml"
 DESIGNS = 4556
@@ -45,3 +48,32 @@ def test_one_region(benchmark: Any) -> None:
 def test_whole_command_with_pictures(benchmark: Any, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mechdesign", "optimize", str(STUDY), "--quiet", "--out", str(tmp_path)]
     benchmark.pedantic(lambda: subprocess.run(command, check=True, stdout=subprocess.DEVNULL), rounds=3)
+
+
+FIVE_BAR = """
+units: {length: m}
+mechanism:
+  links:
+    ground: {A: [-0.15, 0], B: [0.15, 0]}
+    left: [A, D, 0.25]
+    left_rod: [D, P, 0.40]
+    right: [B, E, 0.25]
+    right_rod: [E, P, 0.40]
+  drives: {q1: {angle: left}, q2: {angle: right}}
+  sketch: {D: [-0.38, 0.1], E: [0.38, 0.1], P: [0.05, 0.45]}
+workspace: {point: P, assembly: any}
+"""
+SOME = 64
+
+
+@pytest.mark.parametrize("assembly", ["any", "same"])
+@pytest.mark.parametrize("wanted", [("GII", "GRI", "SUI", "area"), None], ids=["indices", "statistics"])
+def test_regions_of_five_bars(benchmark: Any, assembly: str, wanted: tuple[str, ...] | None) -> None:
+    """Boundary, area and indices to 1e-4, or all statistics of all indices, of designs that differ in their rods."""
+    study = study_of(FIVE_BAR, f"workspace.assembly={assembly}")
+    question = questions(study, 1e-4, wanted)[0]
+    rods = np.linspace(0.36, 0.44, SOME)
+    places = {"left_rod.length": rods, "right_rod.length": rods}
+    given = benchmark.pedantic(lambda: answer(question, places, SOME, BRISK), rounds=3, warmup_rounds=1)
+    assert (given.errors["area"] <= 1e-6 * given.values["area"]).all()
+    benchmark.extra_info.update(milliseconds_a_design=1e3 * benchmark.stats["min"] / SOME)
