@@ -10,9 +10,11 @@ import hashlib
 import io
 import json
 import time
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,12 +60,12 @@ class Journal:
 
     def _read(self) -> bool:
         try:
-            with np.load(self.path, allow_pickle=False) as content:
+            with np.load(io.BytesIO(self.path.read_bytes()), allow_pickle=False) as content:
                 if str(content["origin"]) != self._origin:
                     return False
                 digests, counts, rows = content["digests"], content["counts"], content["rows"]
                 self.words = json.loads(str(content["words"]))
-        except (OSError, ValueError, KeyError, EOFError):
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error):
             return False
         blocks = np.split(rows, np.cumsum(counts)[:-1])
         self._found = [(key.tobytes(), block) for key, block in zip(digests, blocks, strict=True)]

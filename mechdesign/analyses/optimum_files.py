@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from mechdesign.analyses.designs import in_words
 from mechdesign.analyses.optimum_tables import Comparison
@@ -39,22 +40,23 @@ def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int])
     for name, (k, heading) in wanted.items():
         numbers = {variable: float(column[k]) for variable, column in compared.designs.variables.items()}
         heading = f"{heading}: {in_words(numbers)}"
-        text, beside = rewritten(study, changed_data(study, numbers), heading)
+        data = changed_data(study, numbers)
         try:
-            if not _assembles_alike(study, numbers, text):
-                text, beside = rewritten(study, _drawn_anew(study, numbers), heading)
-                if not _assembles_alike(study, numbers, text):
+            if not _assembles_alike(study, numbers, data):
+                data = _drawn_anew(study, numbers)
+                if not _assembles_alike(study, numbers, data):
                     doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
         except MechdesignError as error:
             doubts.append(f"{name}.yaml: {str(error).splitlines()[0]}")
+        text, beside = rewritten(study, data, heading)
         files |= {f"{name}.yaml": text, **beside}
     return files, doubts
 
 
-def _assembles_alike(study: Study, numbers: Mapping[str, float], text: str) -> bool:
-    """Whether the study of this text has the assembly in which the design was evaluated."""
+def _assembles_alike(study: Study, numbers: Mapping[str, float], data: Mapping[str, Any]) -> bool:
+    """Whether the study of this data has the assembly in which the design was evaluated."""
     try:
-        alone = load_bytes(text.encode(), study.path or Path("study.yaml"))
+        alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path or Path("study.yaml"))
     except MechdesignError:
         return False
     return alone.mechanism.forward.modes == variant(study, numbers).mechanism.forward.modes

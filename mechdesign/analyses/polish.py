@@ -40,22 +40,27 @@ class Quadratic:
         return np.asarray(self.slope + self.curvature @ z)
 
 
-def polish(explorer: Explorer, descents: Sequence[tuple[Objective, int]], width: float = WIDTH) -> None:
+def polish(
+    explorer: Explorer,
+    descents: Sequence[tuple[Objective, int]],
+    width: float = WIDTH,
+    narrowest: float = NARROWEST,
+) -> None:
     """Descend from known points, all at once: a batch of designs costs little more than one.
 
     Parameters
     ----------
     descents : sequence of (Objective, int)
         What is made small, and the row of `explorer.known` from which.
-    width : float
-        Half the first box's width, in the unit cube.
+    width, narrowest : float
+        Half the first and the last box's width, in the unit cube.
 
     Raises
     ------
     Spent
         If the evaluations are used up.
     """
-    under_way = [_descent(explorer, objective, start, width) for objective, start in descents]
+    under_way = [_descent(explorer, objective, start, width, narrowest) for objective, start in descents]
     while under_way:
         asked = [(each, next(each, None)) for each in under_way]
         under_way = [each for each, points in asked if points is not None]
@@ -63,17 +68,19 @@ def polish(explorer: Explorer, descents: Sequence[tuple[Objective, int]], width:
             explorer(np.concatenate([points for _, points in asked if points is not None]))
 
 
-def _descent(explorer: Explorer, objective: Objective, start: int, width: float) -> Iterator[Floats]:
+def _descent(explorer: Explorer, objective: Objective, start: int, width: float, narrowest: float) -> Iterator[Floats]:
     """Points to be evaluated before the next ones are asked for."""
     centre = start
     for _ in range(MOST_ROUNDS):
-        if width < NARROWEST:
+        if width < narrowest:
             break
         at = explorer.known.u[centre]
         yield _stencil(at, width)
         steps = _steps(explorer, objective, centre, width)
-        if steps:
-            yield at + width * np.array(steps)
+        # Where the objective has a cliff at a bound, no smooth model leads onto the bound itself.
+        wanted = np.array([at, *(at + width * step for step in steps)])
+        wanted = np.concatenate([wanted[1:], _onto_bounds(wanted, width)])
+        yield wanted
         reached = _best_near(explorer, objective, centre, 2 * width)
         moved = np.abs(explorer.known.u[reached] - at).max()
         centre = reached
@@ -93,6 +100,11 @@ def _stencil(at: Floats, width: float) -> Floats:
     if n <= MOST_MIXED:
         rows += [at + width * inward * (np.eye(n)[i] + np.eye(n)[j]) for i in range(n) for j in range(i)]
     return np.array(rows)
+
+
+def _onto_bounds(points: Floats, width: float) -> Floats:
+    """Points with every coordinate that is near an end of its range put there."""
+    return np.where(points <= width, 0.0, np.where(points >= 1 - width, 1.0, points))
 
 
 def _best_near(explorer: Explorer, objective: Objective, centre: int, width: float) -> int:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.analyses.explorer import Explorer, Known, Objective, Spent
-from mechdesign.analyses.polish import WIDTH, polish
+from mechdesign.analyses.polish import NARROWEST, WIDTH, polish
 from mechdesign.analyses.rays import Floats
 
 # Points of the first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
@@ -24,8 +24,8 @@ GENERATIONS, PATIENCE = 40, 3
 ENOUGH = 1e-3
 # How far apart the starts of two descents are, and how much worse than the best a start may be, of the range.
 APART, PROMISING = 0.2, 0.1
-# Half the width of the first box of descents that repeat others.
-NEAR = 2e-3
+# Half the width of the last box of the extremes' descents, and of the first one of descents that follow others.
+ROUGH, NEAR, NEAREST = 5e-3, 0.05, 1e-3
 
 
 def allowance(dimensions: int, objectives: int) -> int:
@@ -54,14 +54,15 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
         ends = [_single(goal, sign) for goal in range(len(smallest)) for sign in (1.0, -1.0)]
         for goal, down in enumerate(smallest):
             evolve(explorer, ends[2 * goal + (not down)], rng)
-        descend(explorer, ends, starts=2)
-        several = [row for row in rows if np.count_nonzero(row) > 1]
-        if several and explorer.known.feasible.any():
-            for row in several:
-                evolve(explorer, _weighted(explorer.known, smallest, row), rng)
+        # To normalise by, extremes need not be known to the last digit.
+        descend(explorer, ends, starts=2, narrowest=ROUGH)
+        if explorer.known.feasible.any():
+            for row in rows:
+                if np.count_nonzero(row) > 1:
+                    evolve(explorer, _weighted(explorer.known, smallest, row), rng)
             # Normalised by what has been found meanwhile, and once more where the descents have found more.
-            for width in (WIDTH, NEAR):
-                descend(explorer, [_weighted(explorer.known, smallest, row) for row in several], width=width)
+            for width in (NEAR, NEAREST):
+                descend(explorer, [_weighted(explorer.known, smallest, row) for row in rows], width=width)
     except Spent:
         return
 
@@ -103,7 +104,14 @@ def minimise(explorer: Explorer, objective: Objective, rng: np.random.Generator)
     return int(np.argmin(explorer.known.merit(objective)))
 
 
-def descend(explorer: Explorer, objectives: Sequence[Objective], *, starts: int = 1, width: float = WIDTH) -> None:
+def descend(
+    explorer: Explorer,
+    objectives: Sequence[Objective],
+    *,
+    starts: int = 1,
+    width: float = WIDTH,
+    narrowest: float = NARROWEST,
+) -> None:
     """Polish each objective's best known points that lie apart."""
     descents: list[tuple[Objective, int]] = []
     for objective in objectives:
@@ -117,7 +125,7 @@ def descend(explorer: Explorer, objectives: Sequence[Objective], *, starts: int 
             if all(np.abs(explorer.known.u[row] - explorer.known.u[other]).max() > APART for other in begun):
                 begun.append(row)
         descents += [(objective, row) for row in begun]
-    polish(explorer, descents, width)
+    polish(explorer, descents, width, narrowest)
 
 
 def evolve(explorer: Explorer, objective: Objective, rng: np.random.Generator) -> None:

@@ -1,0 +1,42 @@
+"""Search over three variables for the continuous optimum of S1's 2-RRR, and the front between its indices."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mechdesign
+from mechdesign.analyses.goals import Evaluator
+from mechdesign.analyses.objectives import goal
+
+STUDY = Path(__file__).parent / "three_variables.yaml"
+INDICES = ("GII", "GRI", "SUI")
+
+
+def best_of_a_line(bounds: mechdesign.results.Table) -> float:
+    """The best score among symmetrical designs with lower links of length R, l_min in steps of 0.0005, by these bounds."""
+    study = mechdesign.load(STUDY, ["workspace.integrate.tolerance=1e-6"])
+    l_min = np.arange(1.05, 1.15, 0.0005)
+    found = Evaluator(study, [goal(name) for name in INDICES])({"l_min": l_min, "l_1": l_min**0, "l_2": l_min**0})
+    low, high = bounds["min"][:3], bounds["max"][:3]
+    values = np.stack(list(found.values.values()))
+    return float(((values - low[:, None]) / (high - low)[:, None]).sum(axis=0).max())
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_three_variables(benchmark: Any, jobs: int) -> None:
+    study = mechdesign.load(STUDY)
+    result = benchmark.pedantic(lambda: mechdesign.optimize(study, jobs=jobs), rounds=3)
+    assert result.main["l_1"][0] == result.main["l_2"][0] == 1
+    assert result.main["score"][0] == pytest.approx(best_of_a_line(result.tables["bounds"]), abs=1e-4)
+    benchmark.extra_info.update(designs=result.counts["designs"], l_min=float(result.main["l_min"][0]))
+
+
+def test_front_of_two_indices(benchmark: Any) -> None:
+    changes = ["optimize.method=pareto", "optimize.maximize=[GII, SUI]", "optimize.evaluations=1000"]
+    study = mechdesign.load(STUDY, changes)
+    result = benchmark.pedantic(lambda: mechdesign.optimize(study, jobs=2), rounds=1)
+    benchmark.extra_info.update(designs=result.counts["designs"], front=len(result.main))
