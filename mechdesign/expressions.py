@@ -149,6 +149,26 @@ class Expression:
             raise ExpressionError(f"{self.text!r} has no finite value")
         return result
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether it is a sum of its variables times constants: its derivatives are the same everywhere."""
+        degrees: list[int] = []
+        for kind, item in self.program:
+            if kind != "call":
+                degrees.append(int(kind == "name"))
+                continue
+            count = _count(str(item))
+            inner = degrees[-count:]
+            del degrees[-count:]
+            if item in ("+", "-", "negate"):
+                degrees.append(max(inner))
+            elif item == "*":
+                degrees.append(sum(inner))
+            else:
+                # A quotient by a constant is linear; all else of a variable counts as not.
+                degrees.append(inner[0] if item == "/" and not inner[1] else 2 * max(inner))
+        return degrees[0] <= 1
+
     def derivatives(self, env: Mapping[str, ArrayLike]) -> dict[str, Number]:
         """Exact partial derivative with respect to every variable, at the values of `env` (forward mode)."""
         stack: list[tuple[Any, dict[str, Any]]] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.memory import keep_freed_memory
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Result
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.reliability_models import ReliabilitySection
@@ -115,6 +116,31 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
                 f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
             )
     return Result("reliability", tables.build(answer), [*warnings, *failures], counts, failed)
+
+
+def first_order_tables(
+    study: Study, poses: Poses, wanted: Collection[str]
+) -> tuple[dict[str, Table], NDArray[np.int8]]:
+    """Wanted tables of the first-order analysis at poses, perhaps of several designs, and why poses fail.
+
+    Raises
+    ------
+    StudyError
+        If nothing varies.
+    """
+    sources, _ = find_sources(study)
+    section = study.reliability
+    assert section is not None
+    question = ask(study, section)
+    nominal = NominalPoses.solve(study, poses, question)
+    linear = first_order(study, nominal, question, sources.first_order())
+    centres = _in_order(study, poses, question, nominal)
+    none: list[Sums | None] = [None] * poses.count
+    answer = tables.Answer(study, poses, question, ("analytic",), nominal.reason, centres, linear, none)
+    made = {"moments": tables.moments, "contributions": tables.contributions}
+    if question.limited:
+        made["reliability"] = tables.success
+    return {name: make(answer) for name, make in made.items() if name in wanted}, nominal.reason
 
 
 def ask(study: Study, section: ReliabilitySection) -> Question:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mechdesign.analyses import kinematics, stiffness
+from mechdesign.analyses import kinematics, reliability, stiffness
 from mechdesign.analyses.motion import Motion, asked, move
 from mechdesign.analyses.transmission import transmission_table
 from mechdesign.results import Result, Table
@@ -28,11 +28,13 @@ _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
 TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*_OF_MOTION, "extremes", "loops"),
     "stiffness": ("stiffness", "compliance", "deflections"),
+    "reliability": ("moments", "reliability", "contributions"),
 }
 # Sections whose numbers a command reads.
 READ: Mapping[str, Collection[str]] = {
     "kinematics": ("kinematics", "workspace"),
     "stiffness": ("stiffness", "kinematics"),
+    "reliability": ("reliability", "kinematics"),
 }
 
 
@@ -73,10 +75,27 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
         return False
     if any(mechanism.plan(group.names).change_points for group in study.poses(command).groups):
         return False
+    if command == "reliability":
+        return _first_order(study, names)
     if command == "stiffness" and study.stiffness is not None:
         # The order of the points along an elastic link is found once.
         links = [name for name in study.stiffness.elastic if len(mechanism.description.links[name].points) > 2]
         return not any(place.startswith(f"{link}.") for link in links for place in places)
+    return True
+
+
+def _first_order(study: Study, names: Collection[str]) -> bool:
+    """Whether only the first order is asked, and what a source moves does not depend on parameters or places."""
+    section = study.reliability
+    if section is None or set(section.methods) != {"analytic"}:
+        return False
+    formulas = {**study.parameters.formulas, **study.parameters.dependent}
+    reached = {name for name in section.dimensions if name in study.parameters.nominal}
+    for name, formula in formulas.items():
+        if formula.names & reached:
+            if not formula.is_linear or name in names:
+                return False
+            reached.add(name)
     return True
 
 
@@ -114,6 +133,8 @@ def tables(
     poses = stacked(one, designs, places, parameters)
     if command == "kinematics":
         found, reason = _motion(study, wanted, poses, outputs)
+    elif command == "reliability":
+        found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
         question = stiffness.ask(study)
         held = stiffness.solve(study, question, poses)

@@ -173,8 +173,7 @@ class Linearization:
     def sensitivity(self, places: Sequence[str]) -> Rates:
         """Derivatives with respect to dimensions, the drives held; a leading axis runs over `places`.
 
-        Drives may be among them: the derivative is then that with respect to the drive. The configuration must be
-        one of nominal dimensions.
+        Drives may be among them: the derivative is then that with respect to the drive.
         """
         given, explicit, offsets = self._explicit(places)
         rest = [
@@ -223,20 +222,26 @@ class Linearization:
         return [None if edge.slide is None else self.state.slides[edge.slide] for edge in self.structure.edges]
 
     def _explicit(self, places: Sequence[str]) -> tuple[list[Value], list[tuple[Value, Value]], dict[str, Value]]:
-        axes = (1,) * len(self.configuration.shape)
+        configuration = self.configuration
+        axes = (1,) * len(configuration.shape)
 
         def lead(values: Sequence[Value]) -> Value:
+            if any(np.ndim(value) for value in values):
+                return np.stack([np.broadcast_to(value, configuration.shape) for value in values])
             array = np.array(values)
             return array.reshape((len(values), *axes)) if array.any() else 0.0
 
         drives = [coordinate.name for coordinate in self.structure.given]
         given = [lead([float(place == drive) for place in places]) for drive in drives]
-        each = [self.geometry.derivatives(place) for place in places]
+        sizes = configuration.places
+        # Of nominal dimensions they are numbers, the same for every pose.
+        vectors = configuration.vectors if sizes else self.geometry.nominal
+        each = [self.geometry.derivatives(place, sizes, vectors) for place in places]
         explicit = [
             (lead([w[k] for w, _ in each]), lead([d[k] for _, d in each])) for k in range(len(self.structure.edges))
         ]
         offsets = {
-            body: lead([self.geometry.offset_derivative(body, place) for place in places])
+            body: lead([self.geometry.offset_derivative(body, place, sizes) for place in places])
             for body, (_, turns) in self.geometry.graph.bodies.items()
             if turns
         }

@@ -134,17 +134,17 @@ class Geometry:
                 d.append(rotation(self.angle(edge.turns, values)) if edge.turns else 1.0 + 0.0j)
         return Vectors(w, d, offsets)
 
-    def angle_derivative(self, turns: Sequence[Turn], place: str) -> float:
-        """Derivative of a sum of turns with respect to a place, at the nominal dimensions."""
-        total = 0.0
+    def angle_derivative(self, turns: Sequence[Turn], place: str, values: Mapping[str, Value]) -> Value:
+        """Derivative of a sum of turns with respect to a place."""
+        total: Value = 0.0
         for turn in turns:
             if turn.towards is None:
-                total += turn.sign * (turn.term == place)
+                total = total + turn.sign * (turn.term == place)
             else:
                 link, a, b = turn.towards
-                span = self.local(link, b, {}) - self.local(link, a, {})
+                span = self.local(link, b, values) - self.local(link, a, values)
                 change = self.local_derivative(link, b, place) - self.local_derivative(link, a, place)
-                total += turn.sign * float(cross(span, change) / norm2(span))
+                total = total + turn.sign * cross(span, change) / norm2(span)
         return total
 
     def local_derivative(self, body: str, point: str, place: str) -> complex:
@@ -153,24 +153,31 @@ class Geometry:
         dx, dy = offset_names(body.removesuffix(":rod"), point)
         return complex((x == place) + (dx == place), (y == place) + (dy == place))
 
-    def offset_derivative(self, body: str, place: str) -> float:
+    def offset_derivative(self, body: str, place: str, values: Mapping[str, Value]) -> Value:
         """Derivative of a body's angle within its class (radians per unit of the place)."""
-        return self.angle_derivative(self.graph.bodies[body][1], place)
+        return self.angle_derivative(self.graph.bodies[body][1], place, values)
 
-    def derivatives(self, place: str) -> tuple[list[complex], list[complex]]:
-        """Derivatives of all edges' w and d with respect to one place, at the nominal dimensions."""
-        w_z: list[complex] = []
-        d_z: list[complex] = []
+    def derivatives(self, place: str, values: Mapping[str, Value], vectors: Vectors) -> tuple[list[Value], list[Value]]:
+        """Derivatives of all edges' w and d with respect to one place.
+
+        Parameters
+        ----------
+        values : mapping of str to Value
+            Dimensions that differ from the nominal ones.
+        vectors : Vectors
+            The edges for these dimensions.
+        """
+        w_z: list[Value] = []
+        d_z: list[Value] = []
         for k, edge in enumerate(self.graph.edges):
             if place not in self.dependencies[k]:
                 w_z.append(0j)
                 d_z.append(0j)
                 continue
-            total = 0j
+            total: Value = 0j
             for sign, body, point in edge.locals:
-                turned = 1j * self.offset_derivative(body, place) * self.local(body, point, {})
-                change = self.local_derivative(body, point, place) + turned
-                total += sign * complex(change * self.nominal.offsets[body])
+                turned = 1j * self.offset_derivative(body, place, values) * self.local(body, point, values)
+                total = total + sign * (self.local_derivative(body, point, place) + turned) * vectors.offsets[body]
             w_z.append(total)
-            d_z.append(1j * self.angle_derivative(edge.turns, place) * complex(self.nominal.d[k]))
+            d_z.append(1j * self.angle_derivative(edge.turns, place, values) * vectors.d[k])
         return w_z, d_z

@@ -58,6 +58,8 @@ def test_stiffness_designs_a_second(benchmark: Any, path: str) -> None:
     measure(benchmark, path, places[:2], "stiffness.k_min", 20_000, 0.05)
 
 
-def test_first_order_reliability_designs_a_second(benchmark: Any) -> None:
-    result = "reliability.moments.sigma"
-    measure(benchmark, "two_link_arm.yaml", ["r1", "r2"], result, 100, 0.05, "reliability.methods=analytic")
+@pytest.mark.parametrize(("result", "designs"), [("moments.sigma", 2_000), ("reliability", 200)])
+def test_first_order_reliability_designs_a_second(benchmark: Any, result: str, designs: int) -> None:
+    places = ["lower_1.length", "upper_2.length"]
+    result, methods = f"reliability.{result}", "reliability.methods=analytic"
+    measure(benchmark, "five_bar.yaml", places, result, designs, 0.05, methods)

@@ -123,3 +123,14 @@ def test_python_is_refused_and_not_executed(text, tmp_path, monkeypatch):
     with pytest.raises(ExpressionError):
         Expression.parse(text).evaluate({})
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("text", "linear"),
+    [
+        ("3", True), ("a", True), ("2*a - b/4 + 1", True), ("-(a + b)*sqrt(2)", True), ("a*b", False), ("a/b", False),
+        ("2/a", False), ("a**2", False), ("sin(a)", False), ("max(a, 3)", False), ("abs(a)", False), ("3**2*a", True),
+    ],
+)  # fmt: skip
+def test_sums_of_multiples_are_linear(text: str, linear: bool) -> None:
+    assert Expression.parse(text).is_linear is linear

@@ -159,6 +159,48 @@ def test_what_has_no_common_tables_is_asked_of_each_design() -> None:
     agree(study, [], goals, around(study, ["r1", "forearm.length"], 3, 0.1), together=False)
 
 
+ERRORS = """
+reliability:
+  dimensions: {r: 0.1, "*.length": 0.05, rod.P.x: 0.02, guide.direction: 0.2, guide.angle: 0.1, crank: 0.3}
+  clearances: {A: {radial: 0.05, link: rod}, B: {radial: 0.02, link: rod, effect: length}}
+  poses: [{crank: 20}, {crank: 130}]
+  rates: {crank: 2}
+  outputs: [P, S]
+  limits: {P.x: 0.3, S: {radius: 0.4}}
+  methods: analytic
+"""
+
+
+def test_first_order_errors_of_many_designs() -> None:
+    """Parameters, lengths, points, directions, pins; positions, velocities and accelerations."""
+    names = ["ground.G.y", "rod.P.y", "guide.direction", "guide.angle", "slider.S.x", "crank.length"]
+    ranges = ", ".join(f"{name}: {{from: 0, to: 1, number: 2}}" for name in names)
+    study = study_of(
+        SLIDE + ERRORS + f"optimize: {{variables: {{{ranges}}}, maximize: [GII]}}", "mechanism.links.crank=[O, A, 40]"
+    )
+    goals = [
+        goal("reliability.moments.sigma", smallest=True),
+        goal("reliability.worst_case", smallest=True),
+        Goal("v", "reliability", "sigma", where=(("order", "acceleration"), ("output", "P.y"))),
+        Goal("s", "reliability", "contributions.guide.direction.share"),
+        Goal("p", "reliability", "contributions.sensitivity", smallest=True, where=(("source", "rod.P.x"),)),
+        goal("reliability.failure", smallest=True),
+    ]
+    agree(study, names, goals, around(study, names, 5, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("path", "names"),
+    [
+        ("toggle.yaml", ["L", "ground.O4.x", "slider.S.y"]),
+        ("five_bar.yaml", ["ground.B1.x", "lower_1.length", "upper_2.length"]),
+    ],
+)
+def test_first_order_errors_of_the_configurations(path: str, names: list[str]) -> None:
+    study = varied(path, names, "reliability.methods=analytic")
+    agree(study, names, [goal("reliability.sigma", smallest=True)], around(study, names, 4, 0.05))
+
+
 @pytest.mark.parametrize(
     "changes",
     [
