@@ -140,7 +140,7 @@ class Expression:
                 elif kind == "name":
                     stack.append(self._variable(env, str(item)))
                 else:
-                    count = _count(str(item))
+                    count = arity(str(item))
                     arguments = stack[-count:]
                     del stack[-count:]
                     stack.append(self._apply(str(item), arguments))
@@ -148,26 +148,6 @@ class Expression:
         if type(result) is float and not math.isfinite(result) and not _has_nan(env, self.names):
             raise ExpressionError(f"{self.text!r} has no finite value")
         return result
-
-    @property
-    def is_linear(self) -> bool:
-        """Whether it is a sum of its variables times constants: its derivatives are the same everywhere."""
-        degrees: list[int] = []
-        for kind, item in self.program:
-            if kind != "call":
-                degrees.append(int(kind == "name"))
-                continue
-            count = _count(str(item))
-            inner = degrees[-count:]
-            del degrees[-count:]
-            if item in ("+", "-", "negate"):
-                degrees.append(max(inner))
-            elif item == "*":
-                degrees.append(sum(inner))
-            else:
-                # A quotient by a constant is linear; all else of a variable counts as not.
-                degrees.append(inner[0] if item == "/" and not inner[1] else 2 * max(inner))
-        return degrees[0] <= 1
 
     def derivatives(self, env: Mapping[str, ArrayLike]) -> dict[str, Number]:
         """Exact partial derivative with respect to every variable, at the values of `env` (forward mode)."""
@@ -179,7 +159,7 @@ class Expression:
                 elif kind == "name":
                     stack.append((self._variable(env, str(item)), {str(item): 1.0}))
                 else:
-                    count = _count(str(item))
+                    count = arity(str(item))
                     arguments = stack[-count:]
                     del stack[-count:]
                     stack.append(self._differentiate(str(item), arguments))
@@ -229,7 +209,8 @@ def _plain(value: Any) -> Number:
     return float(array) if array.ndim == 0 else array
 
 
-def _count(name: str) -> int:
+def arity(name: str) -> int:
+    """Number of arguments that a function or operator takes."""
     if name in ("min", "max") or name in _BINDING:
         return 2
     return _ARITY.get(name, 1)
@@ -345,8 +326,8 @@ class _Parser:
             if count == 1:
                 raise ExpressionError(f"{name} compares two numbers or more")
             return
-        if count != _count(name):
-            raise ExpressionError(f"{name} takes {_count(name)} number{'s' * (_count(name) > 1)}, not {count}")
+        if count != arity(name):
+            raise ExpressionError(f"{name} takes {arity(name)} number{'s' * (arity(name) > 1)}, not {count}")
         self.program.append(("call", name))
 
     def _close(self) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from mechdesign.analyses import kinematics, reliability, stiffness
 from mechdesign.analyses.motion import Motion, asked, move
 from mechdesign.analyses.transmission import transmission_table
+from mechdesign.linearity import is_linear
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
@@ -93,7 +94,7 @@ def _first_order(study: Study, names: Collection[str]) -> bool:
     reached = {name for name in section.dimensions if name in study.parameters.nominal}
     for name, formula in formulas.items():
         if formula.names & reached:
-            if not formula.is_linear or name in names:
+            if not is_linear(formula) or name in names:
                 return False
             reached.add(name)
     return True
