@@ -1,0 +1,105 @@
+"""Syntheses of the gallery: function, straight line and path generation against closed forms and published designs."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from helpers.gallery import meet, result_of, row, study_named
+
+import mechdesign
+
+
+@cache
+def optimised(name: str):
+    return mechdesign.optimize(study_named(name)).tables
+
+
+def structural_error(x1: float, x3: float) -> float:
+    """Largest error of the follower for y = log10(x), exact at x1, 1.5 and x3, in degrees.
+
+    K1 cos(follower) - K2 cos(crank) + K3 = cos(crank - follower), linear in the ratios K, and solved for the follower
+    by its half-angle tangent: F. Freudenstein, Approximate synthesis of four-bar linkages, Trans. ASME 77 (1955).
+    """
+
+    def wanted(x):
+        return np.radians(90 + 60 * (x - 1)), np.radians(30 + 60 * np.log2(x))
+
+    crank, follower = wanted(np.array([x1, 1.5, x3]))
+    k1, k2, k3 = np.linalg.solve(
+        np.column_stack([np.cos(follower), -np.cos(crank), np.ones(3)]), np.cos(crank - follower)
+    )
+    crank, follower = wanted(1 + np.arange(61) / 60)
+    # a cos(follower) + b sin(follower) = c
+    a, b, c = np.cos(crank) - k1, np.sin(crank), k3 - k2 * np.cos(crank)
+    middle, half = np.arctan2(b, a), np.arccos(c / np.hypot(a, b))
+    errors = [np.angle(np.exp(1j * (middle + side * half - follower))) for side in (1, -1)]
+    return float(np.degrees(min(np.abs(error).max() for error in errors)))
+
+
+def test_function_generator_with_the_best_three_exact_values() -> None:
+    """Every design of the grid against Freudenstein's equation; better than Chebyshev's spacing."""
+    tables = optimised("function_generator")
+    designs, name = tables["designs"], "kinematics.follower.angle_error"
+    exact = [structural_error(x1, x3) for x1, x3 in zip(designs["x1"], designs["x3"], strict=True)]
+    assert designs["feasible"].all()
+    assert designs[name] == pytest.approx(np.array(exact), abs=1e-9)
+    best = int(np.argmin(exact))
+    assert (tables["optimum"]["x1"][0], tables["optimum"]["x3"][0]) == (designs["x1"][best], designs["x3"][best])
+    spread = np.cos(np.radians(30)) / 2
+    assert tables["optimum"][name][0] < structural_error(1.5 - spread, 1.5 + spread)
+
+
+def hoeken(l1, l3):
+    """Path of P over a half turn of the crank: where two circles meet, and as far beyond."""
+    pin = np.exp(1j * np.radians(np.arange(90, 271, 5)))
+    return pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
+
+
+def test_straightest_line_in_the_textbooks_steps() -> None:
+    """L1/L2 = 2.200 and L3/L2 = 2.800 over 180 deg: error 0.096 % of a travel of 4.181 cranks.
+
+    R. L. Norton, Design of Machinery, Table 3-1.
+    """
+    tables = optimised("straight_line_synthesis")
+    designs, optimum = tables["designs"], tables["optimum"]
+    assert (optimum["l1"][0], optimum["l3"][0]) == pytest.approx((2.2, 2.8), abs=1e-12)
+    assert len(designs) == 21 * 29
+    for k in range(0, len(designs), 40):
+        path = hoeken(designs["l1"][k], designs["l3"][k])
+        height = np.sqrt(4 * designs["l3"][k] ** 2 - (designs["l1"][k] + 1) ** 2)
+        assert designs["kinematics.P.y_error"][k] == pytest.approx(np.abs(path.imag - height).max(), abs=1e-12)
+    extremes = result_of("straight_line_synthesis").tables["extremes"]
+    assert row(extremes, "P.x")["range"] == pytest.approx(4.181, abs=5e-4)
+    assert 100 * row(extremes, "P.y")["range"] / row(extremes, "P.x")["range"] == pytest.approx(0.096, abs=5e-4)
+
+
+def test_path_through_five_points_of_a_line() -> None:
+    """Problem 7 of A. P. Morgan and C. W. Wampler, Solving a planar four-bar design using continuation (1990).
+
+    The points as the documentation of PHCpack gives them. The coupler that the search finds is compared with the exact
+    one: ten equations, that the crank's pin keeps its distance from O and the rocker's from D at each point, by Newton.
+    """
+    optimum = optimised("path_synthesis")["optimum"]
+    points = np.array([0.50 + 1.06j, -0.83 - 0.27j, -0.34 + 0.22j, -0.13 + 0.43j, 0.22 + 0.78j])
+    unknown = np.array([0.462, 0.653, 0.446, -0.696, 0.498, *np.radians([-60, 23, -7, -17, -38])])
+
+    def residual(s):
+        a, b, c, u, v = s[:5]
+        turn = np.exp(1j * s[5:])
+        pin = points - turn * (u + 1j * v)
+        return np.concatenate([np.abs(pin) ** 2 - a**2, np.abs(pin + turn * b - 1) ** 2 - c**2])
+
+    for _ in range(30):
+        step = 1e-7
+        slope = np.column_stack(
+            [(residual(unknown + e) - residual(unknown - e)) / (2 * step) for e in step * np.eye(10)]
+        )
+        unknown = unknown - np.linalg.solve(slope, residual(unknown))
+    assert np.abs(residual(unknown)).max() < 1e-12
+    parameters = study_named("path_synthesis").parameters.nominal
+    assert (parameters["a"], parameters["c"]) == pytest.approx((unknown[0], unknown[2]), abs=5e-8)
+    assert optimum["kinematics.C.y_error"][0] < 1e-3
+    found = [optimum[name][0] for name in "buv"]
+    assert found == pytest.approx(unknown[[1, 3, 4]], abs=1e-3)
