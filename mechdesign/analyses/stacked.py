@@ -65,7 +65,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
     They are not where more than the geometry of the poses depends on them.
     """
     mechanism = study.mechanism
-    places = set(places_of(study, names))
+    places = places_of(study, names)
     if command not in TABLES or follows(study, names, READ[command]):
         return False
     graph = mechanism.graph
