@@ -55,7 +55,9 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
         for goal, down in enumerate(smallest):
             evolve(explorer, ends[2 * goal + (not down)], rng)
         # To normalise by, extremes need not be known to the last digit.
-        descend(explorer, ends, starts=2, narrowest=ROUGH)
+        # What is worst has not been looked for all over; it begins twice.
+        starts = [start for down in smallest for start in ((1, 2) if down else (2, 1))]
+        descend(explorer, ends, starts=starts, narrowest=ROUGH)
         if explorer.known.feasible.any():
             for row in rows:
                 if np.count_nonzero(row) > 1:
@@ -108,19 +110,19 @@ def descend(
     explorer: Explorer,
     objectives: Sequence[Objective],
     *,
-    starts: int = 1,
+    starts: Sequence[int] | None = None,
     width: float = WIDTH,
     narrowest: float = NARROWEST,
 ) -> None:
     """Polish each objective's best known points that lie apart."""
     descents: list[tuple[Objective, int]] = []
-    for objective in objectives:
+    for objective, most in zip(objectives, starts or [1] * len(objectives), strict=True):
         merit = explorer.known.merit(objective)
         finite = merit[np.isfinite(merit)]
         enough = finite.min() + PROMISING * np.ptp(finite) if finite.size else -np.inf
         begun: list[int] = []
         for row in np.argsort(merit, kind="stable").tolist():
-            if len(begun) == starts or not merit[row] <= enough:
+            if len(begun) == most or not merit[row] <= enough:
                 break
             if all(np.abs(explorer.known.u[row] - explorer.known.u[other]).max() > APART for other in begun):
                 begun.append(row)

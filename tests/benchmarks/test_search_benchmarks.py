@@ -17,7 +17,7 @@ INDICES = ("GII", "GRI", "SUI")
 
 
 def best_of_a_line(bounds: mechdesign.results.Table) -> float:
-    """The best score among symmetrical designs with lower links of length R, l_min in steps of 0.0005, by these bounds."""
+    """The best score of symmetrical designs with lower links of length R, l_min in steps of 0.0005, by these bounds."""
     study = mechdesign.load(STUDY, ["workspace.integrate.tolerance=1e-6"])
     l_min = np.arange(1.05, 1.15, 0.0005)
     found = Evaluator(study, [goal(name) for name in INDICES])({"l_min": l_min, "l_1": l_min**0, "l_2": l_min**0})
