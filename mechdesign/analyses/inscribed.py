@@ -109,7 +109,7 @@ def inscribed(
     free = inside.all(axis=0).reshape(CELLS, CELLS)
     # What is negative nowhere (the length of a leg) is no border.
     borders = np.array(~inside.all(axis=1), dtype=bool)
-    borders[[margin for _, margin in ends]] = True
+    borders[[*(margin for _, margin in ends), *range(len(field.labels), len(borders))]] = True
     column = np.clip(((every.real - low.real) / dx).astype(int), 0, CELLS - 1)
     row = np.clip(((every.imag - low.imag) / dy).astype(int), 0, CELLS - 1)
     free[column, row] = False

@@ -21,7 +21,7 @@ from mechdesign.analyses.rays import Designs, Floats
 from mechdesign.errors import MechanismError, Problem, StudyError
 from mechdesign.memory import keep_freed_memory
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import WorkspaceSection
+from mechdesign.study.workspace_models import Over, WorkspaceSection
 
 # One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
 CLOSE, BRISK = Effort(128, 48), Effort(16, 6)
@@ -133,6 +133,9 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
             f"the mobility is {mechanism.mobility}: beside {section.point}.x and {section.point}.y "
             f"{mechanism.mobility - 2 or 'no'} coordinates are held, not {len(section.at)}",
         )  # fmt: skip
+    held = [values for values in section.at.values() if not isinstance(values, Over)]
+    if len(held) < len(section.at):
+        raise _problem(study, "workspace.at", "over a range of a coordinate only the command 'workspace' is answered")
     try:
         plan = mechanism.plan((*outputs, *section.at))
     except MechanismError as error:
@@ -164,7 +167,7 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
             integrate_by.tolerance if "tolerance" in integrate_by.model_fields_set else tolerance, integrate_by.nodes,
             indices, wanted,
         )
-        for values in itertools.product(*section.at.values())
+        for values in itertools.product(*held)
     ]  # fmt: skip
 
 

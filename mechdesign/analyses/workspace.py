@@ -10,6 +10,8 @@ from mechdesign.analyses.curves import Patch, patches
 from mechdesign.analyses.indices import INDICES, prepare
 from mechdesign.analyses.indices.index import determinant_power, power_of_length
 from mechdesign.analyses.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
+from mechdesign.analyses.orientation import reachable
+from mechdesign.analyses.point_path import point_path
 from mechdesign.analyses.rays import Designs
 from mechdesign.analyses.region import CLOSE, COLUMNS, RAYS, Answer, Question, answer, questions, split
 from mechdesign.analyses.workspace_tables import held_columns, inscribed_columns, outlines, stacked
@@ -17,6 +19,7 @@ from mechdesign.errors import AssemblyError
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
+from mechdesign.study.workspace_models import Over
 
 
 def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
@@ -36,6 +39,11 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     AssemblyError
         If no point of the scan can be reached, or the region has no end.
     """
+    section = study.workspace
+    if section is not None and study.mechanism.mobility == 1:
+        return point_path(study)
+    if section is not None and any(isinstance(values, Over) for values in section.at.values()):
+        return reachable(study, progress)
     asked = questions(study)
     progress.start(len(asked), "regions")
     answers: list[Answer] = []

@@ -19,7 +19,7 @@ from mechdesign.study.reporter import Reporter
 from mechdesign.study.sections import COMMANDS, KinematicsSection
 from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.units import KINDS, QUANTITY, QuantityError, describe, measure
-from mechdesign.study.workspace_models import INDEX_NAMES, NEEDED, WorkspaceSection
+from mechdesign.study.workspace_models import INDEX_NAMES, NEEDED, Over, WorkspaceSection
 
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
 _STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))
@@ -125,6 +125,9 @@ class Checker:
         for name, values in section.at.items():
             path: Path = ("workspace", "at", name)
             quantity = self.coordinate(name, path, at_key=True)
+            if isinstance(values, Over):
+                self.over(values, path, quantity)
+                continue
             if not values:
                 self.reporter.report(path, "an empty list of values")
             for index in range(len(values)):
@@ -140,6 +143,17 @@ class Checker:
             self.reporter.report(("workspace", "scan"), "'from' and 'to' belong together")
         elif scan.from_ is not None and scan.to is not None and scan.to <= scan.from_:
             self.reporter.report(("workspace", "scan", "to"), f"{scan.to:g} is not beyond 'from', {scan.from_:g}")
+
+        ranges = [name for name, values in section.at.items() if isinstance(values, Over)]
+        if len(ranges) > 1:
+            self.reporter.report(("workspace", "at", ranges[1]), "only one held coordinate can range", at_key=True)
+
+    def over(self, values: Over, path: Path, quantity: str | None) -> None:
+        for key in ("from", "to"):
+            if quantity in ("length", "angle"):
+                self.kind((*path, key), quantity)
+        if values.to <= values.from_:
+            self.reporter.report((*path, "to"), f"{values.to:g} is not beyond 'from', {values.from_:g}")
 
     def optimize(self, section: OptimizeSection) -> None:
         root: Path = ("optimize",)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from mechdesign.study.lists import as_list
 from mechdesign.study.models import Model
@@ -55,13 +55,27 @@ class Integrate(Model):
         return self
 
 
+class Over(Model):
+    """A range of a held coordinate: the region in which some value of it is reached, or every one."""
+
+    from_: Number = Field(alias="from")
+    to: Number
+    all: bool = False
+
+
+def _form(raw: Any) -> str:
+    return "over" if isinstance(raw, dict | Over) else "values"
+
+
+Values = Annotated[tuple[Number, ...], BeforeValidator(as_list), OrShort((NUMBER_FORM,))]
+At = Annotated[Annotated[Over, Tag("over")] | Annotated[Values, Tag("values")], Discriminator(_form)]
+
+
 class WorkspaceSection(Model):
     """Where can it work?"""
 
     point: PointName
-    at: dict[CoordinateName, Annotated[tuple[Number, ...], BeforeValidator(as_list), OrShort((NUMBER_FORM,))]] = Field(
-        default_factory=dict
-    )
+    at: dict[CoordinateName, At] = Field(default_factory=dict)
     scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
     integrate: Integrate = Integrate()
     margin: NonNegativeAngle = 0.0

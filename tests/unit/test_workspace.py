@@ -155,10 +155,9 @@ def test_what_a_section_lacks(changes: tuple[str, ...], said: str) -> None:
         mechdesign.workspace(study_of(LEGS, *changes))
 
 
-def test_a_workspace_needs_two_degrees_of_freedom() -> None:
+def test_one_degree_of_freedom_gives_a_path() -> None:
     study = mechdesign.load(Path(__file__).parents[2] / "configs" / "toggle.yaml", ["workspace={point: S}"])
-    with pytest.raises(StudyError, match="moves on a curve"):
-        mechdesign.workspace(study)
+    assert "path" in mechdesign.workspace(study).tables
 
 
 def test_mixed_units_need_a_length() -> None:

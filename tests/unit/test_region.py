@@ -1,0 +1,199 @@
+"""Any region: holes, several pieces, crescents, tangent rays, and regions over a range of orientations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+
+ARM = """
+units: {length: dimensionless}
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 1.5], lower: [E, P, 1]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
+  limits: [{drive: q1, min: -40, max: 100}, {drive: q2, min: -170, max: -10}]
+  sketch: {E: [1, 1], P: [2, 1]}
+workspace: {point: P, scan: {about: [0, 0]}, indices: []}
+"""
+FIVE_BAR = """
+units: {length: dimensionless}
+mechanism:
+  parameters: {a: 0.25, b: 0.4, h: 0.15}
+  links:
+    ground: {A: [-h, 0], B: [h, 0]}
+    left: [A, C, a]
+    right: [B, D, a]
+    fore_left: [C, P, b]
+    fore_right: [D, P, b]
+  drives: {t1: {angle: left}, t2: {angle: right}}
+  sketch: {C: [-0.3, 0.2], D: [0.3, 0.2], P: [0, 0.48]}
+workspace: {point: P, scan: {about: [0, 0]}, assembly: any, indices: []}
+"""
+LEGS = """
+units: {length: dimensionless}
+mechanism:
+  parameters: {low: 1, high: 3}
+  measures: {d: C.x*C.y}
+  links:
+    ground: {B1: [1, 0], B2: [-1, 0]}
+    leg_1: {from: B1, to: C, telescopic: true}
+    leg_2: {from: B2, to: C, telescopic: true}
+  drives: {l1: {length: leg_1}, l2: {length: leg_2}}
+  limits: [{drive: l1, min: low, max: high}, {drive: l2, min: low, max: high}]
+  sketch: {C: [0, 1.8]}
+workspace: {point: C, scan: {about: [0, 0]}, assembly: any, indices: []}
+"""
+PLATFORM = Path(__file__).parents[2] / "configs" / "planar_3rpr.yaml"
+STROKES = (
+    "mechanism.limits=[{drive: l1, min: 0.4, max: 1.4}, {drive: l2, min: 0.4, max: 1.4}, "
+    "{drive: l3, min: 0.3, max: 1.6}]"
+)
+SAMPLES = 400_000
+
+
+def area(text: str, *overrides: str) -> tuple[float, float]:
+    main = mechdesign.workspace(study_of(text, *overrides)).main
+    return float(main["area"][0]), float(main["area_error"][0])
+
+
+def by_chance(inside: np.ndarray, box: float) -> tuple[float, float]:
+    """Area by uniform samples in a box, and four standard deviations."""
+    part = inside.mean()
+    return box * part, 4 * box * np.sqrt(part * (1 - part) / inside.size)
+
+
+def uniform(half: float) -> np.ndarray:
+    random = np.random.default_rng(5)
+    return random.uniform(-half, half, SAMPLES) + 1j * random.uniform(-half, half, SAMPLES)
+
+
+@pytest.mark.parametrize("about", ["[0, 0]", "[1.2, 0.3]", "[-0.7, 0.9]", "[6, 1]"])
+def test_crescent_of_an_arm_with_joint_limits(about: str) -> None:
+    """dA = a b |sin q2| dq1 dq2, seen from anywhere: thin parts along the rays and between them are met."""
+    found, error = area(ARM, f"workspace.scan.about={about}")
+    exact = 1.5 * np.radians(140) * 2 * np.cos(np.radians(10))
+    assert found == pytest.approx(exact, rel=1e-6)
+    assert error < 1e-5 * exact
+
+
+@pytest.mark.parametrize("about", ["[0, 0]", "[1, 1]"])
+def test_joint_limits_just_short_of_a_turn(about: str) -> None:
+    """Half a degree short of stretched and folded, and a narrow gap all across: slivers wherever one looks from."""
+    limits = "mechanism.limits=[{drive: q1, min: -150, max: 170}, {drive: q2, min: -179, max: -1}]"
+    found, _ = area(ARM, limits, f"workspace.scan.about={about}")
+    assert found == pytest.approx(1.5 * np.radians(320) * 2 * np.cos(np.radians(1)), rel=1e-7)
+
+
+def test_a_limit_of_the_forearm_gives_two_arcs_and_their_sweep() -> None:
+    """The forearm within 120 deg of the world: the elbow's circle moved along, with the elbow on one side only."""
+    limits = "mechanism.limits=[{angle: [ground, lower], min: -60, max: 60}]"
+    found, _ = area(ARM, limits, "workspace.scan.about=[3, 0.5]")
+    # a b times the integral of |sin(q2)| over q2 < 0, q1 + q2 within the range: 1.5 (2 pi / 3) 2.
+    assert found == pytest.approx(1.5 * 2 * np.pi / 3 * 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("about", ["[0, 0]", "[0.05, 0.45]", "[0.6, 0.3]"])
+def test_five_bar_with_holes(about: str) -> None:
+    """Common part of two rings about the motors: a known area, seen from the hole, from inside, outside."""
+    found, error = area(FIVE_BAR, f"workspace.scan.about={about}")
+    assert found == pytest.approx(0.799441, abs=5e-7)
+    assert error < 1e-6
+
+
+@pytest.mark.parametrize("assembly", ["any", "same"])
+def test_five_bar_cut_by_limits_and_singularities(assembly: str) -> None:
+    """Against samples whose legs are solved here: elbows out, motors within limits, one side of the singularity."""
+    limits = "mechanism.limits=[{drive: t1, min: 30, max: 200}, {drive: t2, min: -20, max: 150}]"
+    found, error = area(FIVE_BAR, limits, f"workspace.assembly={assembly}")
+    z = uniform(0.85)
+    elbows, good = [], np.ones(z.shape, dtype=bool)
+    for base, side, low, high in ((-0.15, 1, 30, 200), (0.15, -1, -20, 150)):
+        k = z - base
+        cosine = (0.25**2 + np.abs(k) ** 2 - 0.4**2) / (2 * 0.25 * np.abs(k))
+        good &= np.abs(cosine) < 1
+        angle = np.angle(k) + side * np.arccos(np.clip(cosine, -1, 1))
+        good &= np.radians(high - low) > (angle - np.radians(low)) % (2 * np.pi)
+        elbows.append(base + 0.25 * np.exp(1j * angle))
+    if assembly == "same":
+        forearms = [z - elbow for elbow in elbows]
+        good &= (np.conj(forearms[0]) * forearms[1]).imag > 0
+    guess, doubt = by_chance(good, 1.7**2)
+    assert abs(found - guess) < doubt + error
+
+
+def lens(one: float, two: float, apart: float) -> float:
+    """Common part of two discs."""
+    if one + two <= apart:
+        return 0.0
+    if apart <= abs(one - two):
+        return float(np.pi * min(one, two) ** 2)
+    a = np.arccos((apart**2 + one**2 - two**2) / (2 * apart * one))
+    b = np.arccos((apart**2 + two**2 - one**2) / (2 * apart * two))
+    return float(one**2 * (a - np.sin(2 * a) / 2) + two**2 * (b - np.sin(2 * b) / 2))
+
+
+def rings(low: float, high: float) -> float:
+    """Common part of two rings about places 2 apart."""
+    return lens(high, high, 2) - 2 * lens(low, high, 2) + lens(low, low, 2)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "about"),
+    [
+        (1, 3, "[0, 0]"),
+        (1, 3, "[1, 0]"),
+        (1, 3, "[2, 0]"),
+        (1, 3, "[30, 0.1]"),
+        (1.2, 1.3, "[0, 0]"),
+        (1.2, 1.3, "[0, 0.66]"),
+        (1.2, 1.3, "[0.3, 0.1]"),
+        (0.5, 1.5, "[1.5, 0]"),
+        (0.5, 1.8, "[0.5, 0]"),
+        (0.9, 1.001, "[0, 0]"),
+    ],
+)
+def test_common_part_of_two_rings(low: float, high: float, about: str) -> None:
+    """Two pieces or one, from inside, outside, a base, a corner, and where rays touch the circles."""
+    found, _ = area(LEGS, f"mechanism.parameters={{low: {low}, high: {high}}}", f"workspace.scan.about={about}")
+    assert found == pytest.approx(rings(low, high), rel=1e-7)
+
+
+def test_a_band_of_a_measure_leaves_pieces() -> None:
+    limits = (
+        "mechanism.limits=[{drive: l1, min: low, max: high}, {drive: l2, min: low, max: high}, "
+        "{measure: d, min: 0.1, max: 0.8}]"
+    )
+    found, error = area(LEGS, limits)
+    z = uniform(3)
+    one, two, product = np.abs(z - 1), np.abs(z + 1), z.real * z.imag
+    good = (one > 1) & (one < 3) & (two > 1) & (two < 3) & (product > 0.1) & (product < 0.8)
+    guess, doubt = by_chance(good, 36)
+    assert abs(found - guess) < doubt + error
+
+
+def reached(z: np.ndarray, degrees: float) -> np.ndarray:
+    """Whether the platform's strokes reach places at an orientation."""
+    turn = np.exp(1j * np.radians(degrees))
+    lengths = np.abs(z[:, None] + turn * np.array([-0.2, 0.2, 0.25 + 0.15j]) - np.array([-0.6, 0.6, 0.3 - 0.2j]))
+    return np.asarray(((lengths >= [0.4, 0.4, 0.3]) & (lengths <= [1.4, 1.4, 1.6])).all(axis=1))
+
+
+@pytest.mark.parametrize("every", [False, True])
+def test_a_platform_over_a_range_of_orientations(every: bool) -> None:
+    """Where some orientation is reached, and where every one is."""
+    at = f"{{platform.angle: {{from: -10, to: 10, all: {str(every).lower()}}}}}"
+    section = f"workspace={{point: P, at: {at}, assembly: any}}"
+    result = mechdesign.workspace(mechdesign.load(PLATFORM, [STROKES, section]))
+    z = uniform(2)
+    parts = np.array([reached(z, angle) for angle in np.linspace(-10, 10, 81)])
+    guess, doubt = by_chance(parts.all(axis=0) if every else parts.any(axis=0), 16)
+    # Between the samples' orientations there is a little more (or less).
+    assert abs(result.main["area"][0] - guess) < doubt + result.main["area_error"][0] + 1e-3
+    edge = result.tables["boundary"]
+    assert set(edge["kind"]) == {"limit"}
+    assert {name.split()[0] for name in edge["at"]} <= {"l1", "l2", "l3"}
+    assert (np.abs(edge["platform.angle"]) <= 10).all()
