@@ -12,6 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -113,8 +114,11 @@ def label_levels(
 
 
 def _parts(axes: Axes, contour: QuadContourSet, level: int) -> list[NDArray[np.complex128]]:
-    corners = contour.get_paths()[level].to_polygons(closed_only=False)
-    return [_on_paper(axes, np.asarray(part) @ np.array([1, 1j])) for part in corners]
+    path = contour.get_paths()[level]
+    if path.codes is None:
+        return []
+    corners = np.split(np.asarray(path.vertices), np.flatnonzero(path.codes == Path.MOVETO)[1:])
+    return [_on_paper(axes, part @ np.array([1, 1j])) for part in corners]
 
 
 def _on_paper(axes: Axes, places: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -30,8 +30,9 @@ def optimum_figure(study: Study, designs: Designs) -> Figure:
     if "workspace" in asked and best.workspace is not None:
         # The region is drawn, not its indices.
         plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))
-        found = regions(plain, workspace(plain))
-        return workspace_figure(plain, found[0], f"the best design, {words}")
+        result = workspace(plain)
+        if "local" in result.tables:
+            return workspace_figure(plain, regions(plain, result)[0], f"the best design, {words}")
     if "kinematics" in asked and is_motion(best.poses("kinematics")):
         figure = paths_figure(solve_sweep(best), above=0.4)
         figure.axes[0].set_title(f"The best design, {words}", loc="left")

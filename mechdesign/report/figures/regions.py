@@ -39,7 +39,8 @@ LOCI: Mapping[str, tuple[str, str]] = {
 PALE = "#D5EBF8"
 _LEFT, _RIGHT, _TOP, _BELOW, _BAR, _LEGEND = 0.72, 0.12, 0.34, 0.52, 0.95, 0.24
 _TALLEST = 6.5
-_PAD = 0.03
+# Free room around what is shown, as a share of its size; with a mechanism there are symbols that reach beyond points.
+_PAD, ROOM = 0.03, 0.07
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +125,13 @@ def fate(kind: str, at: str) -> str:
 
 
 def outline(axes: Axes, region: Region, *, width: float = 1.5) -> set[str]:
-    """Draw the boundary, coloured by what ends it; returns the fates that occur."""
+    """Draw a region's boundary, coloured by what ends it; returns the fates that occur."""
+    return outline_of(axes, region.boundary, width=width)
+
+
+def outline_of(axes: Axes, boundary: Table, *, width: float = 1.5) -> set[str]:
+    """Draw the curves of a table, coloured by what ends the region there; returns the fates that occur."""
     seen = set()
-    boundary = region.boundary
     pieces = list(curves(boundary))
     # White below keeps the gaps of dashes clean.
     for rows in pieces:
@@ -198,12 +203,12 @@ class Sheet:
 
 
 def sheet(
-    study: Study, places: NDArray[np.complex128], titles: Sequence[str], title: str, *, bar: bool
+    study: Study, places: NDArray[np.complex128], titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD
 ) -> Sheet:  # fmt: skip
     """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all."""
     number = len(titles)
     x, y = places.real, places.imag
-    pad = _PAD * max(float(np.ptp(x)), float(np.ptp(y)), 1e-12)
+    pad = pad * max(float(np.ptp(x)), float(np.ptp(y)), 1e-12)
     wide, tall = float(np.ptp(x)) + 2 * pad, float(np.ptp(y)) + 2 * pad
     columns = number if number < 4 else 2 if number == 4 else 3
     rows = -(-number // columns)

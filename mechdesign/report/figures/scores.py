@@ -137,12 +137,13 @@ def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
     mesh = Triangulation(*scaled)
     corners = np.stack([mesh.x[mesh.triangles], mesh.y[mesh.triangles]])
     mesh = Triangulation(x, y, mesh.triangles, mask=(np.ptp(corners, axis=2) > 2.01).any(axis=0))
+    norm = None
     if np.ptp(z) == 0:
-        levels, norm = np.array([z[0] - 0.5, z[0] + 0.5]), None
+        levels = np.array([z[0] - 0.5, z[0] + 0.5])
     elif _steep(z) and len(designs.goals) == 1:
         levels, norm = np.geomspace(z.min(), z.max(), LEVELS + 1), LogNorm(z.min(), z.max())
     else:
-        levels, norm = MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(z.min(), z.max()), None
+        levels = np.asarray(MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(z.min(), z.max()))
     filled = axes.tricontourf(mesh, z, levels=levels, cmap=style.COLORMAP, norm=norm)
     axes.tricontour(mesh, z, levels=levels, colors="white", linewidths=0.4, alpha=0.6)
     axes.margins(0.02)

@@ -13,7 +13,9 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.inscribed import inscribed_figure
 from mechdesign.report.figures.maps import map_figures
-from mechdesign.report.figures.regions import Region, curves, fill, keys, loci, outline, regions, sheet
+from mechdesign.report.figures.point_paths import path_figures
+from mechdesign.report.figures.ranges import range_figures
+from mechdesign.report.figures.regions import ROOM, Region, curves, fill, keys, loci, outline, regions, sheet
 from mechdesign.results import Result, Table
 
 if TYPE_CHECKING:
@@ -28,8 +30,13 @@ DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
 def figures(study: Study, result: Result) -> dict[str, Figure]:
     """A map of each local index, the boundary with poses, the largest shapes inside, the drives along the boundary.
 
-    Where several values of held coordinates are asked for, maps show them side by side and the others the first.
+    Where several values of held coordinates are asked for, maps show them side by side and the others the first. Of a
+    point with one degree of freedom its path is drawn; over a range of a held coordinate, what ends the region.
     """
+    if "path" in result.tables:
+        return path_figures(study, result)
+    if "local" not in result.tables:
+        return range_figures(study, result)
     found = regions(study, result)
     if not found:
         return {}
@@ -59,7 +66,7 @@ def workspace_figure(study: Study, region: Region, title: str = "") -> Figure:
     extent = np.concatenate([region.places(), *(place[np.isfinite(place)] for place in reached)])
     where = f" at {region.title}" if region.title else ""
     title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
-    page = sheet(study, extent, [""], title, bar=False)
+    page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
     (axes,) = page.axes
     fill(axes, region)
     page.legend(keys(outline(axes, region), loci(axes, region)))
