@@ -25,8 +25,10 @@ Floats = NDArray[np.float64]
 FORWARD, INVERSE = "forward", "inverse"
 # Ends of curves this near to each other, as a part of the region, are one.
 SAME = 1e-8
-# Values this small, as a part of the largest, are zero but for rounding; what then stands for them.
+# Values this small, as a part of the largest, are zero but for rounding; what then stands for them. The first and the
+# last row of a grid may lie a little beside the ends of its panel.
 ZERO, TINY = 1e-13, 1e-300
+BESIDE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +137,9 @@ def _seams(values: Floats) -> list[tuple[int, int, int]]:
     -------
     list of (row, first column, last column + 1)
     """
-    small = np.abs(values) <= ZERO * np.nanmax(np.abs(values), initial=0.0)
+    part = np.full((len(values), 1), ZERO)
+    part[[0, -1]] = BESIDE
+    small = np.abs(values) <= part * np.nanmax(np.abs(values), initial=0.0)
     found = []
     for row, beside in ((0, 1), (len(values) - 1, len(values) - 2)):
         ends = np.flatnonzero(np.diff(np.concatenate([[0], small[row].astype(int), [0]])))
