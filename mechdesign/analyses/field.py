@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.atlas import Atlas
 from mechdesign.analyses.indices.local import Entries, Local
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
@@ -58,7 +59,7 @@ class Field:
         """
         given: list[Value] = [z.real, z.imag, *self.held]
         if self.plan.iterative:
-            return self.plan.solve(given, places, limits=False)
+            return self._atlas.solve(z, places)[0]
         vectors = self.mechanism.geometry.vectors(places)
         state = self.plan.run(given, vectors, None)
         graph = self.mechanism.graph
@@ -67,21 +68,31 @@ class Field:
             np.zeros((), dtype=np.int8), places,
         )  # fmt: skip
 
+    @cached_property
+    def _atlas(self) -> Atlas:
+        return Atlas.of(self.plan, self.held)
+
     def margins(self, z: NDArray[np.complex128], places: Places, *, assembly: bool = True) -> NDArray[np.float64]:
         """All margins at points `z`, shape (margins, *z.shape), in the order of `labels`; nan where unknown.
 
         Those of the assembly come last and may be left out.
         """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            configuration = self.configuration(z, places)
+            if self.plan.iterative:
+                configuration, grip = self._atlas.solve(z, places)
+            else:
+                configuration = self.configuration(z, places)
             found = [*configuration.closures]
             found += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
             found += [margin for _, margin in self.mechanism.margins(configuration)]
             if self.plan.iterative:
-                found.append(np.where(configuration.valid, 1.0, -1.0))
+                found.append(grip)
             if self.same_assembly and assembly:
                 signs = self._signs
                 found += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
+        if self.plan.iterative:
+            # Where nothing is reached one margin says so, and the others have no end of their own there.
+            found = [margin if margin is grip else np.where(np.isnan(grip), 1.0, margin) for margin in found]
         stacked = np.empty((len(found), *z.shape))
         for row, margin in zip(stacked, found, strict=True):
             row[...] = margin

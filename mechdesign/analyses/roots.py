@@ -11,6 +11,8 @@ Floats = NDArray[np.float64]
 # Values of the functions `which` (indices of brackets) at `x`.
 Evaluate = Callable[[NDArray[np.intp], Floats], Floats]
 STEPS = 80
+# Shares of the way to where a function seems to end that are left: less where the points it is judged by are near.
+SHORT = (1e-3, 0.1)
 
 
 def bracketed_roots(
@@ -48,7 +50,16 @@ def bracketed_roots(
             far = -0.5 * (linear + np.copysign(square, linear))
             one, two = fal / far, far / bend
             x = al + np.where((one / width >= 0) & (one / width <= 1), one, two)
-        halve = ~((x - al) * (x - bl) <= 0)
+            # Where the function ends at one side of the bracket: the line through the other two points, and not quite
+            # as far, so that it is approached from where the function is known.
+            last, f_last = np.where(np.isnan(fal), bl, al), np.where(np.isnan(fal), fbl, fal)
+            secant = (fcl - f_last) / (cl - last)
+            ended = (np.isnan(fal) | np.isnan(fbl)) & np.isfinite(secant)
+            way = f_last / secant
+            short = np.clip(SHORT[1] * np.abs(way / (cl - last)), *SHORT)
+            x = np.where(ended, last - (1 - short) * way, x)
+            square = np.where(ended, np.abs(secant), square)
+        halve = ~((x - al) * (x - bl) <= 0) | (ended & ((x == al) | (x == bl)))
         if step % 3 == 2:
             halve |= np.abs(width) > 0.5 * before[left]
             before[left] = np.abs(width)
@@ -58,7 +69,9 @@ def bracketed_roots(
             near = np.abs(fx) <= tolerance[left] * np.where(halve, np.abs(slope), square)
         root[left] = x
         lower = (fx > 0) == (fal > 0)
-        c[left], fc[left] = np.where(lower, al, bl), np.where(lower, fal, fbl)
+        known = ~np.isnan(fx)
+        c[left] = np.where(known, np.where(lower, al, bl), cl)
+        fc[left] = np.where(known, np.where(lower, fal, fbl), fcl)
         a[left], fa[left] = np.where(lower, x, al), np.where(lower, fx, fal)
         b[left], fb[left] = np.where(lower, bl, x), np.where(lower, fbl, fx)
         done = (fx == 0) | near | (np.abs(b[left] - a[left]) <= tolerance[left])
