@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
@@ -197,3 +198,16 @@ def test_a_platform_over_a_range_of_orientations(every: bool) -> None:
     assert set(edge["kind"]) == {"limit"}
     assert {name.split()[0] for name in edge["at"]} <= {"l1", "l2", "l3"}
     assert (np.abs(edge["platform.angle"]) <= 10).all()
+
+
+@pytest.mark.parametrize("degrees", [-15, 0, 10, 40])
+def test_a_platform_at_constant_orientation(degrees: float) -> None:
+    """The common part of three rings about the bases moved by the platform's points: area by arcs."""
+    at = f"at: {{platform.angle: {degrees}}}, characteristic_length: 0.2"
+    section = f"workspace={{point: P, {at}, assembly: any, indices: []}}"
+    found = mechdesign.workspace(mechdesign.load(PLATFORM, [STROKES, section])).main
+    turn = np.exp(1j * np.radians(degrees))
+    centres = np.array([-0.6, 0.6, 0.3 - 0.2j]) - turn * np.array([-0.2, 0.2, 0.25 + 0.15j])
+    strokes = ((0.4, 1.4), (0.4, 1.4), (0.3, 1.6))
+    rings_there = [(complex(c), low, high) for c, (low, high) in zip(centres, strokes, strict=True)]
+    assert found["area"][0] == pytest.approx(common_area(rings_there), rel=1e-8)
