@@ -139,7 +139,7 @@ def inscribed(
 
 def _holds(outside: Floats, size: float) -> bool:
     """Whether a shape holds a part of the boundary."""
-    return bool((outside < -1e-6 * size).any())
+    return bool((outside < -POINT * size).any())
 
 
 def _sector(about: complex, scan: tuple[float, float], size: float) -> Callable[[Complex], Floats]:
@@ -255,7 +255,9 @@ class _Grow:
         minimize: Any = scipy_minimize
         p = start / self.size
         u = np.arange(SAMPLES) / SAMPLES
-        places, which = self._nearest(shape, p, u[:: SAMPLES // FIRM])
+        # Places all round, each with the margin that is nearest to zero there.
+        places = u[:: SAMPLES // FIRM]
+        which = np.argmin(self._distances(self.size * shape.points(p, places)), axis=0)
         firm, room = len(places), 0.0
         for _ in range(ROUNDS):
             more_u, more_which, depth = self._lowest(shape, p, u)
@@ -275,11 +277,6 @@ class _Grow:
             room = LEAP - float(np.abs(answer.x - p).max()) - 1e-9
             p = answer.x
         return p * self.size if depth > -LATE else None
-
-    def _nearest(self, shape: _Shape, p: Floats, u: Floats) -> tuple[Floats, NDArray[np.intp]]:
-        """Places all round, each with the margin that is nearest to zero there."""
-        values = self._distances(self.size * shape.points(p, u))
-        return u, np.argmin(values, axis=0)
 
     def _with_slopes(self, z: Complex) -> tuple[Floats, Floats, Floats]:
         """Margins and their slopes along x and y, by parts of the size."""
