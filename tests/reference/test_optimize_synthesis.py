@@ -103,3 +103,22 @@ def test_path_through_five_points_of_a_line() -> None:
     assert optimum["kinematics.C.y_error"][0] < 1e-3
     found = [optimum[name][0] for name in "buv"]
     assert found == pytest.approx(unknown[[1, 3, 4]], abs=1e-3)
+
+
+def test_straightness_against_uniform_speed() -> None:
+    """Every design of the front by the closed form; none is better than another in both errors."""
+    front = optimised("straight_line_front")["pareto"]
+    crank = np.radians(np.arange(120, 241, 5))
+    up, along = front["kinematics.P.y_error"], front["kinematics.P.x_error"]
+    for k, (l1, l3, speed) in enumerate(zip(front["l1"], front["l3"], front["speed"], strict=True)):
+        pin = np.exp(1j * crank)
+        path = pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)
+        height = np.sqrt(4 * l3**2 - (l1 + 1) ** 2)
+        assert up[k] == pytest.approx(np.abs(path.imag - height).max(), abs=1e-12)
+        assert along[k] == pytest.approx(np.abs(path.real - l1 + speed * (crank - np.pi)).max(), abs=1e-12)
+    order = np.argsort(up)
+    assert (np.diff(along[order]) < 0).all()
+    assert front["knee"].sum() == 1
+    # Neither end of the front is anywhere near the other in its own goal.
+    assert up.max() > 5 * up.min()
+    assert along.max() > 5 * along.min()
