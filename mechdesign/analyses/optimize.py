@@ -27,7 +27,6 @@ from mechdesign.study import Study
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
 CHUNK, SMALL_CHUNK = 384, 16
 MOST_REASONS = 10
-# The command line tells how to go on.
 Compute = Callable[[Iterable[Batch]], Iterator[Evaluated]]
 
 
@@ -66,7 +65,7 @@ def optimize(
     judge = Judge(study, goals, jobs, progress, journal)
     try:
         with judge.open() as compute:
-            _ask(study, judge, compute, study.seed if seed is None else seed)
+            doubt = _ask(study, judge, compute, study.seed if seed is None else seed)
             designs = judge.designs()
             if not designs.feasible.any():
                 raise AssemblyError(_none_feasible(designs))
@@ -96,8 +95,8 @@ def optimize(
         tables.insert(0, table)
     files, doubts = optimum_files(study, compared, marked)
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
-    return Result("optimize", {table.name: table for table in tables}, (*_warnings(study, designs), *doubts), counts,
-                  files=files)  # fmt: skip
+    warnings = (*doubt, *_warnings(study, designs), *doubts)
+    return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files)
 
 
 def _goals(study: Study) -> tuple[Goal, ...]:
@@ -118,15 +117,15 @@ def _weights(study: Study, goals: int) -> Floats:
     return np.array(rows if rows else [[1.0] * goals], dtype=float).reshape(-1, goals)
 
 
-def _ask(study: Study, judge: Judge, compute: Compute, seed: int) -> None:
-    """Evaluate the designs of the study's method."""
+def _ask(study: Study, judge: Judge, compute: Compute, seed: int) -> tuple[str, ...]:
+    """Evaluate the designs of the study's method; returns what is to be warned of."""
     assert study.optimize is not None
     section, goals = study.optimize, judge.goals
     if section.method == "grid":
         variables = grid(study)
         judge.progress.start(len(next(iter(variables.values()))), "designs")
         judge.evaluate(compute, _chunks(variables, CHUNK))
-        return
+        return ()
     dimensions, smallest = len(section.variables), [each.smallest for each in goals]
 
     def evaluate(u: Floats) -> tuple[Floats, Floats]:
@@ -143,14 +142,16 @@ def _ask(study: Study, judge: Judge, compute: Compute, seed: int) -> None:
         rows = _weights(study, len(goals)).tolist()
         budget = section.evaluations or searching.allowance(dimensions, searching.objectives(len(goals), rows))
         judge.progress.start(budget, "designs")
-        searching.search(Explorer(evaluate, dimensions, budget), smallest, rows, seed)
-        return
+        if searching.search(Explorer(evaluate, dimensions, budget), smallest, rows, seed):
+            return ()
+        return (f"the search ended with its {budget} evaluations; allow more, e.g. optimize.evaluations: {4 * budget}",)
     from mechdesign.analyses import pareto
 
     budget = section.evaluations or pareto.allowance(len(goals))
     judge.progress.start(budget, "designs")
     first = searching.sample(dimensions, np.random.default_rng(seed), pareto.population(budget), budget)
     pareto.evolve(Explorer(evaluate, dimensions, budget), np.where(smallest, 1.0, -1.0), first, seed)
+    return ()
 
 
 def _chunks(designs: Batch, size: int) -> Iterator[Batch]:

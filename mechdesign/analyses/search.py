@@ -38,7 +38,7 @@ def objectives(goals: int, rows: Sequence[Sequence[float]]) -> int:
     return 2 * goals + sum(sum(map(bool, row)) > 1 for row in rows)
 
 
-def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int) -> None:
+def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int) -> bool:
     """Fill an explorer's memory with what the goals' extremes and the best weighted sums need.
 
     Parameters
@@ -47,6 +47,11 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
         Which goals are minimised.
     rows : sequence of sequence of float
         Weights, in the order of the goals.
+
+    Returns
+    -------
+    bool
+        Whether it came to its end with the evaluations that were allowed.
     """
     rng = np.random.default_rng(seed)
     try:
@@ -66,7 +71,8 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
             for width in (NEAR, NEAREST):
                 descend(explorer, [_weighted(explorer.known, smallest, row) for row in rows], width=width)
     except Spent:
-        return
+        return False
+    return True
 
 
 def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> Floats:

@@ -103,7 +103,7 @@ def test_noise_of_a_millionth_does_not_mislead():
 def test_no_point_is_evaluated_twice_nor_more_than_allowed():
     asked = []
     known = explorer(lambda u: asked.append(u.copy()) or u.sum(axis=1), 2, budget=60)
-    search(known, [True], [[1.0]], 0)
+    assert not search(known, [True], [[1.0]], 0)
     points = np.concatenate(asked)
     assert len(points) == len(known.known.u) <= 60
     assert len(np.unique(points, axis=0)) == len(points)
@@ -114,7 +114,7 @@ def test_no_point_is_evaluated_twice_nor_more_than_allowed():
 def test_extremes_and_weighted_sum_of_two_goals():
     """Of (x, 1 - x^2), normalised, the equal-weight best is where 1 = 2 x."""
     known = explorer(lambda u: np.column_stack([u[:, 0], 1 - u[:, 0] ** 2]), 1)
-    search(known, [False, False], [[1.0, 1.0]], 0)
+    assert search(known, [False, False], [[1.0, 1.0]], 0)
     values = known.known.values
     assert values.min(axis=0) == pytest.approx([0, 0], abs=1e-12)
     assert values.max(axis=0) == pytest.approx([1, 1], abs=1e-12)
@@ -152,6 +152,12 @@ def test_optimum_at_a_bound_and_a_condition():
     designs = result.tables["designs"]
     assert ((designs["r1"] * S30 + designs["r2"] * C30 >= 12) == designs["feasible"]).all()
     assert result.counts["designs"] == len(designs)
+
+
+def test_a_search_that_was_cut_short_says_so():
+    result = mechdesign.optimize(study_of(ARM, "optimize.evaluations=40"))
+    assert result.counts["designs"] <= 40
+    assert "the search ended with its 40 evaluations" in result.warnings[0]
 
 
 def test_sensitivity_is_the_change_of_the_score_a_step():
