@@ -74,6 +74,8 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
         return False
     if _poses_from_limits(study, command) and any(place.startswith("limits.") for place in places):
         return False
+    if any(s is not None and s.at_nodes for s in (getattr(study, command), study.kinematics)):
+        return False  # The nodes follow each design's own boundary.
     if any(mechanism.plan(group.names).change_points for group in study.poses(command).groups):
         return False
     if command == "reliability":
