@@ -11,18 +11,20 @@ from numpy.typing import NDArray
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.memory import keep_freed_memory
-from mechdesign.parallel import map_chunks
+from mechdesign.parallel import map_chunks, worker_count
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.plan import Plan
 
-# Poses of a chunk: the fastest of 4,096 to 65,536 for closed forms, measured on one and on two threads.
-CHUNK = 8192
+# Poses of a chunk: the fastest of 4,096 to 262,144, measured. Closed forms are some fifty short operations; threads
+# hand the interpreter's lock over at each and gain only on longer arrays.
+CHUNK = 32768
+MANY = 131072
 
 
 def too_large(shape: tuple[int, ...]) -> bool:
     """Whether a batch is worth dividing."""
-    return int(np.prod(shape, dtype=np.int64)) > 2 * CHUNK
+    return int(np.prod(shape, dtype=np.int64)) > CHUNK
 
 
 def solve(
@@ -47,16 +49,19 @@ def solve(
     if start is not None and start.shape:
         rows_of_start = flat(np.arange(int(np.prod(start.shape))).reshape(start.shape))
 
+    length = CHUNK if plan.iterative or worker_count(jobs) == 1 else MANY
+
     def part(begin: int) -> Configuration:
-        some = slice(begin, begin + CHUNK)
+        some = slice(begin, begin + length)
         begun = start
         if start is not None and rows_of_start is not None:
             begun = start.take(np.unravel_index(rows_of_start[some], start.shape))
-        return plan.solve(
+        return plan.solve_at_once(
             [v if v.ndim == 0 else v[some] for v in given],
             {name: v if v.ndim == 0 else v[some] for name, v in places.items()},
-            start=begun,
-            limits=limits,
+            (min(length, count - begin),),
+            begun,
+            limits,
         )
 
     first = part(0)
@@ -66,7 +71,7 @@ def solve(
     def fill(begin: int) -> None:
         whole.put(begin, part(begin))
 
-    for _ in map_chunks(fill, range(CHUNK, count, CHUNK), jobs):
+    for _ in map_chunks(fill, range(length, count, length), jobs):
         pass
     return whole.configuration(plan, dims, shape)
 

@@ -21,6 +21,9 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, cross, dot, norm2, vector
 
+# In products of complex arrays a temporary stands first, or `np.multiply` is called: of long arrays NumPy's operator
+# computes the product in the temporary's place, with the factors exchanged if it is the second, and in other last bits.
+
 # Closures down to this fraction of the links' squared lengths count as an exact limit, not as open: they are
 # differences of squares, so rounding leaves a few units in the last place there.
 ROUNDING = 4e-15
@@ -43,8 +46,8 @@ def two_angles(k: Value, z1: Value, z2: Value, mode: Value) -> Solution:
     outer, inner = (n1 + n2 + product) - reach, reach - (n1 + n2 - product)
     height = _root(outer * inner, n1 + n2, reach)
     half = 0.5 / reach
-    first = k * vector((reach + (n1 - n2)) * half, height * (mode * half))
-    u1 = first * (np.conj(z1) * (-1 / n1))
+    first = vector((reach + (n1 - n2)) * half, height * (mode * half)) * k
+    u1 = np.multiply(first, np.conj(z1) * (-1 / n1))
     u2 = (first - k) * (np.conj(z2) * (1 / n2))
     return u1, u2, (outer, inner)
 
@@ -65,7 +68,7 @@ def angle_and_turning_slide(k: Value, z: Value, d: Value, mode: Value) -> Soluti
     reach = norm2(k)
     closure = reach - offset * offset
     s = mode * _root(closure, reach) - dot(d, z)
-    u = k * np.conj(z + s * d) * (-1 / reach)
+    u = np.conj(z + s * d) * k * (-1 / reach)
     return u, s, (closure,)
 
 

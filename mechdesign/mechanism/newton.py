@@ -32,6 +32,7 @@ def solve_newton(
     given: Sequence[Value],
     size: float,
     steps: int = STEPS,
+    enough: float = CONVERGED,
 ) -> None:
     """Solve group `index` of a state from a guess of its angles and slides, and note what came out in the state.
 
@@ -41,6 +42,8 @@ def solve_newton(
         A length of the mechanism, by which corrections of slides are measured.
     steps : int
         Most corrections. A pose that has converged is left alone: its result does not depend on its batch.
+    enough : float
+        Correction after which a pose has converged.
     """
     group = state.structure.groups[index]
     theta: list[Value] = [np.asarray(a, dtype=float) for a in angles]
@@ -54,7 +57,7 @@ def solve_newton(
         largest: Value = 0.0
         for k, step in enumerate(solution):
             largest = np.maximum(largest, np.abs(step) if k < len(theta) else np.abs(step) / size)
-        moving = ~(largest < CONVERGED)
+        moving = ~(largest < enough)
         if active is not None:
             solution = [np.where(active, step, 0.0) for step in solution]
             moving &= active

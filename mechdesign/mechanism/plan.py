@@ -16,7 +16,7 @@ from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import Start, follow, unknowns_of
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Vectors
-from mechdesign.mechanism.newton import STEPS
+from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.mechanism.structure import Structure
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
+# On the way to a pose corrections this small will do (radians, or parts of the mechanism's size).
+NEAR = 1e-3
 
 
 class Plan:
@@ -61,11 +63,12 @@ class Plan:
         guess: Guess | None,
         modes: Sequence[Value] | None = None,
         steps: int = STEPS,
+        enough: float = CONVERGED,
     ) -> State:
         """Solve all groups, in the assembly as drawn unless `modes` says another."""
         state = start_state(self.mechanism.graph, self.structure, vectors, given)
         size = self.mechanism.size if self.iterative else 1.0
-        return run(state, self.modes if modes is None else modes, guess, given, size, steps)
+        return run(state, self.modes if modes is None else modes, guess, given, size, steps, enough)
 
     def _start(self, at: Configuration | None) -> Start:
         at = self.mechanism.sketch_configuration if at is None else at
@@ -121,12 +124,28 @@ class Plan:
             if self.change_points is not None:
                 self.change_points.cover(values[0])
             return chunks.solve(self, values, dims, shape, start, limits, jobs)
+        return self.solve_at_once(values, dims, shape, start, limits)
+
+    def solve_at_once(
+        self,
+        values: Sequence[Value],
+        dims: Mapping[str, Value],
+        shape: tuple[int, ...],
+        start: Configuration | None,
+        limits: bool,
+    ) -> Configuration:
+        """`solve` without chunks, for arrays of floats that broadcast to `shape`."""
         vectors = self.mechanism.geometry.vectors(dims)
         reached: NDArray[np.bool_] | None = None
         guess: Guess | None = None
         if self.iterative:
-            guess, reached = self._follow(values, dims, shape, start)
+            begin = self._start(start)
+            guess, reached = self._follow(values, dims, shape, begin)
         state = self.run(values, vectors, guess, self.modes_at(values))
+        if reached is not None:
+            # What the path came near to must be a pose, and of the same assembly.
+            for converged, determinant, sign in zip(state.converged, state.determinants, begin.signs, strict=True):
+                reached = reached & converged & (np.sign(determinant) == sign)
         return self.configuration(state, shape, dims, vectors, reached, limits)
 
     def _follow(
@@ -134,10 +153,9 @@ class Plan:
         values: Sequence[Value],
         dims: Mapping[str, Value],
         shape: tuple[int, ...],
-        at: Configuration | None,
+        begin: Start,
     ) -> tuple[Guess, NDArray[np.bool_]]:
         geometry = self.mechanism.geometry
-        begin = self._start(at)
 
         def flat(value: Value) -> Value:
             value = np.asarray(value)
@@ -153,7 +171,9 @@ class Plan:
 
             return follow(
                 self.structure,
-                lambda at, sizes, guess, steps: self.run(at, geometry.vectors(sizes), guess, self.modes_at(at), steps),
+                lambda at, sizes, guess, steps: self.run(
+                    at, geometry.vectors(sizes), guess, self.modes_at(at), steps, NEAR
+                ),
                 begin.map(some),
                 [some(v) for v in given],
                 {name: some(v) for name, v in places.items()},

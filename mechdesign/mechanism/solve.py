@@ -8,7 +8,7 @@ import numpy as np
 
 from mechdesign.mechanism import dyads
 from mechdesign.mechanism.algebra import Value, plus
-from mechdesign.mechanism.newton import STEPS, solve_newton
+from mechdesign.mechanism.newton import CONVERGED, STEPS, solve_newton
 from mechdesign.mechanism.state import Guess, State, loop_gap
 from mechdesign.mechanism.structure import Group
 
@@ -23,6 +23,7 @@ def run(
     given: Sequence[Value] = (),
     size: float = 1.0,
     steps: int = STEPS,
+    enough: float = CONVERGED,
     begin: int = 0,
 ) -> State:
     """Solve all groups in order.
@@ -34,7 +35,7 @@ def run(
         unsolved.
     guess : mapping, optional
         Where Newton's method starts, for the groups without a closed form.
-    size, steps
+    size, steps, enough
         See `mechdesign.mechanism.newton.solve_newton`.
     begin : int
         First group to solve; those before it are known already.
@@ -44,7 +45,7 @@ def run(
             continue
         if group.form == "newton":
             assert guess is not None
-            solve_newton(state, index, *guess[index], given, size, steps)
+            solve_newton(state, index, *guess[index], given, size, steps, enough)
         elif group.form != "place":
             _closed_form(state, group, mode)
         state.place(group)

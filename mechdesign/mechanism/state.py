@@ -92,7 +92,7 @@ def start_state(graph: Graph, structure: Structure, vectors: Vectors, given: Seq
         for sign, body in tie.offsets:
             offset = vectors.offsets[body]
             if not isinstance(offset, float):
-                turn = turn * (offset if sign > 0 else np.conj(offset))
+                turn = np.multiply(turn, offset if sign > 0 else np.conj(offset))
         ties.append(turn)
         rotations.append(turn if tie.root == 0 else None)
     w = [*vectors.w]
