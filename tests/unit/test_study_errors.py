@@ -138,7 +138,6 @@ QUESTIONS = [
         "optimize: {variables: {r: {from: 1, to: 2, step: 1}}, maximize: GII, weights: [[1, 2]]}",
         "2 weights for 1 goals",
     ),
-    ("optimize: {method: search}", "'search' is not available in this version; available: grid"),
     ("reliability: {dimensions: {r: -1}}", "10:31: reliability.dimensions.r: must be at least 0, not -1"),
     ("reliability: {dimensions: {rod.lenght: 1}}", "did you mean 'rod.length'?"),
     ("reliability: {dimensions: {'*.lenght': 1}}", "no dimension matches '*.lenght'"),
