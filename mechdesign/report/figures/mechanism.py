@@ -29,11 +29,14 @@ _ROUGH = 10.0  # points on paper: a place drawn nearer than this lies under the 
 _TALLEST = 4.2
 
 
-def mechanism_figure(study: Study) -> Figure:
-    """The sketch pose and the first pose of the study's kinematics, on one scale; use inside `style.context`."""
+def mechanism_figure(study: Study, title: str = "sketch pose") -> Figure:
+    """The sketch pose, under `title`, and the first pose of the study's kinematics, on one scale.
+
+    Use inside `style.context`.
+    """
     mechanism = study.mechanism
     sketch = mechanism.sketch_configuration
-    panels: list[Panel] = [("sketch pose", sketch, 0)]
+    panels: list[Panel] = [(title, sketch, 0)]
     scenes = [pose(mechanism, sketch)]
     try:
         sweep = solve_sweep(study, _POSES)
@@ -45,7 +48,7 @@ def mechanism_figure(study: Study) -> Figure:
         note = "first pose" if first == 0 else "first pose that can be assembled"
         if _same(scenes[0], poses[first]):
             panels = []
-            note = f"sketch and {note}"
+            note = f"{title.removesuffix(' pose')} and {note}"
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
         scenes += poses
     return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.label("length"))

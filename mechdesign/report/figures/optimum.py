@@ -20,6 +20,8 @@ from mechdesign.study.variants import variant
 if TYPE_CHECKING:
     from mechdesign.study import Study
 
+_NEVER = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
+
 
 def optimum_figure(study: Study, designs: Designs) -> Figure:
     """The mechanism with the variables of the optimum that is best on the whole."""
@@ -37,6 +39,5 @@ def optimum_figure(study: Study, designs: Designs) -> Figure:
         figure = paths_figure(solve_sweep(best), above=0.4)
         figure.axes[0].set_title(f"The best design, {words}", loc="left")
         return figure
-    figure = mechanism_figure(best)
-    figure.axes[0].set_title(f"The best design, {words}", loc="left")
-    return figure
+    # A title may be broken between variables only.
+    return mechanism_figure(best, f"The best design, {words.replace(' = ', _NEVER)}")
