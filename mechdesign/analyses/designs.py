@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,10 +78,3 @@ def best(score: Floats) -> int:
 def in_words(row: Mapping[str, float]) -> str:
     """``l_min = 1.15, l_a = 1``."""
     return ", ".join(f"{name} = {value:g}" for name, value in row.items())
-
-
-def most_common(reasons: Sequence[str]) -> list[tuple[str, int]]:
-    """Reasons and how often each occurs, the most frequent first."""
-    names, counts = np.unique(np.asarray(reasons, dtype=object).astype(str), return_counts=True)
-    order = np.lexsort((names, -counts))
-    return [(str(names[k]), int(counts[k])) for k in order if names[k]]

@@ -16,6 +16,7 @@ from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.targets import Error
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.golden import lowest
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.results import Column, Table
@@ -26,9 +27,6 @@ Array = NDArray[np.float64]
 
 # How far from its place an extreme may be found, as a part of a step of the sweep.
 PRECISION = 1e-13
-# An error's extreme is flat: its value is exact when its place is known to the root of rounding.
-SECTIONS = 40
-GOLDEN = (5**0.5 - 1) / 2
 # A range below this part of the output's size is rounding: the output does not move.
 STILL = 1e-12
 
@@ -271,13 +269,8 @@ def _refined_errors(
             own[mine] = found.values[mine]
         return np.where(solved.valid & np.isfinite(own), sign * own, np.inf)
 
-    low, high = sweep.beside()
-    for _ in range(SECTIONS):
-        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        lower = error(left) < error(right)
-        low, high = np.where(lower, low, left), np.where(lower, right, high)
-    place = (low + high) / 2
-    value = sign * error(place)
+    place, value = lowest(error, *sweep.beside())
+    value = sign * value
     # Where the pose itself is the extreme its place is kept as the study gives it: beside it values are equal.
     size = {"length": mechanism.size, "angle": turn}
     rounding = STILL * np.array([size.get(one.quantity, 0.0) for one in asked])[which]

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.motion_limits import Limits, as_given
 from mechdesign.analyses.poses import solve_poses
-from mechdesign.analyses.probing import GOLDEN, SECTIONS, Floats, Indices, probe
+from mechdesign.analyses.probing import Floats, Indices, probe
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
+from mechdesign.mechanism.golden import lowest
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -196,19 +197,13 @@ def _golden(
     loop, a, b = loop[some], a[some], b[some]
     start = limits.margins.start(near[some])
 
-    def angle(lane: Indices, x: Floats) -> Floats:
-        angles, _, _ = _values(loops, limits.margins.solve(x, None if start is None else start.take(lane)))
-        value = sign * angles[loop[lane], np.arange(len(lane))]
+    def angle(x: Floats) -> Floats:
+        angles, _, _ = _values(loops, limits.margins.solve(x, start))
+        value = sign * angles[loop, np.arange(len(loop))]
         return np.where(np.isnan(value), np.inf, value)
 
-    every = np.arange(len(some))
-    for _ in range(SECTIONS):
-        left, right = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-        value = angle(np.tile(every, 2), np.concatenate([left, right]))
-        lower = value[: len(some)] < value[len(some) :]
-        a, b = np.where(lower, a, left), np.where(lower, right, b)
-    place = a + (b - a) / 2
-    yield from zip(loop.tolist(), place.tolist(), angle(every, place).tolist(), strict=True)
+    place, least = lowest(angle, a, b)
+    yield from zip(loop.tolist(), place.tolist(), least.tolist(), strict=True)
 
 
 def _beside(samples: _Samples, limits: Limits, middle: Indices, other: Indices) -> Floats:

@@ -6,7 +6,6 @@ that the roots of the first divide the interval within which the second is looke
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.roots import bracketed_roots
+from mechdesign.mechanism.golden import GOLDEN, lowest
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -22,9 +22,6 @@ Evaluate = Callable[[Indices, Floats], Floats]
 # Values of one function in parts of intervals at `x`.
 One = Callable[[Indices, Floats], Floats]
 
-GOLDEN = (math.sqrt(5) - 1) / 2
-# Golden sections that find the smallest value of a smooth function to rounding.
-SECTIONS = 50
 # Where each part of an interval is looked at: near its ends too, so that the slope there is seen, and off the round
 # numbers at which roots like to lie.
 LOOKS = np.array([0.0, 1e-4, *((np.arange(8) + GOLDEN) / 8), 1 - 1e-4, 1.0])
@@ -121,15 +118,13 @@ def _bottoms(one: One, grid: Floats, values: Floats, sign: int) -> tuple[Indices
     a, b = grid[look, part], grid[look + 2, part]
     if not len(part):
         return part, a, a
-    both = np.concatenate([part, part])
-    for _ in range(SECTIONS):
-        left, right = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-        value = sign * one(both, np.concatenate([left, right]))
+
+    def height(x: Floats) -> Floats:
+        value = sign * one(part, x)
         # What is not a number lies beyond a root.
-        value = np.where(np.isnan(value), -np.inf, value)
-        lower = value[: len(part)] < value[len(part) :]
-        a, b = np.where(lower, a, left), np.where(lower, right, b)
-    place = a + (b - a) / 2
+        return np.where(np.isnan(value), -np.inf, value)
+
+    place, _ = lowest(height, a, b)
     return part, place, one(part, place)
 
 

@@ -99,19 +99,6 @@ def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> O
     return lambda values: np.asarray((values - low) @ factor)
 
 
-def minimise(explorer: Explorer, objective: Objective, rng: np.random.Generator) -> int:
-    """Make an objective small over the whole cube; returns the row of the best point.
-
-    Raises
-    ------
-    Spent
-        If the evaluations are used up.
-    """
-    evolve(explorer, objective, rng)
-    descend(explorer, [objective])
-    return int(np.argmin(explorer.known.merit(objective)))
-
-
 def descend(
     explorer: Explorer,
     objectives: Sequence[Objective],

@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.loops import BEYOND, SQUARE
 from mechdesign.analyses.poses import dimensions, radians, solve_poses, starts
-from mechdesign.analyses.probing import GOLDEN, SECTIONS, Floats, Indices
+from mechdesign.analyses.probing import Floats, Indices
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
+from mechdesign.mechanism.golden import lowest
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -107,12 +108,4 @@ def _golden(
         return np.where(np.isnan(value), np.inf, value)
 
     a, b = at[row - (middle > 0)], at[row + (middle < last)]
-    left, right = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-    at_left, at_right = angle(left), angle(right)
-    for _ in range(SECTIONS):
-        lower = at_left < at_right
-        a, b = np.where(lower, a, left), np.where(lower, right, b)
-        left, right = np.where(lower, b - GOLDEN * (b - a), right), np.where(lower, left, a + GOLDEN * (b - a))
-        new = angle(np.where(lower, left, right))
-        at_left, at_right = np.where(lower, new, at_right), np.where(lower, at_left, new)
-    return angle(a + (b - a) / 2)
+    return lowest(angle, a, b)[1]

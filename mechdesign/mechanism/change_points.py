@@ -6,13 +6,14 @@ goes on smoothly, which means that the group's assembly mode changes its sign.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.golden import lowest
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.plan import Plan
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 TOUCHING = 1e-10
 # Closures are looked at this often in a turn of the drive, or in the mechanism's size of a slide's travel.
 SAMPLES = 720
-HALVINGS = 60
-GOLDEN = (np.sqrt(5) - 1) / 2
 
 Array = NDArray[np.float64]
 
@@ -32,15 +31,6 @@ def closing_groups(groups: Sequence[Group]) -> list[int]:
     """Index of the group of each closure of a configuration."""
     counts = {"two angles": 2, "angle and fixed slide": 1, "angle and turning slide": 1}
     return [index for index, group in enumerate(groups) for _ in range(counts.get(group.form, 0))]
-
-
-def lowest(function: Callable[[Array], Array], begin: Array, end: Array) -> tuple[Array, Array]:
-    """Places and values of the smallest values between `begin` and `end`, one a lane, by golden section."""
-    for _ in range(HALVINGS):
-        left, right = end - GOLDEN * (end - begin), begin + GOLDEN * (end - begin)
-        lower = function(left) < function(right)
-        begin, end = np.where(lower, begin, left), np.where(lower, right, end)
-    return begin, function(begin)
 
 
 class ChangePoints:

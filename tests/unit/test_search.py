@@ -11,7 +11,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.cube import from_cube
 from mechdesign.analyses.explorer import Explorer, Spent
-from mechdesign.analyses.search import minimise, sample, search
+from mechdesign.analyses.search import descend, evolve, sample, search
 from mechdesign.errors import AssemblyError, StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -56,7 +56,9 @@ def least(function, dimensions, margins=None, seed=0):
     known = explorer(function, dimensions, margins)
     rng = np.random.default_rng(seed)
     known(sample(dimensions, rng, 16 * (dimensions + 1), 1000))
-    row = minimise(known, lambda values: values[:, 0], rng)
+    evolve(known, lambda values: values[:, 0], rng)
+    descend(known, [lambda values: values[:, 0]])
+    row = int(np.argmin(known.known.merit(lambda values: values[:, 0])))
     return known.known.u[row], known.known.values[row, 0]
 
 
