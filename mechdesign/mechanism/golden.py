@@ -21,7 +21,7 @@ def lowest(function: Callable[[Array], Array], low: Array, high: Array) -> tuple
     Parameters
     ----------
     function : callable
-        Values, shape (n,), of all functions at places of shape (n,); nan does not count as small.
+        Values, shape (n,), of all functions at places of shape (n,), never nan.
     low, high : ndarray, shape (n,)
         Brackets in which each function falls and then rises.
     """
