@@ -13,10 +13,10 @@ from mechdesign.analyses.loops import loop_tables
 from mechdesign.analyses.motion import Asked, Motion, asked, characteristic_length, entry, move
 from mechdesign.analyses.motion_limits import motion_limits
 from mechdesign.analyses.poses import judge_failures, pose_in_words
-from mechdesign.analyses.rates import STALLED
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study

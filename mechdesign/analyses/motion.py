@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from mechdesign.analyses.continuity import continuous
 from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
 from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, radians, solve_poses
-from mechdesign.analyses.rates import STALLED, DriveRates, inverse_rates
+from mechdesign.analyses.rates import DriveRates, inverse_rates
 from mechdesign.analyses.smoothing import through_change_points
 from mechdesign.analyses.targets import Error, errors, needed
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import Linearization, regularity
+from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second

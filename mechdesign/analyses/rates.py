@@ -12,13 +12,10 @@ from mechdesign.analyses.jacobians import determinant, jacobian
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.outputs import second
 
 Array = NDArray[np.float64]
-
-# At a dead centre the angle between links is known to the root of rounding only; below this sine it is at one.
-STALLED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)

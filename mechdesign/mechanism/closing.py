@@ -12,11 +12,11 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, cross, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import regularity
+from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.redundancy import owners_of
-from mechdesign.mechanism.rigidity import CLOSED, SINGULAR, Vector
+from mechdesign.mechanism.rigidity import CLOSED, Vector
 from mechdesign.mechanism.sketch import KEY
 from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Group
@@ -68,7 +68,7 @@ def check_regular(mechanism: Mechanism, configuration: Configuration) -> None:
     MechanismError
         If the mechanism is over-constrained and has more freedom than drives.
     """
-    if not mechanism.forward.iterative or regularity(mechanism.linearize(configuration)) > SINGULAR:
+    if not mechanism.forward.iterative or regularity(mechanism.linearize(configuration)) > STALLED:
         return
     equations, count = mechanism.equations, len(mechanism.drives)
     nodes = np.array([complex(node) for node in configuration.nodes])

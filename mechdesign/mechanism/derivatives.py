@@ -34,6 +34,10 @@ from mechdesign.mechanism.rates import Rates
 from mechdesign.mechanism.state import State, columns, scalars
 from mechdesign.mechanism.structure import Group, Structure
 
+# Below this regularity a pose is at a singularity: at a dead centre the angle between links is known to the root of
+# rounding only, and rounding shows in all rates.
+STALLED = 1e-6
+
 
 class Linearization:
     """The loop equations of the drives' groups at a configuration, ready to be solved for any right-hand side."""

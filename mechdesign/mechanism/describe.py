@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import assemblies
-from mechdesign.mechanism.derivatives import regularity
+from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.four_bars import describe_loops
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Term
 from mechdesign.mechanism.naming import group_in_words, placed_before
-from mechdesign.mechanism.rigidity import SINGULAR
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.mechanism import Mechanism
@@ -74,7 +73,7 @@ def report(mechanism: Mechanism) -> str:
     lines += [f"measure: {_measure(measure)}" for measure in description.measures.values()]
     lines += [f"limit: {_limit(mechanism, limit)}" for limit in description.limits]
     near = float(regularity(mechanism.linearize(mechanism.sketch_configuration)))
-    if near < SINGULAR:
+    if near < STALLED:
         lines.append(
             f"warning: the sketch is at a singular position (regularity {near:.1g} of 1): its drives hold the links "
             "hardly or not at all there, and rates there mean nothing"

@@ -30,8 +30,6 @@ Vector = NDArray[np.float64]
 RANK = 1e-7
 # What closes to this fraction of the mechanism's size is assembled.
 CLOSED = 1e-9
-# Below this regularity (for two links that meet, the sine of the angle between them) rounding shows in all rates.
-SINGULAR = 1e-6
 # A step along the null space (radians, or fractions of the size), and the part of it by which a real motion is told.
 STEP, KEPT = 0.05, 0.3
 # Directions and starts that are tried: deterministic, and enough that chance leaves none out.

@@ -22,7 +22,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.continuation import unknowns_of
 from mechdesign.mechanism.newton import equations, set_unknowns
 from mechdesign.mechanism.solve import run
-from mechdesign.mechanism.state import State, start_state
+from mechdesign.mechanism.state import Guess, State, start_state
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.plan import Plan
@@ -57,7 +57,7 @@ def turning_point(
     scale = 1.0 if angles else plan.mechanism.size
     found = []
     for index in guess:
-        fold = _Fold(plan, given, k, near, index)
+        fold = _Fold(plan, given, k, near, guess, index)
         solution = fold.solve(scale)
         if solution is not None:
             found.append((abs(solution[0] - given[k]), index, solution))
@@ -69,11 +69,13 @@ def turning_point(
 
 
 class _Fold:
-    def __init__(self, plan: Plan, given: Sequence[float], k: int, near: Configuration, index: int) -> None:
+    def __init__(
+        self, plan: Plan, given: Sequence[float], k: int, near: Configuration, guess: Guess, index: int
+    ) -> None:  # fmt: skip
         self.plan, self.given, self.k, self.near, self.index = plan, list(given), k, near, index
         self.group = plan.structure.groups[index]
-        self.guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides, near.nodes)
-        angles, slides = self.guess[index]
+        self.guess = guess
+        angles, slides = guess[index]
         self.start = np.array([*map(float, angles), *map(float, slides)])
         size = plan.mechanism.size
         self.weights = np.array([1.0] * len(angles) + [size] * len(slides))

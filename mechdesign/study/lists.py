@@ -12,7 +12,6 @@ from mechdesign.study.numbers import (
     CoordinateName,
     Number,
     OrShort,
-    Pure,
 )
 
 
@@ -28,4 +27,3 @@ CoordinateNames = Annotated[tuple[CoordinateName, ...], BeforeValidator(one_or_m
 
 
 Numbers = Annotated[tuple[Number, ...], BeforeValidator(as_list), OrShort((NUMBER_FORM,))]
-Weights = Annotated[tuple[Pure, ...], OrShort(({"type": "object", "additionalProperties": NUMBER_FORM},))]

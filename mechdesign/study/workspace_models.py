@@ -6,17 +6,15 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from mechdesign.study.lists import as_list
+from mechdesign.study.lists import Numbers, as_list
 from mechdesign.study.models import Model
 from mechdesign.study.numbers import (
-    NUMBER_FORM,
     Angle,
     Choice,
     CoordinateName,
     Length,
     NonNegativeAngle,
     Number,
-    OrShort,
     PointName,
     Positive,
     PositiveLength,
@@ -67,8 +65,7 @@ def _form(raw: Any) -> str:
     return "over" if isinstance(raw, dict | Over) else "values"
 
 
-Values = Annotated[tuple[Number, ...], BeforeValidator(as_list), OrShort((NUMBER_FORM,))]
-At = Annotated[Annotated[Over, Tag("over")] | Annotated[Values, Tag("values")], Discriminator(_form)]
+At = Annotated[Annotated[Over, Tag("over")] | Annotated[Numbers, Tag("values")], Discriminator(_form)]
 
 
 class WorkspaceSection(Model):
