@@ -13,11 +13,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.kinematics import kinematics
-    from mechdesign.analyses.optimize import optimize
-    from mechdesign.analyses.reliability import reliability
-    from mechdesign.analyses.stiffness import stiffness
-    from mechdesign.analyses.workspace import workspace
+    from mechdesign.analyses.kinematics.analysis import kinematics
+    from mechdesign.analyses.optimize.analysis import optimize
+    from mechdesign.analyses.reliability.analysis import reliability
+    from mechdesign.analyses.stiffness.analysis import stiffness
+    from mechdesign.analyses.workspace.analysis import workspace
     from mechdesign.errors import AssemblyError, MechdesignError, StudyError
     from mechdesign.study import load
 
@@ -40,12 +40,12 @@ _HOMES = {
     "AssemblyError": "mechdesign.errors",
     "MechdesignError": "mechdesign.errors",
     "StudyError": "mechdesign.errors",
-    "kinematics": "mechdesign.analyses.kinematics",
+    "kinematics": "mechdesign.analyses.kinematics.analysis",
     "load": "mechdesign.study",
-    "optimize": "mechdesign.analyses.optimize",
-    "reliability": "mechdesign.analyses.reliability",
-    "stiffness": "mechdesign.analyses.stiffness",
-    "workspace": "mechdesign.analyses.workspace",
+    "optimize": "mechdesign.analyses.optimize.analysis",
+    "reliability": "mechdesign.analyses.reliability.analysis",
+    "stiffness": "mechdesign.analyses.stiffness.analysis",
+    "workspace": "mechdesign.analyses.workspace.analysis",
 }
 
 

@@ -93,7 +93,7 @@ class Study:
     @cached_property
     def _nodes(self) -> poses.Poses:
         # Here, for these poses are themselves the answer to a question.
-        from mechdesign.analyses.nodes import workspace_nodes
+        from mechdesign.analyses.workspace.nodes import workspace_nodes
 
         return workspace_nodes(self)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.goals import Evaluator, goal
+from mechdesign.analyses.optimize.goals import Evaluator, goal
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # A coupler point is to follow a rounded triangle, with a point every five degrees of the crank.

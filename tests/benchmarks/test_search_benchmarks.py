@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.goals import Evaluator
-from mechdesign.analyses.objectives import goal
+from mechdesign.analyses.optimize.goals import Evaluator
+from mechdesign.analyses.optimize.objectives import goal
 
 STUDY = Path(__file__).parent / "three_variables.yaml"
 INDICES = ("GII", "GRI", "SUI")

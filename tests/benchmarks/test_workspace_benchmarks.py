@@ -14,7 +14,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region import BRISK, answer, questions
+from mechdesign.analyses.workspace.region import BRISK, answer, questions
 
 STUDY = Path(__file__).parents[2] / "configs" / "two_rrr.yaml"
 DESIGNS = 4556

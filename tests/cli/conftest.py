@@ -53,7 +53,7 @@ def analysis(monkeypatch):
     """Put a function in place of a command's analysis; it gets (study, **options)."""
 
     def install(function, command="kinematics"):
-        module = ModuleType(f"mechdesign.analyses.{command}")
+        module = ModuleType(f"mechdesign.analyses.{command}.analysis")
         setattr(module, command, function)
         figures = ModuleType(f"mechdesign.report.figures.{command}")
         figures.figures = lambda study, result: {}

@@ -6,8 +6,8 @@ import numpy as np
 
 import mechdesign
 from helpers.studies import study_of
-from mechdesign.analyses.legs import Leg
-from mechdesign.analyses.stiffness import ask
+from mechdesign.analyses.stiffness.analysis import ask
+from mechdesign.analyses.stiffness.legs import Leg
 from mechdesign.results import Result
 
 METRES = "units: {length: m, angle: deg, time: s, force: N}\n"

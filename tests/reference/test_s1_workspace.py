@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.region import BRISK, CLOSE, answer, questions
-from mechdesign.analyses.rules import Rule
+from mechdesign.analyses.workspace.region import BRISK, CLOSE, answer, questions
+from mechdesign.analyses.workspace.rules import Rule
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 

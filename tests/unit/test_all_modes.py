@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics import kinematics
+from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.errors import StudyError
 
 FOUR_BAR = """

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics import kinematics
+from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.mechanism.four_bars import FourBar, describe_loops, four_bars
 from mechdesign.results import Result
 

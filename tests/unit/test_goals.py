@@ -10,7 +10,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.goals import Evaluator, Goal, goal
+from mechdesign.analyses.optimize.goals import Evaluator, Goal, goal
 from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.study import Study
 from mechdesign.study.optimize_models import Condition
@@ -338,7 +338,7 @@ def test_designs_that_make_no_mechanism_are_told_and_leave_the_others_alone() ->
     ],
 )
 def test_names_that_no_result_has_are_told_before_anything_is_computed(goals: str, message: str) -> None:
-    from mechdesign.analyses.goals import bounds_of
+    from mechdesign.analyses.optimize.goals import bounds_of
 
     study = study_of(SLIDE + f"optimize: {{variables: {{r: {{from: 0, to: 1, number: 2}}}}, {goals}}}")
     section = study.optimize
@@ -365,7 +365,7 @@ def test_a_wrong_name_is_told_with_its_place_in_the_file(tmp_path: Path) -> None
 
 
 def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    from mechdesign.analyses import stacked
+    from mechdesign.analyses.optimize import stacked
 
     study = varied("gallery/four_bar.yaml", ["crank.length", "coupler.C.x"])
     goals = [goal("kinematics.extremes.C.y.range"), goal("kinematics.C.x")]
@@ -378,7 +378,7 @@ def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_conditions_with_rows() -> None:
-    from mechdesign.analyses.goals import bounds_of
+    from mechdesign.analyses.optimize.goals import bounds_of
 
     condition = Condition.model_validate(
         {"result": "kinematics.extremes.max", "where": {"output": "P.x"}, "at_most": 3}

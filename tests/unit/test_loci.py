@@ -9,7 +9,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.contours import joined, zero_curves
+from mechdesign.analyses.workspace.contours import joined, zero_curves
 from mechdesign.results import Table
 
 FIVE_BAR = """

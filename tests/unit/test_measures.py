@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics import kinematics
-from mechdesign.analyses.reliability import reliability
-from mechdesign.analyses.stiffness import stiffness
-from mechdesign.analyses.workspace import workspace
+from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.analyses.reliability.analysis import reliability
+from mechdesign.analyses.stiffness.analysis import stiffness
+from mechdesign.analyses.workspace.analysis import workspace
 from mechdesign.report.requirements import judge
 
 ARM = """

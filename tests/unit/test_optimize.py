@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.designs import best, grid, normalised
+from mechdesign.analyses.optimize.designs import best, grid, normalised
 from mechdesign.errors import AssemblyError, StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"

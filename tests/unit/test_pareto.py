@@ -7,9 +7,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.explorer import Explorer
-from mechdesign.analyses.pareto import crowding, evolve, front, knee
-from mechdesign.analyses.search import sample
+from mechdesign.analyses.optimize.explorer import Explorer
+from mechdesign.analyses.optimize.pareto import crowding, evolve, front, knee
+from mechdesign.analyses.optimize.search import sample
 
 # x = r1 cos 30 + r2 cos 60 is small and y = r1 sin 30 + r2 sin 60 large: first r2 grows, then r1.
 ARM = """\

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, owens_t
 
-from mechdesign.analyses.error_limits import Band, Disc, correlation
-from mechdesign.analyses.probability import (
+from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
+from mechdesign.analyses.reliability.probability import (
     binomial_interval,
     disc_failure,
     failure_probability,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechdesign.analyses.sampling import PIN_VARIANCE, deviations, generator, pins
+from mechdesign.analyses.reliability.sampling import PIN_VARIANCE, deviations, generator, pins
 
 SAMPLES = 400_000
 

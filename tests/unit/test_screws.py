@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechdesign.analyses.compliance import Held, hold
-from mechdesign.analyses.screws import (
+from mechdesign.analyses.stiffness.compliance import Held, hold
+from mechdesign.analyses.stiffness.screws import (
     Chain,
     constraint_compliance,
     equivalent_springs,

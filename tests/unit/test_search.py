@@ -9,9 +9,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.cube import from_cube
-from mechdesign.analyses.explorer import Explorer, Spent
-from mechdesign.analyses.search import descend, evolve, sample, search
+from mechdesign.analyses.optimize.cube import from_cube
+from mechdesign.analyses.optimize.explorer import Explorer, Spent
+from mechdesign.analyses.optimize.search import descend, evolve, sample, search
 from mechdesign.errors import AssemblyError, StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"

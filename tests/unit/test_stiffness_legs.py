@@ -21,7 +21,7 @@ from helpers.stiffness import (
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.legs import Beam, Guide, Hinge
+from mechdesign.analyses.stiffness.legs import Beam, Guide, Hinge
 
 
 def test_two_link_legs_on_a_platform() -> None:

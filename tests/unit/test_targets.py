@@ -9,9 +9,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.kinematics import kinematics
-from mechdesign.analyses.optimize import optimize
-from mechdesign.analyses.targets import nearest
+from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.analyses.kinematics.targets import nearest
+from mechdesign.analyses.optimize.analysis import optimize
 from mechdesign.errors import StudyError
 from mechdesign.results import Table
 

@@ -10,8 +10,8 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.indices import OF_JACOBIAN, prepare
-from mechdesign.analyses.region import BRISK, answer, questions
+from mechdesign.analyses.workspace.indices import OF_JACOBIAN, prepare
+from mechdesign.analyses.workspace.region import BRISK, answer, questions
 from mechdesign.errors import StudyError
 from mechdesign.study import Study
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.goals import goal
-from mechdesign.analyses.workspace import workspace
+from mechdesign.analyses.optimize.goals import goal
+from mechdesign.analyses.workspace.analysis import workspace
 from mechdesign.report.figures.designs import Designs
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.paths import paths_figure

@@ -8,7 +8,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words, solve_poses
-from mechdesign.analyses.stiffness import ask, evaluate
+from mechdesign.analyses.stiffness.analysis import ask, evaluate
 from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import name_labels, obstacles

@@ -1,0 +1,195 @@
+"""How does it move? Positions, velocities, accelerations, Jacobians, drive efforts, extremes and limits of motion."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from mechdesign.analyses.kinematics import targets
+from mechdesign.analyses.kinematics.extremes import extremes
+from mechdesign.analyses.kinematics.loops import loop_tables
+from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry, move
+from mechdesign.analyses.kinematics.motion_limits import motion_limits
+from mechdesign.analyses.poses import judge_failures, pose_in_words
+from mechdesign.errors import Problem, StudyError
+from mechdesign.mechanism.assemblies import assemblies
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.progress import NULL, Progress
+from mechdesign.results import Column, Result, Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+# Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
+SINGULAR = 1e-8
+
+
+def kinematics(
+    study: Study,
+    *,
+    seed: int | None = None,
+    jobs: int | None = 1,
+    progress: Progress = NULL,
+    all_modes: bool = False,
+) -> Result:
+    """Solve every pose of the study's kinematics.
+
+    Parameters
+    ----------
+    study : Study
+    seed, jobs : ignored
+        Kinematics draws no random numbers and is fast enough on one thread.
+    all_modes : bool
+        Whether to follow every other assembly of the same links as well.
+
+    Returns
+    -------
+    Result
+        Tables ``motion``, ``extremes``; for a sweep of one coordinate ``limits``; ``loops`` and ``toggles`` of
+        four-bars and slider-cranks; ``targets`` where there are some;
+        ``jacobian`` where the study lists as many outputs as drives; ``modes`` with `all_modes`.
+
+    Raises
+    ------
+    AssemblyError
+        If no pose at all can be assembled.
+    MechanismError
+        If a pose's coordinates do not determine the mechanism, or an output does not exist.
+    StudyError
+        If all modes are asked of poses that give different coordinates.
+    """
+    question = asked(study)
+    poses = question.poses
+    if all_modes and len(poses.groups) > 1:
+        message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
+        raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
+    progress.start(poses.count, "poses")
+    motion = move(question, progress)
+    warnings, failed = judge_failures(study, poses, motion.reason)
+    warnings += _conditioning(motion) + _stalled(motion) + targets.gaps(study, motion.errors, poses, motion.valid)
+    tables = {"motion": motion_table(motion), "extremes": extremes_table(motion)}
+    swept, limits = swept_of(poses), None
+    if swept is not None:
+        group, reason = poses.groups[0], motion.reason
+        limits = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
+        tables["limits"] = limits.table
+        warnings += limits.warnings
+    tables |= loop_tables(study, poses, limits)
+    if motion.errors:
+        tables["targets"] = targets_table(motion)
+    if question.square:
+        tables["jacobian"] = jacobian_table(motion)
+    counts = {"poses": poses.count, "invalid": int(np.count_nonzero(motion.reason))}
+    if all_modes:
+        tables["modes"], told, counts["modes"] = _modes(question, motion)
+        warnings += told
+    return Result("kinematics", tables, warnings, counts, failed)
+
+
+def _modes(question: Asked, drawn: Motion) -> tuple[Table, list[str], int]:
+    """The motion of every assembly, the sketch's first; what is to be said of each; and how many they are."""
+    study, poses = question.study, question.poses
+    found = assemblies(study.mechanism, poses.groups[0].names)
+    labels: list[str] = []
+    parts: list[Sequence[Column]] = []
+    warnings = []
+    for assembly in sorted(found, key=lambda assembly: not assembly.drawn):
+        motion = drawn if assembly.drawn else move(asked(dataclasses.replace(study, mechanism=assembly.mechanism)))
+        labels += [assembly.label] * poses.count
+        parts.append(motion.columns())
+        bad = int(np.count_nonzero(motion.reason))
+        if bad:
+            told = "no pose is" if bad == poses.count else f"{bad} of {poses.count} poses are not"
+            warnings.append(f"mode {assembly.label}: {told} valid")
+    columns = [Column("mode", np.array(labels), "", "assembly: the joints that choose it and their sides")]
+    for same in zip(*parts, strict=True):
+        columns.append(dataclasses.replace(same[0], values=np.concatenate([column.values for column in same])))
+    return Table("modes", tuple(columns), "the motion of every assembly mode"), warnings, len(parts)
+
+
+def swept_of(poses: Poses) -> str | None:
+    """The one coordinate that moves along a sweep; None of listed poses, and where several do."""
+    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
+    return moving[0] if not poses.listed and len(moving) == 1 else None
+
+
+def motion_table(motion: Motion) -> Table:
+    """Every pose with all outputs."""
+    return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
+
+
+def extremes_table(motion: Motion, names: Collection[str] | None = None) -> Table:
+    """Smallest and largest values, exact for some outputs or all; see `kinematics.extremes.extremes`."""
+    question, poses = motion.asked, motion.asked.poses
+    swept = swept_of(poses)
+    return extremes(question.study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason, names)
+
+
+def targets_table(motion: Motion) -> Table:
+    """Errors against the targets."""
+    poses = motion.asked.poses
+    return targets.table(motion.asked.study, motion.errors, poses, swept_of(poses), motion.valid)
+
+
+def jacobian_table(motion: Motion) -> Table:
+    """Every entry of the Jacobian, a row a pose."""
+    question = motion.asked
+    columns = motion.pose_columns()
+    for output in question.listed:
+        for drive in question.drives:
+            name = entry(output, drive)
+            meaning = f"derivative of {output.name} by {drive.name}, angles in radians"
+            columns.append(Column(name, motion.arrays[name], _per(question.study, output, drive), meaning))
+    columns.append(Column("valid", motion.valid, meaning="1 where the pose is assembled and within its limits"))
+    return Table("jacobian", tuple(columns), "derivatives of the listed outputs by the drives, per radian")
+
+
+def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
+    """Unit of a derivative; angles in radians whatever the study's unit."""
+    above, below = (
+        {"length": study.units.label("length"), "angle": "rad"}.get(c.quantity, "") for c in (output, drive)
+    )  # fmt: skip
+    if above == below:
+        return ""
+    return f"{above or '1'}/{below}" if below else above
+
+
+def _conditioning(motion: Motion) -> list[str]:
+    if "inverse_condition" not in motion.arrays:
+        return []
+    values = motion.arrays["inverse_condition"]
+    regular = motion.valid & (motion.arrays["conditioning"] >= STALLED)
+    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.asked.study) is None:
+        return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
+    near = regular & ~(values >= SINGULAR)
+    if near.any():
+        count = np.count_nonzero(near)
+        poses = "1 pose is" if count == 1 else f"{count} poses are"
+        return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"]
+    return []
+
+
+def _stalled(motion: Motion) -> list[str]:
+    study, poses = motion.asked.study, motion.asked.poses
+    stalled = motion.valid & ~motion.smooth & ~(motion.arrays["conditioning"] >= STALLED)
+    warnings = []
+    rows = np.flatnonzero(stalled)
+    if len(rows):
+        lie = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
+        warnings.append(
+            f"{lie} at a dead centre or change point, where the drives do not move the mechanism in one way "
+            f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
+            f"nothing there; the first: {pose_in_words(study, poses, rows[0])}"
+        )
+    if motion.asked.of_given:
+        rates = motion.arrays[f"{study.mechanism.drives[0]}_velocity"]
+        rows = np.flatnonzero(motion.valid & ~stalled & np.isnan(rates))
+        if len(rows):
+            lie = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
+            warnings.append(
+                f"{lie} where no drive rates give what is asked: the drives cannot move it in every direction; rates "
+                f"are nan there; the first: {pose_in_words(study, poses, rows[0])}"
+            )
+    return warnings

@@ -1,0 +1,300 @@
+"""One motion of a mechanism: every pose of its kinematics solved, and the columns that say how it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
+from mechdesign.analyses.kinematics.continuity import continuous
+from mechdesign.analyses.kinematics.rates import DriveRates, inverse_rates
+from mechdesign.analyses.kinematics.smoothing import through_change_points
+from mechdesign.analyses.kinematics.targets import Error, errors, needed
+from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, radians, solve_poses
+from mechdesign.mechanism import Mechanism, Reason
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Quantity
+from mechdesign.mechanism.outputs import first, second
+from mechdesign.progress import NULL, Progress
+from mechdesign.results import Column
+from mechdesign.study import Poses, Study
+from mechdesign.study.sections import KinematicsSection
+
+Array = NDArray[np.float64]
+
+
+def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
+    """Every moving point, link and slide."""
+    graph = mechanism.graph
+    still = {point for body, point in graph.points if body == GROUND}
+    points = [point for point in mechanism.points if point not in still]
+    moving = [name for name in mechanism.description.links if name != GROUND and graph.bodies[name][0] != 0]
+    slides = [f"{name}.{'length' if k in graph.telescopic else 'slide'}" for k, name in enumerate(graph.slides)]
+    return (*points, *(f"{link}.angle" for link in moving), *slides)
+
+
+def characteristic_length(study: Study) -> float | None:
+    """Length that turns angles into lengths, from the section of kinematics or workspace."""
+    for section in (study.kinematics, study.workspace):
+        if section is not None and section.characteristic_length is not None:
+            return section.characteristic_length
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a study asks of every pose.
+
+    Parameters
+    ----------
+    poses : Poses
+        Of kinematics.
+    outputs : list of Coordinate
+        Those of the tables: the listed ones, then those that have a target and are not listed.
+    listed : list of Coordinate
+        Those that the Jacobian is of.
+    square : bool
+        Whether the study lists as many outputs as drives.
+    watched : list of Coordinate
+        All whose values are needed: drives, outputs, and what targets depend on.
+    of_given : bool
+        Whether rates and accelerations are those of the given coordinates rather than of the drives.
+    """
+
+    study: Study
+    section: KinematicsSection
+    poses: Poses
+    outputs: list[Coordinate]
+    listed: list[Coordinate]
+    square: bool
+    watched: list[Coordinate]
+    of_given: bool
+
+    @property
+    def drives(self) -> list[Coordinate]:
+        """The mechanism's drives."""
+        return [self.study.mechanism.coordinate(name) for name in self.study.mechanism.drives]
+
+
+def asked(study: Study) -> Asked:
+    """Read a study's questions about its motion.
+
+    Raises
+    ------
+    MechanismError
+        If an output does not exist.
+    StudyError
+        If no poses are given and none can be assumed.
+    """
+    section = study.kinematics or KinematicsSection()
+    mechanism, poses = study.mechanism, study.poses("kinematics")
+    listed = expand_outputs(study, section.outputs or default_outputs(mechanism))
+    shown = {output.name: output for output in listed}
+    for target in study.targets.values():
+        shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
+    names = dict.fromkeys([*mechanism.drives, *shown, *needed(study, poses)])
+    rates = {*section.rates, *section.accelerations}
+    return Asked(
+        study,
+        section,
+        poses,
+        list(shown.values()),
+        listed,
+        section.outputs is not None and len(listed) == len(mechanism.drives),
+        [mechanism.coordinate(name) for name in names],
+        not rates <= set(mechanism.drives),
+    )
+
+
+@dataclass
+class Motion:
+    """The solved poses of one assembly; `arrays` holds every column but those of the poses, nan where it has no value.
+
+    Parameters
+    ----------
+    reason : int8 array, shape (poses,)
+        See `mechdesign.mechanism.Reason`.
+    errors : list of Error
+        Of the targets.
+    smooth : bool array, shape (poses,)
+        Poses at a change point whose values are those of the motion that goes through it.
+    """
+
+    asked: Asked
+    arrays: dict[str, Array] = field(default_factory=dict)
+    reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
+    errors: list[Error] = field(default_factory=list)
+    smooth: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Whether each pose is assembled and within its limits."""
+        return np.equal(self.reason, 0)
+
+    def put(self, name: str, rows: NDArray[np.intp], values: object) -> None:
+        """Set some rows of a column."""
+        if name not in self.arrays:
+            self.arrays[name] = np.full(self.asked.poses.count, np.nan)
+        self.arrays[name][rows] = np.broadcast_to(np.asarray(values, dtype=float), rows.shape)
+
+    def fill(self, solved: SolvedPoses) -> None:
+        """Take up poses that give the same coordinates."""
+        study, rows, configuration = self.asked.study, solved.rows, solved.configuration
+        self.reason[rows] = configuration.reason
+        values = dict(zip(study.mechanism.drives, solved.drives, strict=True))
+        for coordinate in self.asked.watched:
+            if coordinate.name in solved.given:
+                # As the study gives it, not there and back through radians; also where the pose fails.
+                self.put(coordinate.name, rows, self.asked.poses.values[coordinate.name][rows])
+            else:
+                value = values.get(coordinate.name)
+                value = configuration.value(coordinate) if value is None else value
+                self.put(coordinate.name, rows, in_study_units(study, coordinate, value))
+        linear = study.mechanism.linearize(configuration)
+        assembled = configuration.valid | np.equal(configuration.reason, int(Reason.LIMIT))
+        conditioning = np.where(assembled, regularity(linear), np.nan)
+        self.put("conditioning", rows, conditioning)
+        regular = conditioning >= STALLED
+        if self.asked.section.rates or self.asked.section.accelerations:
+            self._rates(linear, solved, regular)
+        if self.asked.square or self.asked.section.loads:
+            self._statics(linear, rows, regular)
+
+    def _drive_rates(self, linear: Linearization, given: tuple[str, ...]) -> DriveRates:
+        study, section = self.asked.study, self.asked.section
+        names = given if self.asked.of_given else study.mechanism.drives
+        coordinates = [study.mechanism.coordinate(name) for name in names]
+        speeds, bends = (
+            [radians(study, c, known.get(c.name, 0.0)) for c in coordinates]
+            for known in (section.rates, section.accelerations)
+        )
+        if self.asked.of_given:
+            return inverse_rates(study.mechanism, linear, coordinates, speeds, bends)
+        return DriveRates(speeds, bends)
+
+    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: NDArray[np.bool_]) -> None:
+        drives = self._drive_rates(linear, solved.given)
+        velocity = linear.velocity(drives.velocities)
+        acceleration = linear.acceleration(velocity, drives.accelerations)
+        configuration = linear.configuration
+        found = {o.name: o for o in [*(self.asked.drives if self.asked.of_given else []), *self.asked.outputs]}
+        for output in found.values():
+            for order, value in (
+                ("velocity", first(configuration, output, velocity)),
+                ("acceleration", second(configuration, output, velocity, acceleration)),
+            ):
+                value = np.where(regular, in_study_units(self.asked.study, output, value), np.nan)
+                self.put(f"{output.name}_{order}", solved.rows, value)
+
+    def _statics(self, linear: Linearization, rows: NDArray[np.intp], regular: NDArray[np.bool_]) -> None:
+        mechanism, configuration = self.asked.study.mechanism, linear.configuration
+        rates, drives = linear.drives(), self.asked.drives
+        if self.asked.square:
+            matrix = np.where(regular[:, None, None], jacobian(linear, rates, self.asked.listed), np.nan)
+            for i, output in enumerate(self.asked.listed):
+                for j, drive in enumerate(drives):
+                    self.put(entry(output, drive), rows, matrix[:, i, j])
+            self.put("det_J", rows, determinant(matrix))
+            if mixes(self.asked.listed, drives):
+                length = characteristic_length(self.asked.study)
+                matrix = homogeneous(matrix, self.asked.listed, drives, np.nan if length is None else length)
+            self.put("inverse_condition", rows, inverse_condition(matrix))
+        if self.asked.section.loads:
+            work = np.zeros((len(drives), *configuration.shape))
+            for load in self.asked.section.loads:
+                if load.at is not None and load.force is not None:
+                    for axis, force in zip("xy", load.force, strict=True):
+                        work = work + force * first(configuration, mechanism.coordinate(f"{load.at}.{axis}"), rates)
+                if load.link is not None and load.moment is not None:
+                    work = work + load.moment * first(configuration, mechanism.coordinate(f"{load.link}.angle"), rates)
+            for drive, effort in zip(drives, work, strict=True):
+                self.put(f"{drive.name}_effort", rows, np.where(regular, -effort, np.nan))
+
+    def columns(self) -> list[Column]:
+        """The columns of the motion table, `valid` last."""
+        asked, arrays, label = self.asked, self.arrays, self.asked.study.units.label
+        shown = {output.name: output for output in asked.outputs}
+        drives = {drive.name: drive for drive in asked.drives}
+        columns = [column for column in self.pose_columns() if column.name in drives or column.name not in shown]
+        for name, output in ((drives if asked.of_given else {}) | shown).items():
+            if name not in drives:
+                columns.append(Column(name, arrays[name], label(output.quantity), f"value of {name}"))
+            for order in ("velocity", "acceleration"):
+                rate = f"{name}_{order}"
+                if rate in arrays:
+                    kind = _RATES[output.quantity, order]
+                    columns.append(Column(rate, arrays[rate], label(kind), f"{order} of {name}"))
+            point, _, axis = name.rpartition(".")
+            columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
+        for name, meaning in (
+            ("det_J", "determinant of the Jacobian, outputs by drives, per radian"),
+            ("inverse_condition", "smallest over largest singular value of the Jacobian"),
+            ("conditioning", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the angle "
+             "between two links that meet"),
+        ):  # fmt: skip
+            if name in arrays:
+                columns.append(Column(name, arrays[name], "", meaning))
+        for drive in asked.drives:
+            name = f"{drive.name}_effort"
+            if name in arrays:
+                unit = label("moment" if drive.quantity == "angle" else "force")
+                columns.append(Column(name, arrays[name], unit, "drive effort that balances the loads"))
+        columns.append(Column("valid", self.valid, meaning="1 where the pose is assembled and within its limits"))
+        return columns
+
+    def pose_columns(self) -> list[Column]:
+        """The drives, and the coordinates that the study gives."""
+        asked, units = self.asked, self.asked.study.units
+        columns = [Column(c.name, self.arrays[c.name], units.label(c.quantity), "drive") for c in asked.drives]
+        named = {column.name for column in columns}
+        for column in pose_columns(asked.study, asked.poses):
+            if column.name not in named:
+                columns.append(replace(column, values=self.arrays.get(column.name, column.values)))
+        return columns
+
+    def _error(self, error: Error) -> Column:
+        study = self.asked.study
+        far = error.output in study.mechanism.points
+        meaning = f"distance of {error.output} from its target" if far else f"{error.output} less its target"
+        return Column(error.name, error.values, study.units.label(error.quantity), meaning)
+
+
+_RATES: Mapping[tuple[Quantity, str], str] = {
+    ("length", "velocity"): "velocity",
+    ("length", "acceleration"): "acceleration",
+    ("angle", "velocity"): "angular_velocity",
+    ("angle", "acceleration"): "angular_acceleration",
+    ("none", "velocity"): "none",
+    ("none", "acceleration"): "none",
+}
+
+
+def entry(output: Coordinate, drive: Coordinate) -> str:
+    """Name of an entry of the Jacobian: ``C.x_by_theta``."""
+    return f"{output.name}_by_{drive.name}"
+
+
+def move(question: Asked, progress: Progress = NULL) -> Motion:
+    """Solve every pose; one that fails is nan, with its reason.
+
+    Raises
+    ------
+    MechanismError
+        If a pose's coordinates do not determine the mechanism.
+    """
+    study, poses = question.study, question.poses
+    motion = Motion(question, reason=np.zeros(poses.count, dtype=np.int8))
+    for solved in solve_poses(study, poses):
+        motion.fill(solved)
+        progress.update(len(solved.rows))
+    through_change_points(motion)
+    if not poses.listed:
+        turning = [c for c in question.watched if c.quantity == "angle" and c.name not in poses.names]
+        motion.arrays |= continuous(study, poses, turning, motion.arrays)
+    motion.errors = list(errors(study, poses, motion.arrays, np.arange(poses.count)))
+    return motion

@@ -1,0 +1,61 @@
+"""Poses at a change point that a motion follows: their values from the poses on both sides.
+
+Where two assemblies meet, the equations of the velocities have no one solution, and those of the positions half of the
+digits; but the motion that is followed is smooth there. With S_k = f(k h) + f(-k h) from both sides
+
+    f(0) = (15 S_1 - 6 S_2 + S_3) / 20  + O(h^6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechdesign.analyses.poses import in_study_units, solve_poses
+from mechdesign.study.poses import PoseGroup, Poses
+
+if TYPE_CHECKING:
+    from mechdesign.analyses.kinematics.motion import Motion
+
+# Poses with a conditioning below this have lost digits.
+NEAR = 1e-3
+# h: radians, or parts of the mechanism's size. What the formula leaves out is about 1e-12, what accelerations lose of
+# their digits this near to a change point about 1e-10.
+DISTANCE = 1e-2
+STEPS = DISTANCE * np.array([-3, -2, -1, 1, 2, 3])
+WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
+
+
+def through_change_points(motion: Motion) -> None:
+    """Set the columns of a motion at its change points, where the study follows them; note which in `smooth`."""
+    question = motion.asked
+    study, group = question.study, question.poses.groups[0]
+    plan = study.mechanism.plan(group.names)
+    motion.smooth = np.zeros(question.poses.count, dtype=bool)
+    if plan.change_points is None or len(question.poses.groups) > 1:
+        return
+    rows = np.flatnonzero(motion.valid & (motion.arrays["conditioning"] < NEAR))
+    if not len(rows):
+        return
+    (name,) = group.names
+    coordinate = plan.structure.given[0]
+    scale = 1.0 if coordinate.quantity == "angle" else study.mechanism.size
+    steps = in_study_units(study, coordinate, scale * STEPS)
+    values = (group.values[name][rows][:, None] + steps).ravel()
+    beside = Poses((PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),))
+    around = type(motion)(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
+    for solved in solve_poses(study, beside):
+        around.fill(solved)
+    angles = {c.name for c in question.watched if c.quantity == "angle"}
+    turn = 2 * np.pi / study.units.angle_factor
+    good = around.valid.reshape(-1, len(STEPS)).all(axis=1)
+    for column, array in motion.arrays.items():
+        if column in (name, "conditioning"):
+            continue
+        table = around.arrays[column].reshape(-1, len(STEPS))
+        if column in angles:
+            table = np.unwrap(table, period=turn, axis=1)
+        array[rows[good]] = (table @ WEIGHTS)[good]
+    motion.smooth[rows[good]] = True

@@ -1,0 +1,291 @@
+"""Goals of designs: one evaluation for every question, of thousands of designs at once wherever that is possible."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.optimize import stacked
+from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal
+from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.analyses.workspace.region import BRISK, GRID_TOLERANCE, Question, answer, questions, split
+from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
+from mechdesign.expressions import Number
+from mechdesign.results import Result
+from mechdesign.rows import UnknownColumnError, choose
+from mechdesign.study import Study
+from mechdesign.study.variants import faults, follows, variant
+
+EMPTY = "nothing of the workspace can be reached"
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
+# By `mechdesign.mechanism.Reason`.
+FAILED = (
+    "",
+    "a pose cannot be assembled",
+    "a pose is reached in another assembly only",
+    "a pose is outside the limits",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """Values of goals for a batch of designs; nan where there is none, and why."""
+
+    values: dict[Goal, Floats]
+    errors: dict[str, Floats]
+    reasons: list[str]
+
+
+class Evaluator:
+    """Evaluates goals for designs of one study, which differ in parameters or single places.
+
+    Three ways lead to the same numbers: the workspaces of all designs, and the tables of all designs, are computed
+    together; what is left is asked of each design by a variant of the study.
+
+    Raises
+    ------
+    StudyError
+        If a goal names what no result has, or the study lacks what it needs.
+    """
+
+    def __init__(self, study: Study, goals: Sequence[Goal]) -> None:
+        assert study.optimize is not None
+        self.study = study
+        self.goals = list(dict.fromkeys(goals))
+        self.question: Question | None = None
+        self._columns = tuple(dict.fromkeys(("area", *(g.column for g in self.goals if g.regional))))
+        names = study.optimize.variables
+        if any(each.regional for each in self.goals):
+            asked = questions(study, GRID_TOLERANCE, self._columns)
+            if len(asked) > 1:
+                message = "an optimisation compares one workspace a design: hold one value of each coordinate"
+                raise StudyError([study.problem(message, "workspace", "at")])
+            if all(each.index for each in self.goals if each.regional) and not follows(study, names, ("workspace",)):
+                self.question = asked[0]
+        # Goals of commands and tables whose answers are found for all designs at once; the others.
+        self._together: dict[str, dict[str, list[Goal]]] = {}
+        self._alone: dict[str, list[Goal]] = {}
+        # Outputs whose extremes are asked.
+        self._outputs: set[str] = set()
+        problems = [problem for command in self._commands() for problem in self._look(command)]
+        if problems:
+            raise StudyError(problems)
+
+    def _commands(self) -> list[str]:
+        return list(dict.fromkeys(each.command for each in self.goals if not each.regional))
+
+    def _look(self, command: str) -> Iterator[Problem]:
+        """Find the tables of a command's goals, before anything is computed but the study's own design."""
+        goals = [each for each in self.goals if each.command == command and not each.regional]
+        if command == "optimize":
+            yield self.study.problem("an optimisation cannot judge itself", *self._key(goals[0]))
+            return
+        assert self.study.optimize is not None
+        if command in stacked.TABLES:
+            result = stacked.tables(self.study, command, stacked.TABLES[command], 1, {}, {}).result
+            together = stacked.possible(self.study, command, self.study.optimize.variables)
+            for each in list(goals):
+                try:
+                    chosen = choose(result, each.column, dict(each.where))
+                except UnknownColumnError:
+                    continue
+                goals.remove(each)
+                table = chosen.table.name
+                if table == "extremes":
+                    self._outputs.update(chosen.table["output"][chosen.counts].tolist())
+                if together:
+                    self._together.setdefault(command, {}).setdefault(table, []).append(each)
+                else:
+                    self._alone.setdefault(command, []).append(each)
+        if not goals:
+            return
+        self._alone.setdefault(command, []).extend(goals)
+        try:
+            result = _ask(_quick(self.study), command)
+        except AssemblyError:
+            # The study's own design has no such result; others tell.
+            return
+        for each in goals:
+            try:
+                each.worst(result)
+            except UnknownColumnError as error:
+                yield self.study.problem(str(error), *self._key(each))
+
+    def _key(self, wanted: Goal) -> tuple[str | int, ...]:
+        """Where the study names a goal."""
+        section = self.study.optimize
+        assert section is not None
+        for key, names in (("maximize", section.maximize), ("minimize", section.minimize)):
+            for index, name in enumerate(names):
+                if goal(name, smallest=key == "minimize") == wanted:
+                    return "optimize", key, index
+        for index, condition in enumerate(section.subject_to):
+            if any(judged == wanted for judged, _, _ in bounds_of(condition)):
+                return "optimize", "subject_to", index
+        return ("optimize",)
+
+    def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
+        """Evaluate a batch of designs, given by the values of the variables in the study's units."""
+        count = len(next(iter(designs.values())))
+        batch = _Batch(self.study, designs, count, self.goals)
+        if self.question is not None:
+            self._workspaces(batch, np.flatnonzero(batch.feasible))
+        for command, tables in self._together.items():
+            rows, size = np.flatnonzero(batch.feasible), stacked.size(self.study, command)
+            for begin in range(0, len(rows), size):
+                self._tables(batch, command, tables, rows[begin : begin + size])
+        alone = bool(self._alone) or (self.question is None and any(each.regional for each in self.goals))
+        for k in np.flatnonzero(batch.feasible).tolist():
+            if alone or k in batch.left:
+                batch.reasons[k] = self._one(batch, k)
+        return Evaluated(batch.values, batch.errors, [str(reason) for reason in batch.reasons])
+
+    def _workspaces(self, batch: _Batch, rows: NDArray[np.intp]) -> None:
+        if not len(rows):
+            return
+        assert self.question is not None
+        try:
+            self._regional(batch, rows, self.question, batch.take(batch.places, rows))
+        except AssemblyError as error:
+            # One design's workspace has no end; the others are still to be told.
+            if len(rows) == 1:
+                batch.reasons[rows] = _plainly(error)
+                return
+            for half in np.array_split(rows, 2):
+                self._workspaces(batch, half)
+
+    def _regional(self, batch: _Batch, rows: NDArray[np.intp], question: Question, places: dict[str, Floats]) -> None:
+        given = answer(question, places, len(rows), BRISK)
+        for each in self.goals:
+            if each.regional:
+                batch.values[each][rows] = given.values[each.column]
+                if split(each.column)[1] == "mean":
+                    batch.errors.setdefault(each.name, np.full(len(batch.reasons), np.nan))[rows] = given.errors[
+                        each.column
+                    ]
+        batch.reasons[rows[~(given.panels.closes & (given.values["area"] > 0))]] = EMPTY
+
+    def _tables(
+        self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: NDArray[np.intp]
+    ) -> None:
+        places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
+        stack = stacked.tables(self.study, command, tables.keys(), len(rows), places, parameters, self._outputs)
+        failed = FAILED_ARRAY[_first(stack.reason)]
+        wrong = stack.reason != 0
+        batch.note(rows, wrong.any(axis=1) if stack.listed else wrong.all(axis=1), failed)
+        for table, goals in tables.items():
+            left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
+            for each in goals:
+                values = each.worst(stack.result, len(rows))
+                batch.values[each][rows] = values
+                lost = np.isnan(values) & ~left
+                batch.note(rows, lost, np.where(failed == "", f"{each.name} has no value", failed))
+            for k in rows[left].tolist():
+                batch.left.setdefault(k, {}).setdefault(command, []).extend(goals)
+
+    def _one(self, batch: _Batch, k: int) -> str:
+        """Ask what is left of one design; returns why it is infeasible."""
+        row = np.array([k])
+        command = ""
+        try:
+            other = variant(self.study, {name: float(column[k]) for name, column in batch.designs.items()})
+            if self.question is None and any(each.regional for each in self.goals):
+                self._regional(batch, row, questions(other, GRID_TOLERANCE, self._columns)[0], {})
+                if batch.reasons[k]:
+                    return str(batch.reasons[k])
+            left = batch.left.get(k, {})
+            for command in dict.fromkeys((*self._alone, *left)):
+                result = _ask(other, command)
+                if result.failed:
+                    return _pose_reason(other, command)
+                for each in (*self._alone.get(command, ()), *left.get(command, ())):
+                    batch.values[each][k] = each.worst(result)[0]
+                    if np.isnan(batch.values[each][k]):
+                        return _pose_reason(other, command) or f"{each.name} has no value"
+        except UnknownColumnError as error:
+            return str(error)
+        except AssemblyError as error:
+            return (_pose_reason(other, command) if command else "") or _plainly(error)
+        except MechdesignError as error:
+            return _plainly(error)
+        return ""
+
+
+class _Batch:
+    """Designs of one call, and what is found of them."""
+
+    def __init__(self, study: Study, designs: Mapping[str, Floats], count: int, goals: Sequence[Goal]) -> None:
+        self.designs = {name: np.broadcast_to(np.asarray(v, dtype=float), count) for name, v in designs.items()}
+        values = study.parameters.values(self.designs)
+        self.parameters = {name: value for name, value in values.items() if np.ndim(value)}
+        self.places = study.parameters.places(self.designs)
+        self.values: dict[Goal, Floats] = {each: np.full(count, np.nan) for each in goals}
+        self.errors: dict[str, Floats] = {}
+        # What is still to be asked of single designs, by their row and by command.
+        self.left: dict[int, dict[str, list[Goal]]] = {}
+        self.reasons = np.array(faults(study, self.parameters, self.places, count), dtype=object)
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Designs that nothing is said against."""
+        return np.asarray(self.reasons == "", dtype=bool)
+
+    def take(self, values: Mapping[str, Number], rows: NDArray[np.intp]) -> dict[str, Floats]:
+        """Values of some designs."""
+        return {
+            name: np.broadcast_to(np.asarray(value, dtype=float), len(self.reasons))[rows]
+            for name, value in values.items()
+        }
+
+    def note(self, rows: NDArray[np.intp], wrong: NDArray[np.bool_], reasons: NDArray[np.object_]) -> None:
+        """Say what is wrong with some of the rows, where nothing has been said yet."""
+        new = wrong & (self.reasons[rows] == "")
+        self.reasons[rows[new]] = reasons[new]
+
+
+FAILED_ARRAY = np.array(FAILED, dtype=object)
+
+
+def _first(reason: NDArray[np.int8]) -> NDArray[np.intp]:
+    """The first reason of each design's poses, shape (designs,); 0 where none fails."""
+    worst = np.where(reason == 0, len(FAILED), reason).min(axis=1, initial=len(FAILED))
+    return np.where(worst == len(FAILED), 0, worst).astype(np.intp)
+
+
+def _pose_reason(study: Study, command: str) -> str:
+    """Why poses of a command fail; empty where none does, or where it is not asked of poses."""
+    if command == "workspace":
+        return EMPTY
+    found = [solved.configuration.reason for solved in solve_poses(study, study.poses(command))]
+    return FAILED[int(_first(np.concatenate(found)[None])[0])]
+
+
+def _ask(study: Study, command: str) -> Result:
+    result: Result = getattr(import_module(f"mechdesign.analyses.{command}.analysis"), command)(study)
+    return result
+
+
+def _quick(study: Study) -> Study:
+    """The study with as few samples as there may be, where only the names of columns are asked."""
+    section = study.reliability
+    few = None if section is None else section.model_copy(update={"samples": 2})
+    return dataclasses.replace(study, reliability=few)
+
+
+def _plainly(error: MechdesignError) -> str:
+    """An error without its numbers and the file's name, so that designs with one mistake count together."""
+    text = str(error).splitlines()[0]
+    if isinstance(error, StudyError):
+        first = error.problems[0]
+        text = ": ".join(part for part in (first.key, first.message) if part)
+    return NUMBER.sub("...", text)
+
+
+__all__ = ["Evaluated", "Evaluator", "Goal", "bounds_of", "goal"]

@@ -1,0 +1,92 @@
+"""Results by which designs are compared, by name: an index of the workspace, or the worst row of any column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.workspace.region import COLUMNS, batched, split
+from mechdesign.results import Result
+from mechdesign.rows import choose, worst
+from mechdesign.study.optimize_models import Condition
+from mechdesign.study.sections import COMMANDS
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A result that is maximised, minimised or bounded: an index of the workspace, or the worst row of a column.
+
+    Parameters
+    ----------
+    name : str
+        As the study gives it; of a condition with its bound.
+    command, column : str
+        Where it is found; the column as `mechdesign.rows.choose` understands it.
+    smallest : bool
+        Whether the largest row is the worst one.
+    absolute : bool
+        Judge absolute values.
+    where : tuple of (str, object)
+        Only rows whose columns have these values count.
+    """
+
+    name: str
+    command: str
+    column: str
+    smallest: bool = False
+    absolute: bool = False
+    where: tuple[tuple[str, object], ...] = ()
+
+    @property
+    def regional(self) -> bool:
+        """Whether it is a number of the whole workspace."""
+        found = self.column in COLUMNS or bool(split(self.column)[0])
+        return self.command == "workspace" and found and not self.where
+
+    @property
+    def index(self) -> bool:
+        """Whether it is an index of the workspace that is evaluated for many designs at once."""
+        return self.regional and batched(self.column)
+
+    def worst(self, result: Result, designs: int = 1) -> NDArray[np.float64]:
+        """The value of each design's worst row; nan where none counts or one has no value.
+
+        Parameters
+        ----------
+        result : Result
+            Of several designs, as many rows of each, one design after the other.
+
+        Raises
+        ------
+        UnknownColumnError
+            If the result has no such column.
+        """
+        chosen = choose(result, self.column, dict(self.where), absolute=self.absolute)
+        shape = designs, len(chosen.values) // designs
+        return worst(chosen.values.reshape(shape), chosen.counts.reshape(shape), largest=self.smallest)
+
+
+def goal(name: str, *, smallest: bool = False) -> Goal:
+    """Read a result's name, such as ``GII``, ``stiffness.k_min``, ``kinematics.extremes.C.x.range``.
+
+    Of an error the absolute value counts.
+    """
+    command, column = _parts(name)
+    return Goal(name, command, column, smallest, absolute=column.endswith("_error"))
+
+
+def bounds_of(condition: Condition) -> Iterator[tuple[Goal, float, bool]]:
+    """The worst rows that a condition judges, with the bound and whether it is an upper one."""
+    command, column = _parts(condition.result)
+    for bound, upper in ((condition.at_least, False), (condition.at_most, True)):
+        if bound is not None:
+            name = f"{condition.result} {'at most' if upper else 'at least'} {bound:g}"
+            yield Goal(name, command, column, upper, condition.abs, tuple(condition.where.items())), bound, upper
+
+
+def _parts(name: str) -> tuple[str, str]:
+    command, _, column = name.partition(".")
+    return (command, column) if command in COMMANDS else ("workspace", name)

@@ -1,0 +1,293 @@
+"""How precise is it when it is made? Error moments, reliability and contributions, analytically and by simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.kinematics.continuity import continuous
+from mechdesign.analyses.kinematics.motion import default_outputs
+from mechdesign.analyses.poses import expand_outputs, judge_failures, radians, solve_poses
+from mechdesign.analyses.reliability import tables
+from mechdesign.analyses.reliability.assembly import forward_plan
+from mechdesign.analyses.reliability.error_limits import Band, Disc
+from mechdesign.analyses.reliability.first_order import Channel, FirstOrder, Rates, linear_errors, nominal_values
+from mechdesign.analyses.reliability.simulation import Setting, Sums, simulate
+from mechdesign.analyses.reliability.sources import Source, find_sources
+from mechdesign.errors import StudyError
+from mechdesign.mechanism import Configuration, Reason
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.memory import keep_freed_memory
+from mechdesign.progress import NULL, Progress
+from mechdesign.results import Result, Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+from mechdesign.study.reliability_models import ReliabilitySection
+
+Floats = NDArray[np.float64]
+
+# Poses whose sensitivities are computed together.
+_BLOCK = 2048
+# Listed poses that get a density of their own.
+_DENSITIES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked: channels (outputs by order), and the limits on them.
+
+    Parameters
+    ----------
+    orders : int
+        1 where positions are asked only, 3 with velocities and accelerations.
+    channels : tuple of Channel
+        Outputs, order by order: all positions first.
+    pair : (int, int) or None
+        The two limited channels, where there are just two; without limits, the two outputs.
+    """
+
+    outputs: tuple[Coordinate, ...]
+    orders: int
+    channels: tuple[Channel, ...]
+    rates: Rates
+    bands: tuple[Band, ...]
+    discs: tuple[Disc, ...]
+    pair: tuple[int, int] | None
+
+    @property
+    def limited(self) -> bool:
+        """Whether a reliability is asked."""
+        return bool(self.bands or self.discs)
+
+
+def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
+    """Errors of a study's outputs from its tolerances and clearances.
+
+    Parameters
+    ----------
+    study : Study
+    seed : int, optional
+        In place of the study's.
+    jobs : int or None
+        Threads; the result does not depend on it.
+
+    Returns
+    -------
+    Result
+        Tables ``moments``, ``reliability`` (where there are limits), ``contributions``, ``density`` and
+        ``convergence``.
+
+    Raises
+    ------
+    StudyError
+        If nothing varies.
+    AssemblyError
+        If no pose at all can be assembled.
+    """
+    keep_freed_memory()
+    sources, warnings = find_sources(study)
+    section = study.reliability
+    assert section is not None
+    question = ask(study, section)
+    poses = study.poses("reliability")
+    nominal = NominalPoses.solve(study, poses, question)
+    failures, failed = judge_failures(study, poses, nominal.reason)
+    linear = first_order(study, nominal, question, sources.first_order()) if "analytic" in section.methods else None
+    sums: list[Sums | None] = [None] * poses.count
+    if "monte_carlo" in section.methods:
+        settings = _settings(study, nominal, question, linear, poses.listed)
+        progress.start(len(settings) * section.samples, "samples")
+        chosen = study.seed if seed is None else seed
+        simulated = simulate(settings, sources, chosen, section.samples, jobs, progress)
+        for setting, found in zip(settings, simulated, strict=True):
+            sums[setting.pose] = found
+    centres = _in_order(study, poses, question, nominal)
+    answer = tables.Answer(study, poses, question, section.methods, nominal.reason, centres, linear, sums)
+    counts = {"poses": poses.count}
+    if "monte_carlo" in section.methods:
+        done = [found for found in sums if found is not None]
+        counts["samples"] = sum(found.samples for found in done)
+        counts["invalid"] = sum(found.samples - found.valid for found in done)
+        if counts["invalid"]:
+            failures.append(
+                f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
+            )
+    return Result("reliability", tables.build(answer), [*warnings, *failures], counts, failed)
+
+
+def first_order_tables(
+    study: Study, poses: Poses, wanted: Collection[str]
+) -> tuple[dict[str, Table], NDArray[np.int8]]:
+    """Wanted tables of the first-order analysis at poses, perhaps of several designs, and why poses fail.
+
+    Raises
+    ------
+    StudyError
+        If nothing varies.
+    """
+    sources, _ = find_sources(study)
+    section = study.reliability
+    assert section is not None
+    question = ask(study, section)
+    nominal = NominalPoses.solve(study, poses, question)
+    linear = first_order(study, nominal, question, sources.first_order())
+    centres = _in_order(study, poses, question, nominal)
+    none: list[Sums | None] = [None] * poses.count
+    answer = tables.Answer(study, poses, question, ("analytic",), nominal.reason, centres, linear, none)
+    made = {"moments": tables.moments, "contributions": tables.contributions}
+    if question.limited:
+        made["reliability"] = tables.success
+    return {name: make(answer) for name, make in made.items() if name in wanted}, nominal.reason
+
+
+def ask(study: Study, section: ReliabilitySection) -> Question:
+    """Channels and limits of a section; limited coordinates are outputs too."""
+    mechanism = study.mechanism
+    limited = [f"{name}.{axis}" if limit.radius is not None else name
+               for name, limit in section.limits.items()
+               for axis in ("xy" if limit.radius is not None else "x")]  # fmt: skip
+    names = section.outputs or (() if limited else default_outputs(mechanism))
+    outputs = expand_outputs(study, tuple(names))
+    known = [output.name for output in outputs]
+    outputs += expand_outputs(study, tuple(dict.fromkeys(name for name in limited if name not in known)))
+    known = [output.name for output in outputs]
+    for name in section.rates | section.accelerations:
+        if name not in mechanism.drives:
+            raise StudyError(
+                f"reliability.rates: '{name}' is not a drive; the drives are {', '.join(mechanism.drives)}"
+            )
+    rates = Rates(*(
+        tuple(float(radians(study, mechanism.coordinate(name), given.get(name, 0.0))) for name in mechanism.drives)
+        for given in (section.rates, section.accelerations)
+    ))  # fmt: skip
+    orders = 3 if section.rates or section.accelerations else 1
+    bands, discs = [], []
+    for name, limit in section.limits.items():
+        if limit.radius is not None:
+            discs.append(Disc(known.index(f"{name}.x"), known.index(f"{name}.y"), limit.radius))
+        else:
+            low, high = (
+                float(radians(study, mechanism.coordinate(name), value)) if value is not None else bound
+                for value, bound in ((limit.min, -np.inf), (limit.max, np.inf))
+            )
+            bands.append(Band(known.index(name), low, high))
+    pair: tuple[int, int] | None = None
+    if len(bands) == 2 and not discs:
+        pair = (bands[0].output, bands[1].output)
+    elif len(discs) == 1 and not bands:
+        pair = (discs[0].x, discs[0].y)
+    elif not limited and len(outputs) == 2:
+        pair = (0, 1)
+    channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
+    return Question(tuple(outputs), orders, channels, rates, tuple(bands), tuple(discs), pair)
+
+
+@dataclass(frozen=True, eq=False)
+class NominalPoses:
+    """The nominal mechanism at every pose.
+
+    Parameters
+    ----------
+    reason : int8 array, shape (poses,)
+    groups : tuple
+        Per group of poses that give the same coordinates: rows, configuration, drives (n, drives), whether the
+        drives were given.
+    values : ndarray, shape (channels, poses)
+        Radians and lengths.
+    """
+
+    reason: NDArray[np.int8]
+    groups: tuple[tuple[NDArray[np.intp], Configuration, Floats, bool], ...]
+    values: Floats
+
+    @staticmethod
+    def solve(study: Study, poses: Poses, question: Question) -> NominalPoses:
+        reason = np.zeros(poses.count, dtype=np.int8)
+        values = np.full((len(question.channels), poses.count), np.nan)
+        groups = []
+        for solved in solve_poses(study, poses):
+            configuration = solved.configuration
+            reason[solved.rows] = configuration.reason
+            found = nominal_values(study.mechanism, configuration, question.channels, question.rates)
+            for row, value in zip(values, found, strict=True):
+                row[solved.rows] = value
+            drives = np.stack([np.broadcast_to(d, configuration.shape) for d in solved.drives], axis=-1)
+            groups.append((solved.rows, configuration, drives, set(solved.given) == set(study.mechanism.drives)))
+        return NominalPoses(reason, tuple(groups), values)
+
+    @property
+    def assembled(self) -> NDArray[np.bool_]:
+        """Poses that can be computed, those outside the limits of motion included."""
+        return np.isin(self.reason, (Reason.OK, Reason.LIMIT))
+
+
+def first_order(study: Study, nominal: NominalPoses, question: Question, sources: tuple[Source, ...]) -> FirstOrder:
+    """Linear error model at every pose; nan where the pose is not assembled."""
+    parts: FirstOrder | None = None
+    components = np.zeros((len(question.channels), 0, 0))
+    for rows, configuration, _, _ in nominal.groups:
+        for begin in range(0, len(rows), _BLOCK):
+            block = np.arange(begin, min(begin + _BLOCK, len(rows)))
+            with np.errstate(invalid="ignore", divide="ignore"):
+                parts = linear_errors(
+                    study.mechanism, configuration.take(block), question.channels, sources, question.rates
+                )
+            if not components.size:
+                components = np.full((*parts.components.shape[:2], len(nominal.reason)), np.nan)
+            components[:, :, rows[block]] = parts.components
+    assert parts is not None
+    components[:, :, ~nominal.assembled] = np.nan
+    return FirstOrder(sources, components, parts.owner, parts.variance)
+
+
+def _settings(
+    study: Study, nominal: NominalPoses, question: Question, linear: FirstOrder | None, listed: bool
+) -> list[Setting]:
+    mechanism = study.mechanism
+    sigma = None if linear is None else np.sqrt(np.einsum("czp,z->cp", linear.components**2, linear.variance))
+    assembled = np.flatnonzero(nominal.assembled)
+    settings = []
+    for rows, configuration, drives, given in nominal.groups:
+        for k, row in enumerate(rows):
+            if not nominal.assembled[row]:
+                continue
+            pose = configuration.take(k)
+            scale = None
+            if question.pair is not None and sigma is not None and listed and row in assembled[:_DENSITIES]:
+                one, two = (float(sigma[channel, row]) for channel in question.pair)
+                scale = (one, two) if one > 0 and two > 0 else None
+            settings.append(
+                Setting(
+                    int(row),
+                    mechanism.forward if given else forward_plan(mechanism, pose),
+                    pose,
+                    drives[k].tolist(),
+                    question.channels,
+                    nominal.values[:, row].tolist(),
+                    question.rates,
+                    question.bands,
+                    question.discs,
+                    question.pair,
+                    scale,
+                    bool(row == assembled[0]),
+                )
+            )
+    return sorted(settings, key=lambda setting: setting.pose)
+
+
+def _in_order(study: Study, poses: Poses, question: Question, nominal: NominalPoses) -> Floats:
+    """Nominal values in study units, shape (channels, poses); angles without jumps along a sweep."""
+    values = nominal.values.copy()
+    for row, channel in zip(values, question.channels, strict=True):
+        if channel.coordinate.quantity == "angle":
+            row /= study.units.angle_factor
+    if not poses.listed:
+        turning = {c.coordinate.name: (row, c.coordinate) for row, c in zip(values, question.channels, strict=True)
+                   if c.order == 0 and c.coordinate.quantity == "angle"}  # fmt: skip
+        rows = {name: row for name, (row, _) in turning.items()}
+        for name, row in continuous(study, poses, [c for _, c in turning.values()], rows).items():
+            rows[name][:] = row
+    return values

@@ -1,0 +1,148 @@
+"""Errors to the first order: sensitivities of position, velocity and acceleration, and what follows [S2, S3].
+
+Var(output) = sum over sources of (d output / d source)^2 Var(source)          [S3, eqs. 12-14]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.reliability.sources import Source
+from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
+
+Floats = NDArray[np.float64]
+ORDERS = ("position", "velocity", "acceleration")
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One quantity whose error is asked: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
+
+    coordinate: Coordinate
+    order: int
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Rates and accelerations of the drives (radians and lengths per time)."""
+
+    velocity: tuple[float, ...]
+    acceleration: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FirstOrder:
+    """Linear error model at a batch of poses.
+
+    Parameters
+    ----------
+    components : ndarray, shape (channels, components, poses)
+        Derivative of each channel (radians, lengths) by each independent component of the sources.
+    owner : ndarray of int, shape (components,)
+        The source of each component.
+    variance : ndarray, shape (components,)
+    """
+
+    sources: tuple[Source, ...]
+    components: Floats
+    owner: NDArray[np.intp]
+    variance: Floats
+
+    def covariance(self) -> Floats:
+        """Covariance of the channels, shape (poses, channels, channels) [S2, eq. 9]."""
+        moved = np.moveaxis(self.components, 2, 0)
+        return np.asarray((moved * self.variance) @ np.swapaxes(moved, 1, 2))
+
+    def sensitivity(self) -> Floats:
+        """Per source, shape (channels, sources, poses): the derivative, of a pin sqrt(s_x^2 + s_y^2)."""
+        found = np.empty((self.components.shape[0], len(self.sources), self.components.shape[2]))
+        for k in range(len(self.sources)):
+            own = self.components[:, self.owner == k]
+            found[:, k] = own[:, 0] if own.shape[1] == 1 else np.sqrt((own * own).sum(axis=1))
+        return found
+
+    def share(self, sensitivity: Floats) -> Floats:
+        """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies."""
+        parts = sensitivity**2 * np.array([source.variance for source in self.sources])[:, None]
+        total = parts.sum(axis=1, keepdims=True)
+        return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
+
+    def worst_case(self, sensitivity: Floats) -> Floats:
+        """Sum of |sensitivity| times tolerance, shape (channels, poses)."""
+        reach = np.array([source.reach for source in self.sources])
+        return np.asarray(np.einsum("csp,s->cp", np.abs(sensitivity), reach))
+
+
+def nominal_values(
+    mechanism: Mechanism, configuration: Configuration, channels: Sequence[Channel], rates: Rates
+) -> list[Value]:
+    """Values of the channels at solved configurations (radians, lengths)."""
+    if all(channel.order == 0 for channel in channels):
+        return [configuration.value(channel.coordinate) for channel in channels]
+    linear = mechanism.linearize(configuration)
+    velocity = linear.velocity(rates.velocity)
+    bends = any(channel.order == 2 for channel in channels)
+    acceleration = linear.acceleration(velocity, rates.acceleration) if bends else None
+    values = []
+    for channel in channels:
+        if channel.order == 0:
+            values.append(configuration.value(channel.coordinate))
+        elif channel.order == 1:
+            values.append(first(configuration, channel.coordinate, velocity))
+        else:
+            assert acceleration is not None
+            values.append(second(configuration, channel.coordinate, velocity, acceleration))
+    return values
+
+
+def linear_errors(
+    mechanism: Mechanism,
+    configuration: Configuration,
+    channels: Sequence[Channel],
+    sources: tuple[Source, ...],
+    rates: Rates,
+) -> FirstOrder:
+    """Linear error model at a flat batch of nominal configurations, the drives held.
+
+    Raises
+    ------
+    MechanismError
+        For the acceleration of a measure that is an expression.
+    """
+    directions = [(k, direction) for k, source in enumerate(sources) for direction in source.directions]
+    names = list(dict.fromkeys(name for _, direction in directions for name in direction))
+    by_place = np.zeros((len(channels), len(names), *configuration.shape))
+    if names:
+        linear = mechanism.linearize(configuration)
+        position = linear.sensitivity(names)
+        motion: Motion | None = None
+        if any(channel.order for channel in channels):
+            velocity = linear.velocity(rates.velocity)
+            acceleration = linear.acceleration(velocity, rates.acceleration)
+            velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
+            assert acceleration_z is not None
+            motion = Motion(velocity, acceleration, position, velocity_z, acceleration_z)
+        for row, channel in zip(by_place, channels, strict=True):
+            if motion is None or channel.order == 0:
+                row[...] = first(configuration, channel.coordinate, position)
+            elif channel.order == 1:
+                row[...] = velocity_sensitivity(configuration, channel.coordinate, motion)
+            else:
+                row[...] = acceleration_sensitivity(configuration, channel.coordinate, motion)
+    slopes = np.zeros((len(directions), len(names)))
+    for row, (_, direction) in enumerate(directions):
+        for name, slope in direction.items():
+            slopes[row, names.index(name)] = slope
+    return FirstOrder(
+        sources,
+        np.einsum("zn,cnp->czp", slopes, by_place),
+        np.array([k for k, _ in directions], dtype=np.intp),
+        np.array([sources[k].variance for k, _ in directions]),
+    )

@@ -1,0 +1,202 @@
+"""Probabilities of normal errors within limits, and intervals of a simulated one.
+
+All are failure probabilities, summed from positive terms only, so that none loses digits however small it is; the
+reliability is one minus it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaincinv, ndtr, ndtri
+
+from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
+
+Floats = NDArray[np.float64]
+
+# 99.7 %: three standard deviations of a normal estimate [S2, eq. 15].
+CONFIDENCE = 0.997
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+# Beyond this many standard deviations the normal density is zero in double precision.
+_FAR = 39.0
+_LATTICE = 8191
+_SHIFTS = 8
+
+
+def failure_probability(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc]) -> float:
+    """Probability that normal errors of mean zero break any limit.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (outputs, outputs)
+        May be singular.
+    bands, discs
+        All limits must hold. One or two limited outputs are integrated to about 1e-14 of the result; more by a
+        randomised lattice, to about 1e-5 of it.
+    """
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    if not np.isfinite(covariance).all():
+        return float("nan")
+    if len(bands) == 1 and not discs:
+        (band,) = bands
+        return _outside(band.low, band.high, float(sigma[band.output]))
+    if len(bands) == 2 and not discs:
+        one, two = bands
+        return _rectangle(one, two, covariance)
+    if len(discs) == 1 and not bands:
+        (disc,) = discs
+        return disc_failure(covariance[np.ix_([disc.x, disc.y], [disc.x, disc.y])], disc.radius)
+    return _lattice(covariance, bands, discs)
+
+
+def _outside(low: float, high: float, sigma: float) -> float:
+    """P(normal of mean zero outside [low, high])."""
+    if sigma == 0:
+        return 0.0 if low <= 0 <= high else 1.0
+    return float(ndtr(low / sigma) + ndtr(-high / sigma))
+
+
+def _rectangle(one: Band, two: Band, covariance: Floats) -> float:
+    pair = covariance[np.ix_([one.output, two.output], [one.output, two.output])]
+    sigma = np.sqrt(np.diagonal(pair))
+    if not sigma.all():
+        # An error that does not vary keeps its limit or breaks it; the other one decides.
+        parts = [_outside(b.low, b.high, float(s)) for b, s in zip((one, two), sigma, strict=True)]
+        return parts[0] + (1 - parts[0]) * parts[1]
+    lows, highs = np.array([one.low, two.low]) / sigma, np.array([one.high, two.high]) / sigma
+    return rectangle_failure(lows, highs, correlation(pair))
+
+
+def rectangle_failure(low: Floats, high: Floats, rho: float) -> float:
+    """P(standard bivariate normal with correlation `rho` outside the rectangle) [S2, eqs. 10, 11].
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (2,)
+        In standard deviations; may be infinite.
+
+    Notes
+    -----
+    P(x outside) plus the integral over x inside of its density times P(y outside | x), by Gauss-Legendre panels of
+    one standard deviation, refined where y given x crosses a limit within a narrow band (rho near +-1).
+    """
+    if not (low < high).all():
+        return 1.0
+    # Rounding may carry the correlation of one error with itself beyond 1.
+    rest = np.sqrt(max(0.0, (1.0 - rho) * (1.0 + rho)))
+    if rest < 1e-12:
+        # y is x or -x: one error with the tighter of the two limits.
+        other = (low[1], high[1]) if rho > 0 else (-high[1], -low[1])
+        return _outside(max(low[0], other[0]), min(high[0], other[1]), 1.0)
+    begin, end = max(low[0], -_FAR), min(high[0], _FAR)
+    total = _outside(low[0], high[0], 1.0)
+    if begin >= end:
+        return total
+    edges = [np.linspace(begin, end, int(np.ceil(end - begin)) + 1)]
+    width = rest / max(abs(rho), rest)
+    for limit in (low[1], high[1]):
+        if np.isfinite(limit) and width < 0.5:
+            edges.append(limit / rho + width * np.array([-16, -8, -6, -4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8, 16]))
+    joined = np.unique(np.concatenate(edges))
+    x, weight = _panels(joined[(joined >= begin) & (joined <= end)])
+    density = np.exp(-0.5 * x * x) / np.sqrt(2 * np.pi)
+    tails = ndtr((low[1] - rho * x) / rest) + ndtr((rho * x - high[1]) / rest)
+    return float(total + np.sum(weight * density * tails))
+
+
+def disc_failure(covariance: Floats, radius: float) -> float:
+    """P(bivariate normal of mean zero outside a circle about zero); `covariance` of shape (2, 2).
+
+    Notes
+    -----
+    In principal axes with standard deviations a >= b, over x = radius sin t, which removes the root at the rim.
+    """
+    b, a = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 0.0))
+    if radius <= 0 or a == 0:
+        return 0.0 if a == 0 else 1.0
+    total = _outside(-radius, radius, float(a))
+    if b < 1e-12 * a:
+        return total
+    reach = np.arcsin(min(1.0, _FAR * a / radius))
+    # The chance that y is outside falls within b of the rim: panels shrink towards it.
+    near = np.sqrt(np.minimum(1.0, np.array([1e-3, 1e-2, 0.1, 1.0, 4.0, 16.0, 40.0]) * (b / radius)))
+    count = int(np.ceil(reach * radius / a)) + 4
+    edges = np.concatenate([np.linspace(0.0, reach, min(count, 400)), np.arccos(near)])
+    t, weight = _panels(np.unique(edges[(edges >= 0) & (edges <= reach)]))
+    x, height = radius * np.sin(t), radius * np.cos(t)
+    density = np.exp(-0.5 * (x / a) ** 2) / (a * np.sqrt(2 * np.pi))
+    return float(total + 4.0 * np.sum(weight * density * height * ndtr(-height / b)))
+
+
+def _panels(edges: Floats) -> tuple[Floats, Floats]:
+    """Gauss-Legendre nodes and weights over all panels between `edges`."""
+    half = 0.5 * np.diff(edges)[:, None]
+    middle = 0.5 * (edges[1:] + edges[:-1])[:, None]
+    return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
+
+
+def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc]) -> float:
+    """Sequential conditioning (Genz 1992) over a shifted Richtmyer lattice; a disc limits y by the x before it."""
+    order: list[tuple[int, float, float, float]] = [(b.output, b.low, b.high, 0.0) for b in bands]
+    for disc in discs:
+        order += [(disc.x, -disc.radius, disc.radius, 0.0), (disc.y, -disc.radius, disc.radius, disc.radius)]
+    chosen = [output for output, *_ in order]
+    root = _pivot_free_cholesky(covariance[np.ix_(chosen, chosen)])
+    primes = np.array([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71], dtype=float)
+    if len(order) > len(primes):
+        primes = np.arange(2, len(order) + 2) + np.pi
+    rng = np.random.Generator(np.random.SFC64(20))
+    means = []
+    for _ in range(_SHIFTS):
+        shift = rng.random(len(order))
+        steps = np.arange(1, _LATTICE + 1)[:, None] * np.sqrt(primes[: len(order)])
+        points = np.abs(2.0 * np.mod(steps + shift, 1.0) - 1.0)
+        drawn = np.zeros((len(order), _LATTICE))
+        log_success = np.zeros(_LATTICE)
+        before = np.zeros(_LATTICE)
+        for k, (_, low, high, radius) in enumerate(order):
+            mean = root[k, :k] @ drawn[:k]
+            lower, upper = low - mean, high - mean
+            if radius:
+                chord = np.sqrt(np.maximum(radius * radius - before * before, 0.0))
+                lower, upper = -chord - mean, chord - mean
+            if root[k, k] > 0:
+                a, b = ndtr(lower / root[k, k]), ndtr(-upper / root[k, k])
+                log_success += np.log1p(-np.minimum(a + b, 1.0 - 1e-300))
+                drawn[k] = ndtri(np.clip(a + points[:, k] * (1.0 - a - b), 1e-300, 1.0 - 1e-16))
+            else:
+                log_success = np.where((lower <= 0) & (upper >= 0), log_success, -np.inf)
+            before = mean + root[k, k] * drawn[k]
+        means.append(-np.expm1(log_success).mean())
+    return float(np.mean(means))
+
+
+def _pivot_free_cholesky(matrix: Floats) -> Floats:
+    """Lower factor of a positive semidefinite matrix, in its order; a row that depends on others gets a zero pivot."""
+    size = len(matrix)
+    root = np.zeros((size, size))
+    for k in range(size):
+        for j in range(k):
+            if root[j, j] > 0:
+                root[k, j] = (matrix[k, j] - root[k, :j] @ root[j, :j]) / root[j, j]
+        rest = matrix[k, k] - root[k, :k] @ root[k, :k]
+        root[k, k] = np.sqrt(rest) if rest > 1e-12 * matrix[k, k] else 0.0
+    return root
+
+
+def binomial_interval(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Clopper-Pearson interval of the probability of an event that was seen `events` times in `samples`."""
+    if samples == 0:
+        return float("nan"), float("nan")
+    tail = 0.5 * (1.0 - confidence)
+    low = betaincinv(events, samples - events + 1, tail) if events else 0.0
+    high = betaincinv(events + 1, samples - events, 1.0 - tail) if events < samples else 1.0
+    return float(low), float(high)
+
+
+def simulation_error(failure: float, samples: int) -> float:
+    """Error of a simulated reliability at 99.7 %, three standard errors [S2, eq. 16]."""
+    return 3.0 * float(np.sqrt(failure * (1.0 - failure) / samples)) if samples else float("nan")

@@ -1,0 +1,214 @@
+"""Monte Carlo simulation: made mechanisms chunk by chunk, exact kinematics of each, and only sums kept [S2, S3]."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.reliability.error_limits import Band, Disc
+from mechdesign.analyses.reliability.first_order import Channel, Rates, nominal_values
+from mechdesign.analyses.reliability.sampling import CHUNK, generator
+from mechdesign.analyses.reliability.sources import Sources
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import Value, wrap
+from mechdesign.mechanism.plan import Plan
+from mechdesign.parallel import map_chunks
+from mechdesign.progress import Progress
+
+Floats = NDArray[np.float64]
+
+# The density's grid, in standard deviations [S2, Fig. 4], and the chunks it is counted over: a million samples.
+CELLS = 25
+REACH = 3.0
+_DENSITY_CHUNKS = 50
+# The trend of the means is followed in steps of this many samples through the first chunks, then at
+# powers of two.
+_TREND_STEP = 1000
+_TREND_CHUNKS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What to simulate at one pose.
+
+    Parameters
+    ----------
+    pose : int
+        Row of the pose; names its streams.
+    nominal : Configuration
+        Solved pose of the nominal mechanism.
+    drives : sequence of float
+        Values of the drives, which are held (radians, lengths).
+    centres : sequence of float
+        Nominal values of the channels.
+    pair : (int, int) or None
+        Channels whose covariance is wanted.
+    scale : (float, float) or None
+        Standard deviations for the density of the pair; None where no density is wanted.
+    trend : bool
+        Whether to follow the means.
+    """
+
+    pose: int
+    plan: Plan
+    nominal: Configuration
+    drives: Sequence[float]
+    channels: Sequence[Channel]
+    centres: Sequence[float]
+    rates: Rates
+    bands: Sequence[Band]
+    discs: Sequence[Disc]
+    pair: tuple[int, int] | None
+    scale: tuple[float, float] | None
+    trend: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums over samples; they add up chunk by chunk, in order.
+
+    Parameters
+    ----------
+    errors, squares : ndarray, shape (channels,)
+        Of errors about the nominal value, over valid samples: small numbers, so the variance loses no digits.
+    product : float
+        Of the errors of the pair.
+    density : ndarray of int, shape (CELLS * CELLS,) or (0,)
+        Samples in each cell, over `counted` samples.
+    trend : ndarray, shape (steps, 1 + channels)
+        Valid samples and sums of errors after each step, from the begin of the chunk.
+    """
+
+    samples: int
+    valid: int
+    failures: int
+    errors: Floats
+    squares: Floats
+    product: float
+    density: NDArray[np.int64]
+    counted: int
+    trend: Floats
+
+    def __add__(self, other: Sums) -> Sums:
+        offset = np.concatenate([[self.valid], self.errors])
+        return Sums(
+            self.samples + other.samples,
+            self.valid + other.valid,
+            self.failures + other.failures,
+            self.errors + other.errors,
+            self.squares + other.squares,
+            self.product + other.product,
+            self.density + other.density if len(other.density) else self.density,
+            self.counted + other.counted,
+            np.concatenate([self.trend, other.trend + offset]) if len(other.trend) else self.trend,
+        )
+
+
+def simulate(
+    settings: Sequence[Setting], sources: Sources, seed: int, samples: int, jobs: int | None, progress: Progress
+) -> Iterator[Sums]:
+    """Sums of each setting in order; they do not depend on `jobs`."""
+    chunks = -(-samples // CHUNK)
+
+    def tasks() -> Iterable[tuple[Setting, int, int]]:
+        for setting in settings:
+            for chunk in range(chunks):
+                yield setting, chunk, min(CHUNK, samples - chunk * CHUNK)
+
+    def work(task: tuple[Setting, int, int]) -> Sums:
+        setting, chunk, count = task
+        return simulate_chunk(setting, sources, seed, chunk, count)
+
+    total: Sums | None = None
+    done = 0
+    for sums in map_chunks(work, tasks(), jobs):
+        total = sums if total is None else total + sums
+        progress.update(sums.samples)
+        done += 1
+        if done == chunks:
+            yield total
+            total, done = None, 0
+
+
+def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, count: int) -> Sums:
+    """Draw `count` made mechanisms at one pose and sum their errors."""
+    errors, valid = sample_errors(setting, sources, seed, chunk, count)
+    failures = count - _successes(setting, errors, count)
+    kept = int(np.count_nonzero(valid))
+    if kept < count:
+        errors = [error[valid] for error in errors]
+    sums = np.array([error.sum() for error in errors])
+    squares = np.array([(error * error).sum() for error in errors])
+    product = 0.0
+    density = np.zeros(0, dtype=np.int64)
+    if setting.pair is not None:
+        x, y = (errors[k] for k in setting.pair)
+        product = float((x * y).sum())
+        if setting.scale is not None and chunk < _DENSITY_CHUNKS:
+            density = _count_cells(x, y, setting.scale)
+    trend = np.zeros((0, 1 + len(errors)))
+    if setting.trend and kept:
+        if chunk < _TREND_CHUNKS:
+            begins = np.arange(0, kept, _TREND_STEP)
+            steps = [np.minimum(begins + _TREND_STEP, kept).astype(float)]
+            steps += [np.cumsum(np.add.reduceat(error, begins)) for error in errors]
+            trend = np.stack(steps, axis=1)
+        elif chunk.bit_count() == 1:
+            trend = np.concatenate([[kept], sums])[None]
+    return Sums(count, kept, failures, sums, squares, product, density, kept if len(density) else 0, trend)
+
+
+def sample_errors(
+    setting: Setting, sources: Sources, seed: int, chunk: int, count: int
+) -> tuple[list[Floats], NDArray[np.bool_]]:
+    """Errors (value minus nominal) of each channel for the samples of a chunk, and which samples are assembled."""
+    places, deviations = sources.draw(generator(seed, setting.pose, chunk), count)
+    mechanism = setting.plan.mechanism
+    given: list[Value] = [
+        value + deviations[name] if name in deviations else value
+        for name, value in zip(mechanism.drives, setting.drives, strict=True)
+    ]
+    made = setting.plan.solve(given, places, start=setting.nominal, limits=False)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        values = nominal_values(mechanism, made, setting.channels, setting.rates)
+    errors = []
+    for channel, value, centre in zip(setting.channels, values, setting.centres, strict=True):
+        error = np.broadcast_to(value - centre, (count,))
+        if channel.order == 0 and channel.coordinate.quantity == "angle":
+            error = wrap(error)
+        errors.append(error)
+    return errors, np.broadcast_to(made.valid, (count,))
+
+
+def _successes(setting: Setting, errors: Sequence[Floats], count: int) -> int:
+    """Samples that keep every limit; one that is not assembled is nan and keeps none."""
+    if not setting.bands and not setting.discs:
+        return 0
+    kept: NDArray[np.bool_] | None = None
+    with np.errstate(invalid="ignore"):
+        for band in setting.bands:
+            error = errors[band.output]
+            inside = (
+                np.abs(error) <= band.high if band.low == -band.high else (error >= band.low) & (error <= band.high)
+            )
+            kept = inside if kept is None else kept & inside
+        for disc in setting.discs:
+            x, y = errors[disc.x], errors[disc.y]
+            inside = x * x + y * y <= disc.radius * disc.radius
+            kept = inside if kept is None else kept & inside
+    assert kept is not None
+    return int(np.count_nonzero(kept))
+
+
+def _count_cells(x: Floats, y: Floats, scale: tuple[float, float]) -> NDArray[np.int64]:
+    cells = []
+    inside = np.ones(len(x), dtype=bool)
+    for value, sigma in zip((x, y), scale, strict=True):
+        cell = np.floor((value / sigma + REACH) * (CELLS / (2 * REACH)))
+        inside &= (cell >= 0) & (cell < CELLS)
+        cells.append(cell)
+    index = cells[0][inside] * CELLS + cells[1][inside]
+    return np.bincount(index.astype(np.intp), minlength=CELLS * CELLS)

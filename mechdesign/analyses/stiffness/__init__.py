@@ -1,0 +1,1 @@
+"""How stiff is it? Legs, screws and compliance."""

@@ -1,0 +1,71 @@
+"""From a leg of the mechanism and solved poses to the screws of its joints and elastic elements."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.stiffness.legs import Beam, Guide, Leg
+from mechdesign.analyses.stiffness.screws import Array, Chain, hinge_twist, slide_twist
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import Value
+from mechdesign.study.stiffness_models import Profile, StiffnessSection
+
+SHEAR_FACTOR = 5 / 6  # of a rectangle
+
+
+def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration) -> Chain:
+    """A leg's joints and elastic elements in each pose, seen from the asked point."""
+    at = configuration.point(section.at)
+    passive: list[Array] = []
+    elastic: list[Array] = []
+    compliance: list[Value] = []
+    for element in leg.elements:
+        if isinstance(element, Beam):
+            twists, flexible = _beam(element, section.sections[element.section], configuration, at)
+            elastic += twists
+            compliance += flexible
+            continue
+        if isinstance(element, Guide):
+            twist = slide_twist(_slide_direction(element.slide, configuration))
+        else:
+            twist = hinge_twist(configuration.point(element.point) - at)
+        if element.drive is None:
+            passive.append(twist)
+        else:
+            elastic.append(twist)
+            compliance.append(1 / section.actuators[element.drive])
+    return Chain(passive, elastic, compliance, configuration.point(leg.base) - at, configuration.point(leg.tip) - at)
+
+
+def _slide_direction(slide: int, configuration: Configuration) -> NDArray[np.complex128]:
+    k = next(k for k, edge in enumerate(configuration.graph.edges) if edge.slide == slide)
+    direction = configuration.vectors.d[k] * configuration.rotations[configuration.graph.edges[k].frame]
+    return np.broadcast_to(np.asarray(direction, dtype=complex), configuration.shape)
+
+
+def _beam(
+    beam: Beam, profile: Profile, configuration: Configuration, at: NDArray[np.complex128]
+) -> tuple[list[Array], list[Value]]:
+    tail, head = configuration.point(beam.tail), configuration.point(beam.head)
+    span = head - tail
+    length = np.abs(span)
+    if beam.axis is not None:
+        along = configuration.rotation(beam.axis)
+    else:
+        along = np.divide(span, length, out=np.ones(span.shape, dtype=complex), where=length > 0)
+    stretch, bend, shear = rigidities(profile)
+    twists = [slide_twist(along), slide_twist(1j * along), hinge_twist((tail + head) / 2 - at)]
+    return twists, [length / stretch, length**3 / (12 * bend) + length * shear, length / bend]
+
+
+def rigidities(profile: Profile) -> tuple[float, float, float]:
+    """EA, EI and the shear compliance per length (zero unless asked for) of a section; its height lies in the plane."""
+    if profile.width is not None and profile.height is not None:
+        area, inertia = profile.width * profile.height, profile.width * profile.height**3 / 12
+    else:
+        assert profile.area is not None
+        assert profile.inertia is not None
+        area, inertia = profile.area, profile.inertia
+    shear = 1 / (SHEAR_FACTOR * profile.G * area) if profile.shear and profile.G is not None else 0.0
+    return profile.E * area, profile.E * inertia, shear

@@ -1,0 +1,282 @@
+"""From links and joints to serial-chain legs: what carries a wrench from the asked body to the ground.
+
+Bodies are the vertices of a graph and joints its edges. Taking away the ground and the asked body leaves one piece a
+leg; a leg is serial if its piece, without its dangling ends, is a plain path. No names of mechanisms occur: what is not
+such a path is told as such.
+
+[S4, section 2]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
+from mechdesign.errors import Problem, StudyError
+from mechdesign.mechanism.graph import GROUND, rod_of
+from mechdesign.mechanism.mechanism import Mechanism
+from mechdesign.mechanism.model import Description, Link, Term
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A revolute joint at a point; driven if `drive` names a drive."""
+
+    point: str
+    drive: str | None = None
+
+
+@dataclass(frozen=True)
+class Guide:
+    """A slide of the mechanism's graph (its index); driven if `drive` names a drive."""
+
+    slide: int
+    drive: str | None = None
+
+
+@dataclass(frozen=True)
+class Beam:
+    """An elastic beam between two points; along the x axis of `axis` where given, so that no length is too short."""
+
+    tail: str
+    head: str
+    section: str
+    axis: str | None = None
+
+
+Element = Hinge | Guide | Beam
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A serial chain from the ground to the asked body.
+
+    Parameters
+    ----------
+    name : str
+        Its links, from the base, joined by ``+``; that of its joint where it has none.
+    links : tuple of str
+        Links in the chain.
+    drives : tuple of str
+        Drives at its joints.
+    base, tip : str
+        Points of its first and last joint.
+    elements : tuple
+        Joints and beams in order from the base; rigid drives and rigid links are not among them.
+    """
+
+    name: str
+    links: tuple[str, ...]
+    drives: tuple[str, ...]
+    base: str
+    tip: str
+    elements: tuple[Element, ...]
+
+
+def not_serial(message: str) -> StudyError:
+    """The error of every structure that is no set of serial legs."""
+    return StudyError(
+        [Problem(f"{message}; the stiffness of such a mechanism comes with a later release", "stiffness")]
+    )
+
+
+def find_legs(
+    mechanism: Mechanism, link: str | None, at: str, elastic: Mapping[str, str], actuators: Mapping[str, float]
+) -> tuple[Leg, ...]:
+    """Find the legs that carry a body, by structure alone.
+
+    Parameters
+    ----------
+    link : str or None
+        The asked link; None for the pin `at` itself.
+    at : str
+        The asked point.
+    elastic : mapping of str to str
+        Section of each elastic link.
+    actuators : mapping of str to float
+        Stiffness of each compliant drive.
+
+    Raises
+    ------
+    StudyError
+        Where the legs are not serial chains, or what is asked does not move.
+    """
+    description = mechanism.description
+    bodies = build_bodies(mechanism, link, at, elastic)
+    builder = _LegBuilder(mechanism, bodies, elastic, actuators)
+    legs = [builder.build(path) for path in _paths(bodies)]
+    order = {name: k for k, name in enumerate(description.links)}
+    legs.sort(key=lambda leg: min((order[name] for name in leg.links), default=len(order)))
+    _check_drives(description, bodies, legs)
+    return tuple(legs)
+
+
+def _paths(bodies: Bodies) -> Iterator[tuple[list[str], list[Contact]]]:
+    """Per leg, bodies from the ground to the asked body and the contacts between them."""
+    target = bodies.asked
+    contacts = bodies.contacts
+    for contact in contacts:
+        if {contact.a, contact.b} == {GROUND, target}:
+            yield [GROUND, target], [contact]
+    seen: set[str] = set()
+    for root in bodies.names:
+        if root in seen or root in (GROUND, target):
+            continue
+        piece = _piece(root, contacts, target)
+        seen |= piece
+        mine = [c for c in contacts if c.a in piece or c.b in piece]
+        mine = _without_dangling(mine, target)
+        ends = {end for c in mine for end in (c.a, c.b)}
+        if not {GROUND, target} <= ends:
+            continue
+        yield _as_path(mine, target, bodies)
+
+
+def _piece(root: str, contacts: Sequence[Contact], target: str) -> set[str]:
+    """Bodies joined to `root` otherwise than through the ground or the asked body."""
+    piece, stack = {root}, [root]
+    while stack:
+        body = stack.pop()
+        for contact in contacts:
+            if body in (contact.a, contact.b):
+                other = contact.other(body)
+                if other not in piece and other not in (GROUND, target):
+                    piece.add(other)
+                    stack.append(other)
+    return piece
+
+
+def _without_dangling(contacts: list[Contact], target: str) -> list[Contact]:
+    """Contacts that can carry a wrench: bodies held in one place only are taken off, again and again."""
+    while True:
+        degree: dict[str, int] = {}
+        for contact in contacts:
+            for end in (contact.a, contact.b):
+                degree[end] = degree.get(end, 0) + 1
+        loose = {body for body, count in degree.items() if count == 1 and body not in (GROUND, target)}
+        if not loose:
+            return contacts
+        contacts = [c for c in contacts if c.a not in loose and c.b not in loose]
+
+
+def _as_path(contacts: list[Contact], target: str, bodies: Bodies) -> tuple[list[str], list[Contact]]:
+    path, used = [GROUND], list[Contact]()
+    while path[-1] != target:
+        onward = [c for c in contacts if path[-1] in (c.a, c.b) and c not in used]
+        if len(onward) != 1:
+            break
+        used.append(onward[0])
+        path.append(onward[0].other(path[-1]))
+    if path[-1] != target or len(used) != len(contacts):
+        links = sorted({bodies.link_of(end) for c in contacts for end in (c.a, c.b)} - {GROUND, ""})
+        what = f"link '{bodies.link}'" if bodies.link else f"pin '{bodies.at}'"
+        raise not_serial(
+            f"links {', '.join(links)} between the ground and {what} branch or form a loop, so they are no serial chain"
+        )
+    return path, used
+
+
+@dataclass(frozen=True)
+class _LegBuilder:
+    mechanism: Mechanism
+    bodies: Bodies
+    elastic: Mapping[str, str]
+    actuators: Mapping[str, float]
+
+    def build(self, path: tuple[list[str], list[Contact]]) -> Leg:
+        names, contacts = self._without_pins(*path)
+        drives = [self._drive(contact) for contact in contacts]
+        elements: list[Element] = []
+        for k, (contact, drive) in enumerate(zip(contacts, drives, strict=True)):
+            if k:
+                elements += self._beams(names[k], contacts[k - 1], contact)
+            if contact.kind != "clamp" and (drive is None or drive in self.actuators):
+                elements.append(Hinge(contact.point, drive) if contact.slide is None else Guide(contact.slide, drive))
+        links = tuple(dict.fromkeys(filter(None, map(self.bodies.link_of, names[1:]))))
+        if names[-1] != ASKED:
+            links = tuple(link for link in links if link != self.bodies.link)
+        slide = contacts[0].slide
+        joint = contacts[0].point if slide is None else self.mechanism.graph.slides[slide]
+        return Leg(
+            "+".join(links) or joint, links, tuple(filter(None, drives)), contacts[0].point,
+            contacts[-1].point, tuple(elements),
+        )  # fmt: skip
+
+    def _without_pins(self, names: list[str], contacts: list[Contact]) -> tuple[list[str], list[Contact]]:
+        """Join the two contacts of a compound pin, of which only two links carry, into one."""
+        kept, joints = [names[0]], [contacts[0]]
+        for k in range(1, len(names) - 1):
+            if self.bodies.is_pin(names[k]):
+                joints[-1] = joints[-1].through(names[k], contacts[k])
+            else:
+                kept.append(names[k])
+                joints.append(contacts[k])
+        return [*kept, names[-1]], joints
+
+    def _drive(self, contact: Contact) -> str | None:
+        for name, drive in self.mechanism.description.drives.items():
+            if contact.slide is not None:
+                if drive.kind != "angle" and drive.target == self.mechanism.graph.slides[contact.slide]:
+                    return name
+            elif drive.kind == "angle" and contact.joins(drive.target, drive.reference):
+                return name
+        return None
+
+    def _beams(self, body: str, entry: Contact, leave: Contact) -> list[Element]:
+        """Beams of one body between its two contacts; of a telescopic leg, its whole length at its second body."""
+        name = self.bodies.link_of(body)
+        section = self.elastic.get(name)
+        if section is None:
+            return []
+        link = self.mechanism.description.links[name]
+        if link.telescopic and link.ends is not None:
+            if body != name:
+                return []
+            own = {c.other(body) == rod_of(name): c for c in (entry, leave)}
+            if True not in own or own[False].point != link.ends[0]:
+                raise not_serial(f"elastic leg '{name}' is joined elsewhere than at its ends")
+            return [Beam(*link.ends, section, name)]
+        nodes = self._way(link, entry.reach(body), leave.reach(body))
+        return [Beam(a, b, section) for a, b in pairwise(nodes)]
+
+    def _way(self, link: Link, entry: tuple[str, ...], leave: tuple[str, ...]) -> list[str]:
+        order = self._order(link)
+        i, j = (order.index(reach[0]) if reach[0] in order else -1 for reach in (entry, leave))
+        if i < 0 or j < 0:
+            inner = [entry[0], leave[0]] if entry[0] != leave[0] else [entry[0]]
+        else:
+            inner = order[i : j + 1] if i <= j else order[j : i + 1][::-1]
+        return [*entry[:0:-1], *inner, *leave[1:]]
+
+    def _order(self, link: Link) -> list[str]:
+        """Points along a link: as listed, and those on the line between the ends of a binary link where they lie."""
+        points = list(link.points)
+        if link.ends is None:
+            return points
+
+        def number(term: Term) -> float:
+            return self.mechanism.nominal[term] if isinstance(term, str) else term
+
+        length = number(link.points[link.ends[1]][0])
+        place = {name: (number(x), number(y)) for name, (x, y) in link.points.items()}
+        between = [n for n, (x, y) in place.items() if 0 < x < length and abs(y) <= 1e-9 * length]
+        between.sort(key=lambda name: place[name][0])
+        rest = [name for name in points if name not in between and name not in link.ends]
+        return [link.ends[0], *between, link.ends[1], *rest]
+
+
+def _check_drives(description: Description, bodies: Bodies, legs: list[Leg]) -> None:
+    """Every angle drive between links that carry must sit at a joint of a leg."""
+    carrying = {name for leg in legs for name in leg.links} | {GROUND, bodies.link}
+    held = {name for leg in legs for name in leg.drives}
+    for name, drive in description.drives.items():
+        if drive.kind == "angle" and name not in held and {drive.target, drive.reference} <= carrying:
+            mend = ""
+            if drive.reference == GROUND:
+                mend = " (if its motor sits at a joint, give the angle 'from' the link that carries it)"
+            raise not_serial(
+                f"drive '{name}' holds the angle of link '{drive.target}' from '{drive.reference}', and no joint of a "
+                f"leg is between the two: this is not a serial leg{mend}"
+            )

@@ -1,0 +1,132 @@
+"""The tables of a stiffness result: columns, units, meanings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.poses import pose_columns
+from mechdesign.analyses.stiffness.legs import Leg
+from mechdesign.analyses.stiffness.screws import Array
+from mechdesign.results import Column, Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """Rows of the table of springs, in no order."""
+
+    row: NDArray[np.intp]
+    leg: NDArray[np.intp]
+    stiffness: Array
+    place: NDArray[np.complex128]
+    angle: Array
+
+
+def _kinds(size: int, what: str) -> dict[tuple[int, int], str]:
+    """Kind of quantity of each entry of the upper triangle of a stiffness or compliance matrix."""
+    prefix = ("", "coupling_", "rotational_")
+    return {(i, j): prefix[(i == 2) + (j == 2)] + what for i in range(size) for j in range(i, size)}
+
+
+def _entries(study: Study, letter: str, matrix: Array, what: str, meaning: str) -> list[Column]:
+    return [
+        Column(f"{letter}{i + 1}{j + 1}", matrix[:, i, j], study.units.label(kind), meaning)
+        for (i, j), kind in _kinds(matrix.shape[1], what).items()
+    ]
+
+
+def stiffness_table(
+    study: Study, poses: Poses, stiff: Array, soft: Array, rank: NDArray[np.intp], free: Array, valid: NDArray[np.bool_]
+) -> Table:
+    units = study.units
+    size = stiff.shape[1]
+    low, high, angle = _principal(soft)
+    with np.errstate(divide="ignore"):
+        direct = [1 / soft[:, k, k] for k in range(size)]
+    columns = pose_columns(study, poses)
+    columns += [
+        Column(name, values, units.label(kind), "load over its own displacement, the others free")
+        for name, values, kind in zip(
+            ("k_x", "k_y", "k_phi"), direct, ("stiffness", "stiffness", "rotational_stiffness"), strict=False
+        )
+    ]
+    unit = units.label("stiffness")
+    columns += [
+        Column("k_min", low, unit, "stiffness to a force in the softest direction, the body free to turn"),
+        Column("k_max", high, unit, "stiffness to a force in the stiffest direction, the body free to turn"),
+        Column("k_angle", angle / units.angle_factor, units.label("angle"), "angle of the stiffest direction"),
+    ]
+    columns += _entries(study, "K", stiff, "stiffness", "stiffness matrix at the asked point; nan where rigid")
+    columns.append(Column("rank", rank, "", "number of independent wrenches that hold the body"))
+    for k, name in enumerate(("free_x", "free_y", "free_phi")[:size]):
+        per = "" if k == 2 else units.label("length")
+        columns.append(
+            Column(name, free[:, k], per, "the free twist, per radian where it turns; nan where none is free")
+        )
+    columns.append(Column("valid", valid, "", "1 where the pose is assembled and within its limits"))
+    return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
+
+
+def _principal(soft: Array) -> tuple[Array, Array, Array]:
+    """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi)."""
+    mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
+    radius = np.hypot(half, soft[:, 0, 1])
+    with np.errstate(divide="ignore"):
+        stiffest = mean - radius
+        high = np.where(stiffest > 1e-13 * mean, 1 / stiffest, np.where(np.isnan(mean), np.nan, np.inf))
+        low = 1 / (mean + radius)
+    angle = np.mod(np.arctan2(soft[:, 0, 1], half) / 2 + np.pi / 2, np.pi)
+    return low, high, angle
+
+
+def compliance_table(study: Study, poses: Poses, soft: Array) -> Table:
+    """``compliance.csv``: C11 ... C33."""
+    columns = pose_columns(study, poses) + _entries(study, "C", soft, "compliance", "displacement per load")
+    return Table(
+        "compliance", tuple(columns), "twist (dx, dy, dphi in radians) at the asked point per load, axes of the world"
+    )
+
+
+def springs_table(study: Study, poses: Poses, legs: Sequence[Leg], springs: Sequence[Springs]) -> Table:
+    units = study.units
+    row = np.concatenate([s.row for s in springs] or [np.zeros(0, dtype=np.intp)])
+    leg = np.concatenate([s.leg for s in springs] or [np.zeros(0, dtype=np.intp)])
+    order = np.lexsort((leg, row))
+
+    def gather(name: str) -> Any:
+        return np.concatenate([getattr(s, name) for s in springs] or [np.zeros(0)])[order]
+
+    names = np.array([leg.name for leg in legs] or [""])
+    place, angle = gather("place"), gather("angle")
+    per_radian = units.label("rotational_stiffness")
+    columns = [Column(c.name, c.values[row[order]], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns += [
+        Column("leg", names[leg[order]], "", "links of the leg, from the base"),
+        Column("stiffness", gather("stiffness"), units.label("stiffness"),
+               f"along its line, inf where rigid; where angle is nan about its point ({per_radian})"),
+        Column("x", np.real(place), units.label("length"), "a point on its line"),
+        Column("y", np.imag(place), units.label("length"), "a point on its line"),
+        Column("angle", angle / units.angle_factor, units.label("angle"), "direction of its line"),
+    ]  # fmt: skip
+    return Table("springs", tuple(columns), "springs that hold the body as its legs do")
+
+
+def deflections_table(study: Study, poses: Poses, loads: Array, soft: Array) -> Table:
+    units = study.units
+    size = soft.shape[1]
+    moved = np.einsum("nij,lj->nli", soft, loads[:, :size]).reshape(-1, size)
+    repeat = np.repeat(np.arange(poses.count), len(loads))
+    applied = np.tile(loads, (poses.count, 1))
+    columns = [Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    force, moment, length = units.label("force"), units.label("moment"), units.label("length")
+    for k, (name, unit) in enumerate(zip(("fx", "fy", "mz")[:size], (force, force, moment), strict=False)):
+        columns.append(Column(name, applied[:, k], unit, "load at the asked point"))
+    for k, (name, unit) in enumerate(zip(("dx", "dy", "dphi")[:size], (length, length, "rad"), strict=False)):
+        columns.append(Column(name, moved[:, k], unit, "deflection of the asked point"))
+    return Table("deflections", tuple(columns), "deflections under the study's loads")

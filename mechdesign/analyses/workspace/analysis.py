@@ -1,0 +1,166 @@
+"""Where can it work? The reachable region of a point, its performance indices and its boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mechdesign.analyses.workspace.curves import Patch, patches
+from mechdesign.analyses.workspace.indices import INDICES, prepare
+from mechdesign.analyses.workspace.indices.index import determinant_power, power_of_length
+from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
+from mechdesign.analyses.workspace.orientation import reachable
+from mechdesign.analyses.workspace.point_path import point_path
+from mechdesign.analyses.workspace.rays import Designs
+from mechdesign.analyses.workspace.region import CLOSE, COLUMNS, RAYS, Answer, Question, answer, questions, split
+from mechdesign.analyses.workspace.tables import held_columns, inscribed_columns, outlines, stacked
+from mechdesign.errors import AssemblyError
+from mechdesign.progress import NULL, Progress
+from mechdesign.results import Column, Result, Table
+from mechdesign.study import Study
+from mechdesign.study.workspace_models import Over
+
+
+def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
+    """Reachable region of a point: indices (GII, GRI, SUI), local indices on a grid, and the boundary.
+
+    Parameters
+    ----------
+    study : Study
+        With a workspace section.
+    seed, jobs
+        Not used: nothing is random, and one region takes a moment.
+
+    Raises
+    ------
+    StudyError
+        If the section lacks what cannot be assumed.
+    AssemblyError
+        If no point of the scan can be reached, or the region has no end.
+    """
+    section = study.workspace
+    if section is not None and study.mechanism.mobility == 1:
+        return point_path(study)
+    if section is not None and any(isinstance(values, Over) for values in section.at.values()):
+        return reachable(study, progress)
+    asked = questions(study)
+    progress.start(len(asked), "regions")
+    answers: list[Answer] = []
+    local: list[list[Column]] = []
+    regions: list[tuple[Study, Question, list[Patch]]] = []
+    shapes: list[tuple[Circle, Rectangle]] = []
+    warnings: list[str] = []
+    for question in asked:
+        given = answer(question, {}, 1, CLOSE)
+        answers.append(given)
+        warnings += _doubts(question, given)
+        if given.panels.closes[0]:
+            designs = Designs(question.field, {}, 1, question.about)
+            found = list(patches(designs, given.panels, question.rays or RAYS, CLOSE.samples))
+            local.append(_local(study, question, found))
+            shapes.append(inscribed(question.field, question.about, question.scan, found))
+            regions.append((study, question, found))
+        else:
+            shapes.append((NO_CIRCLE, NO_RECTANGLE))
+        progress.update(1)
+    if not local:
+        raise AssemblyError(_unreachable(study, asked[0]))
+    tables = [
+        Table("indices", (*_indices(study, asked, answers), *inscribed_columns(study, shapes)),
+              "performance indices over the region"),
+        Table("local", stacked(local), "local indices on a grid that follows the boundary"),
+        *outlines(regions),
+    ]  # fmt: skip
+    empty = sum(not given.panels.closes[0] for given in answers)
+    return Result("workspace", {table.name: table for table in tables}, tuple(warnings),
+                  {"regions": len(asked), "empty": empty})  # fmt: skip
+
+
+def _unreachable(study: Study, question: Question) -> str:
+    assert study.workspace is not None
+    return (
+        f"point {study.workspace.point} reaches nothing on the scan about ({question.about.real:g}, "
+        f"{question.about.imag:g}): its links cannot close there in the sketch's assembly, or a limit forbids it"
+    )
+
+
+def _doubts(question: Question, given: Answer) -> Iterator[str]:
+    where = ", ".join(f"{name} = {value:g}" for name, value in question.held.items())
+    where = f" at {where}" if where else ""
+    if not given.panels.closes[0]:
+        yield f"nothing is reachable{where}"
+        return
+    for name in ("GII", "GRI"):
+        error, value = given.errors[name][0], given.values[name][0]
+        if question.rule == "gauss" and not error <= 2 * question.tolerance * abs(value):
+            yield f"{name}{where} is only known to {error:.1g}, not to the tolerance asked for"
+
+
+def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Answer]) -> Iterator[Column]:
+    for name in asked[0].held:
+        label = study.units.label(study.mechanism.quantity(name))
+        yield Column(name, np.array([question.held[name] for question in asked]), label, "held coordinate")
+    meanings = index_meanings(study, asked[0])
+
+    def column(name: str) -> Column:
+        return Column(name, np.concatenate([given.values[name] for given in answers]), *meanings[name])
+
+    def error(name: str) -> Column:
+        values = np.concatenate([given.errors[name] for given in answers])
+        return Column(f"{name}_error", values, meanings[name][0], f"estimated error of {name}")
+
+    estimated = asked[0].rule == "gauss"
+    statistics = [name for name in asked[0].wanted if name not in COLUMNS]
+    yield from (column(name) for name in COLUMNS)
+    yield from (error(name) for name in COLUMNS[:4] if estimated)
+    yield from (column(name) for name in statistics)
+    yield from (error(name) for name in statistics if estimated or not name.endswith(("_mean", "_std")))
+
+
+def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each column of the answer."""
+    area = study.units.label("area")
+    found = {
+        "GII": ("", "mean of the inverse condition number over the region"),
+        "GRI": (INDICES["resistivity"].unit(study, question.field), "mean of 1/abs(det J) over the region"),
+        "SUI": ("", "area of the region over that of the rectangle around it"),
+        "area": (area, "area of the region"),
+        "box_area": (area, "area of the rectangle around the region"),
+    }
+    for name in (name for name in question.wanted if name not in COLUMNS):
+        index, kind = INDICES[split(name)[0]], split(name)[1]
+        found[name] = (index.unit(study, question.field), f"{_STATISTICS[kind]} over the region: {index.meaning}")
+    return found
+
+
+_STATISTICS = {"mean": "mean", "min": "infimum", "max": "supremum", "std": "standard deviation"}
+
+
+def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
+    grids = [patch.grid(question.about) for patch in found]
+    z = np.concatenate([grid.ravel() for grid in grids])
+    local = question.field.local(z, {})
+    names = dict.fromkeys(("inverse_condition", "resistivity", *(index.name for index in question.indices)))
+    node = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)) for grid in grids])
+    ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
+    patch = np.repeat(np.arange(len(grids)), [grid.size for grid in grids])
+    length, determinant = study.units.label("length"), power_of_length(study, determinant_power(question.field))
+    columns = [
+        Column(index.name, np.broadcast_to(index.values(local), z.shape), index.index.unit(study, question.field),
+               index.index.meaning)
+        for index in prepare(study, list(names))
+    ]  # fmt: skip
+    return [
+        *held_columns(study, question, len(z)),
+        Column("x", z.real, length, "place of the point"),
+        Column("y", z.imag, length, "place of the point"),
+        *columns[:2],
+        Column(
+            "det_J", np.broadcast_to(local.determinant, z.shape), determinant, "determinant of the Jacobian, per radian"
+        ),
+        *columns[2:],
+        Column("patch", patch, "", "part of the region between two boundary curves"),
+        Column("ray", ray, "", "ray of the patch's grid"),
+        Column("node", node, "", "node along the ray, from the inner to the outer boundary"),
+    ]

@@ -1,0 +1,86 @@
+"""The region of one design as patches: boundary curves and a grid between them, for tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.workspace.panels import Panels
+from mechdesign.analyses.workspace.rays import SAME, Designs, Floats, Intervals, Ints, trace
+
+SLACK = 1e-9
+# Rays of the narrowest panel; and how far inside its ends it is traced where the ends themselves are degenerate.
+FEWEST = 25
+BESIDE = 1e-9
+# Nodes of a map along each ray, from boundary to boundary.
+GRID = 33
+# An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
+INSET = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """The part of the region between one inner and one outer curve, over one panel.
+
+    Parameters
+    ----------
+    theta, inner, outer : ndarray, shape (rays,)
+        Angles and the radii of both curves.
+    enters, leaves : int
+        Margins that are zero on them; -1 where the patch begins at the centre of the scan.
+    """
+
+    theta: Floats
+    inner: Floats
+    outer: Floats
+    enters: int
+    leaves: int
+
+    def grid(self, about: complex) -> NDArray[np.complex128]:
+        """Nodes, shape (rays, GRID), denser towards both curves."""
+        radius = self.inner[:, None] + self.fractions() * (self.outer - self.inner)[:, None]
+        return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
+
+    def fractions(self) -> Floats:
+        """Places of a ray's nodes between both curves."""
+        return np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
+
+
+def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterator[Patch]:
+    """Patches of a single design, with about `rays` rays over all panels (both ends of each included)."""
+    total = float(np.sum(panels.high - panels.low))
+    for low, high in zip(panels.low, panels.high, strict=True):
+        number = max(FEWEST, round(rays * (high - low) / total) + 1)
+        # Denser towards the ends, where cusps are thin and corners sharp.
+        theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
+        zero = np.zeros(number, dtype=np.intp)
+        traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
+        if (traced.counts[[0, -1]] != traced.counts[number // 2]).any():
+            # At its very ends a panel meets its neighbour, or an interval vanishes.
+            theta = np.clip(theta, low + BESIDE * (high - low), high - BESIDE * (high - low))
+            traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
+        ray, inner, outer, enters, leaves = _whole(traced, SAME * float(panels.reach[0]))
+        counts = np.bincount(ray, minlength=number)
+        usual = int(np.argmax(np.bincount(counts)))
+        kept = np.flatnonzero(counts == usual)
+        first = np.searchsorted(ray, kept)
+        for slot in range(usual):
+            at: Ints = first + slot
+            yield Patch(theta[kept], inner[at], outer[at], _most(enters[at]), _most(leaves[at]))
+
+
+def _whole(traced: Intervals, near: float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
+    """Intervals with those made one that a single point divides, such as where a leg has no length."""
+    ray = traced.ray
+    meets = (ray[1:] == ray[:-1]) & (traced.inner[1:] - traced.outer[:-1] <= near)
+    begins, ends = np.append(True, ~meets)[: len(ray)], np.append(~meets, True)[: len(ray)]
+    return ray[begins], traced.inner[begins], traced.outer[ends], traced.enters[begins], traced.leaves[ends]
+
+
+def _most(margins: Ints) -> int:
+    """The margin that most rays name: single rays may meet another (a corner)."""
+    names, counts = np.unique(margins, return_counts=True)
+    return int(names[np.argmax(counts)])

@@ -1,0 +1,169 @@
+"""What is known of a mechanism at a point of the plane: margins (positive inside its region) and local indices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.workspace.atlas import Atlas
+from mechdesign.analyses.workspace.indices.local import Entries, Local
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import determinants
+from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.rates import Rates
+
+Places = Mapping[str, Value]
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A mechanism seen from the place of one of its points, the other degrees of freedom held.
+
+    Parameters
+    ----------
+    plan : Plan
+        Solves for the point's x and y, then the held coordinates.
+    held : sequence of float
+        Values of the held coordinates, angles in radians.
+    same_assembly : bool
+        Whether the region ends where a forward determinant changes sign, that is where the assembly of the sketch
+        meets another one.
+    length : float or None
+        Characteristic length by which angles count as lengths in the Jacobian.
+    """
+
+    mechanism: Mechanism
+    plan: Plan
+    held: tuple[float, ...] = ()
+    same_assembly: bool = True
+    length: float | None = None
+
+    @property
+    def outputs(self) -> Sequence[Coordinate]:
+        """Coordinates whose Jacobian is meant: the point's, then the held ones."""
+        return self.plan.structure.given
+
+    def configuration(self, z: NDArray[np.complex128], places: Places) -> Configuration:
+        """The mechanism with its point at `z`; outside the region what can still be computed is given.
+
+        Unlike `Plan.solve` this leaves finite what does not depend on a leg that cannot reach, so that margins keep
+        their sign and smoothness there.
+        """
+        given: list[Value] = [z.real, z.imag, *self.held]
+        if self.plan.iterative:
+            return self._atlas.solve(z, places)[0]
+        vectors = self.mechanism.geometry.vectors(places)
+        state = self.plan.run(given, vectors, None)
+        graph = self.mechanism.graph
+        return Configuration(
+            graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
+            np.zeros((), dtype=np.int8), places,
+        )  # fmt: skip
+
+    @cached_property
+    def _atlas(self) -> Atlas:
+        return Atlas.of(self.plan, self.held)
+
+    def margins(self, z: NDArray[np.complex128], places: Places, *, assembly: bool = True) -> NDArray[np.float64]:
+        """All margins at points `z`, shape (margins, *z.shape), in the order of `labels`; nan where unknown.
+
+        Those of the assembly come last and may be left out.
+        """
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            if self.plan.iterative:
+                configuration, grip = self._atlas.solve(z, places)
+            else:
+                configuration = self.configuration(z, places)
+            found = [*configuration.closures]
+            found += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
+            found += [margin for _, margin in self.mechanism.margins(configuration)]
+            if self.plan.iterative:
+                found.append(grip)
+            if self.same_assembly and assembly:
+                signs = self._signs
+                found += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
+        if self.plan.iterative:
+            # Where nothing is reached one margin says so, and the others have no end of their own there.
+            found = [margin if margin is grip else np.where(np.isnan(grip), 1.0, margin) for margin in found]
+        stacked = np.empty((len(found), *z.shape))
+        for row, margin in zip(stacked, found, strict=True):
+            row[...] = margin
+        return stacked
+
+    @cached_property
+    def labels(self) -> tuple[tuple[str, str], ...]:
+        """Kind (``singularity`` or ``limit``) and name of each margin."""
+        mechanism = self.mechanism
+        at = np.asarray(complex(*(float(mechanism.sketch_configuration.value(c)) for c in self.outputs[:2])))
+        configuration = self.configuration(at, {})
+        found = [("singularity", name) for name in self._closure_names()]
+        found += [("singularity", f"{mechanism.graph.slides[s]} length") for s in mechanism.graph.telescopic]
+        found += [("limit", label) for label, _ in mechanism.margins(configuration)]
+        if self.plan.iterative:
+            found.append(("singularity", "continuation"))
+        if self.same_assembly:
+            found += [("singularity", f"assembly {k}") for k in range(len(self._signs))]
+        return tuple(found)
+
+    @cached_property
+    def singular(self) -> NDArray[np.bool_]:
+        """Which margins end where a leg is stretched or folded, so that indices have square roots there."""
+        closures = len(self._closure_names())
+        return np.arange(len(self.labels)) < closures
+
+    def _closure_names(self) -> list[str]:
+        """What ends the reach of each closed-form group, in the order of `Configuration.closures`."""
+        bodies = self.mechanism.graph.bodies
+        names = []
+        for group in self.plan.structure.groups:
+            links = "-".join(
+                dict.fromkeys(b.removesuffix(":rod") for b, (frame, _) in bodies.items() if frame in group.angles)
+            )
+            if group.form == "two angles":
+                names += [f"{links} stretched", f"{links} folded"]
+            elif group.form not in ("place", "newton", "two slides"):
+                names.append(f"{links} at its reach")
+        return names
+
+    @cached_property
+    def closing(self) -> int:
+        """Number of leading margins that say whether the mechanism can be assembled at all."""
+        return sum(1 for kind, name in self.labels if kind == "singularity" and not name.startswith("assembly"))
+
+    @cached_property
+    def _signs(self) -> list[float]:
+        sketch = self.mechanism.sketch_configuration
+        return [float(np.sign(d)) for d in self._determinants(sketch)]
+
+    def _determinants(self, configuration: Configuration) -> list[Value]:
+        return determinants(self.mechanism.linearize(configuration))
+
+    def local(self, z: NDArray[np.complex128], places: Places) -> Local:
+        """What local indices at points `z` are computed from."""
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            configuration = self.configuration(z, places)
+            return Local(configuration, *self._jacobian(configuration))
+
+    def _jacobian(self, configuration: Configuration) -> tuple[Entries, Entries]:
+        """The Jacobian per radian, and with angles as lengths where there is a characteristic length."""
+        linear = self.mechanism.linearize(configuration)
+        rest = [0.0] * len(linear.structure.edges)
+        drives = linear.structure.given
+        columns: list[Rates] = [
+            linear.solve([float(j == k) for j in range(len(drives))], rest) for k in range(len(drives))
+        ]
+        jacobian: list[list[Value]] = [[first(configuration, out, rates) for rates in columns] for out in self.outputs]
+        if self.length is None:
+            return jacobian, jacobian
+        rows = [self.length if out.quantity == "angle" else 1.0 for out in self.outputs]
+        scale = [1 / self.length if drive.quantity == "angle" else 1.0 for drive in drives]
+        return jacobian, [[entry * r * c for entry, c in zip(row, scale, strict=True)]
+                          for row, r in zip(jacobian, rows, strict=True)]  # fmt: skip

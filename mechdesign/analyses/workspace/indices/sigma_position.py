@@ -1,0 +1,43 @@
+"""Position error of the workspace's point to the first order, from what the reliability section says varies."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechdesign.analyses.reliability.first_order import Channel, Rates, linear_errors
+from mechdesign.analyses.reliability.sources import Source, find_sources
+from mechdesign.analyses.workspace.indices.assembled import assembled_only
+from mechdesign.analyses.workspace.indices.index import Evaluate, Index
+from mechdesign.analyses.workspace.indices.local import Floats
+from mechdesign.mechanism import Configuration, Mechanism
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
+
+STILL = Rates((), ())
+
+
+def prepare(study: Study) -> Evaluate:
+    """Find what varies."""
+    assert study.workspace is not None
+    mechanism, point = study.mechanism, study.workspace.point
+    channels = tuple(Channel(mechanism.coordinate(f"{point}.{axis}"), 0) for axis in "xy")
+    sources = find_sources(study)[0].first_order()
+    return assembled_only(partial(evaluate, mechanism, channels, sources))
+
+
+def evaluate(
+    mechanism: Mechanism, channels: tuple[Channel, ...], sources: tuple[Source, ...], configuration: Configuration
+) -> Floats:
+    """sqrt(var x + var y), the drives held [S2, eq. 9]."""
+    linear = linear_errors(mechanism, configuration, channels, sources, STILL)
+    return np.asarray(np.sqrt(np.einsum("czp,z->p", linear.components**2, linear.variance)))
+
+
+INDEX = Index(
+    "sigma_position", "sqrt(sigma_x^2 + sigma_y^2) of the point's first-order error", prepare,
+    lambda study, field: study.units.label("length"), crossing=float("inf"), section="reliability",
+)  # fmt: skip

@@ -1,0 +1,247 @@
+"""Smallest and largest value of local indices over the region of each design, and whether they are infinite.
+
+The search starts from the best of a grid of nodes and closes in on it by smaller and smaller grids, in the maps of
+`quadrature` (a panel's angle and an interval's radius over [0, 1]), in which even a root at the boundary is smooth.
+Towards the boundary an index may vanish or grow without bound: how it does is read off two places near it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.workspace.indices import Local, Prepared
+from mechdesign.analyses.workspace.panels import Panels
+from mechdesign.analyses.workspace.rays import Designs, Floats, Ints, trace
+from mechdesign.analyses.workspace.rules import cosine, cubic, spread
+
+# Places in the maps stay this far from the ends: rounding leaves nothing nearer to corners, or to the boundary.
+EDGE_U, EDGE_V = 1e-3, 1e-5
+# Nodes of the first grid in the maps: angles of each panel, radii of each interval; the ends look into corners.
+ANGLES = np.concatenate([[EDGE_U], np.linspace(0.04, 0.96, 11), [1 - EDGE_U]])
+RADII = np.concatenate([[0.01], np.linspace(0.07, 0.93, 8), [0.99]])
+# Distances from the boundary, as fractions of the interval, between which the power of an index is read off.
+NEAR = np.array([1e-8, 1.6e-7])
+# Powers of the distance beyond which an index is said to vanish, or to be infinite, at the boundary.
+POWER = 0.25
+STENCIL = np.linspace(-1.0, 1.0, 5)
+SHRINK = 0.35
+MOST_ROUNDS = 40
+# An extreme in a corner is compared with the value this many times as far from it, in the map.
+BACK = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Peaks:
+    """Extremes of indices, all of shape (indices, designs).
+
+    Parameters
+    ----------
+    value, error : ndarray, shape (2, indices, designs)
+        Infimum and supremum of each index, and their estimated errors; nan where the region is empty.
+    order : ndarray, shape (indices, designs)
+        n where the index grows as distance^-n towards a singularity, else 0.
+    """
+
+    value: Floats
+    error: Floats
+    order: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Places of regions: design, panel, interval of the ray, and share of the panel's and of the interval's map."""
+
+    design: Ints
+    panel: Ints
+    slot: Ints
+    u: Floats
+    v: Floats
+
+    def pick(self, index: Ints | NDArray[np.bool_]) -> _Places:
+        return _Places(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
+
+
+def find_peaks(
+    designs: Designs,
+    panels: Panels,
+    indices: Sequence[Prepared],
+    samples: int,
+    tolerance: float,
+    wanted: NDArray[np.bool_],
+) -> Peaks:
+    """Extremes of indices over the regions.
+
+    Parameters
+    ----------
+    tolerance : float
+        Relative accuracy at which the search ends.
+    wanted : ndarray of bool, shape (2, indices)
+        Whether the infimum, and the supremum of each index is searched for; else only its order is found.
+    """
+    shape = (len(indices), designs.count)
+    value, order = np.stack([np.full(shape, np.inf), np.full(shape, -np.inf)]), np.zeros(shape)
+    _at_ends(designs, panels, indices, samples, value, order)
+    places, local = _grid(designs, panels, samples)
+    _at_crossings(designs, indices, places.design, local, value, order)
+    error = np.zeros(value.shape)
+    lanes = []
+    for sense, k in np.argwhere(wanted):
+        start = _best(places.design, (2 * sense - 1) * np.asarray(indices[k].values(local)), designs.count)
+        # What lies at the bound of the index already needs no search.
+        design = np.flatnonzero((start >= 0) & (value[sense, k] != indices[k].index.bounds[sense]))
+        lanes.append((np.full(len(design), sense), np.full(len(design), k), design, start[design]))
+    if lanes:
+        sense, k, design, start = (np.concatenate(column) for column in zip(*lanes, strict=True))
+        peak, doubt = _climb(designs, panels, indices, 2.0 * sense - 1, k, samples, tolerance, places.pick(start))
+        sign = 2.0 * sense - 1
+        value[sense, k, design] = sign * np.fmax(sign * value[sense, k, design], sign * peak)
+        error[sense, k, design] = doubt
+    value[:, :, ~panels.closes] = error[:, :, ~panels.closes] = np.nan
+    return Peaks(value, error, order)
+
+
+def _at_ends(
+    designs: Designs, panels: Panels, indices: Sequence[Prepared], samples: int, value: Floats, order: Floats
+) -> None:
+    """Note the indices that vanish or have no bound where the region ends in a singularity."""
+    u = np.array([0.2, 0.5, 0.8])[:, None]
+    theta = (panels.low + u * (panels.high - panels.low)).ravel()
+    design = np.tile(panels.design, len(u))
+    traced = trace(designs, design, theta, panels.reach[design], samples)
+    singular = np.append([kind == "singularity" for kind, _ in designs.field.labels], False)
+    for margin, end, side in ((traced.enters, traced.inner, 1.0), (traced.leaves, traced.outer, -1.0)):
+        at = np.flatnonzero(singular[margin])
+        if not at.size:
+            continue
+        ray = traced.ray[at]
+        radius = end[at] + side * NEAR[:, None] * (traced.outer - traced.inner)[at]
+        local = designs.field.local(designs.about + radius * np.exp(1j * theta[ray]), designs.of(design[ray]))
+        for k, index in enumerate(indices):
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                near, far = np.broadcast_to(np.asarray(index.values(local), dtype=float), radius.shape)
+                power = np.log(far / near) / np.log(NEAR[1] / NEAR[0])
+            vanishes, grows = power > POWER, power < -POWER
+            value[0, k, design[ray[vanishes]]] = 0.0
+            value[1, k, design[ray[grows]]] = np.inf
+            np.maximum.at(order[k], design[ray[grows]], np.round(-2 * power[grows]) / 2)
+
+
+def _at_crossings(
+    designs: Designs, indices: Sequence[Prepared], design: Ints, local: Local, value: Floats, order: Floats
+) -> None:
+    """Note them too where a forward singularity lies inside: the determinant has both signs."""
+    determinant = np.broadcast_to(local.determinant, design.shape)
+    crossed = np.ones(designs.count, dtype=bool)
+    for sign in (1, -1):
+        crossed &= np.bincount(design[sign * determinant > 0], minlength=designs.count) > 0
+    for k, index in enumerate(indices):
+        limit = index.index.crossing
+        if limit is not None:
+            sense = int(limit > 0)
+            value[sense, k, crossed] = limit
+            order[k, crossed] = np.maximum(order[k, crossed], float(sense))
+
+
+def _grid(designs: Designs, panels: Panels, samples: int) -> tuple[_Places, Local]:
+    """The first nodes of all regions."""
+    u = np.tile(ANGLES[:, None], len(panels.low))
+    panel = np.tile(np.arange(len(panels.low)), len(ANGLES))
+    theta = spread(panels.low, panels.high, u, cubic)[0].ravel()
+    design = panels.design[panel]
+    traced = trace(designs, design, theta, panels.reach[design], samples)
+    slot = np.arange(len(traced.ray)) - np.searchsorted(traced.ray, traced.ray)
+    radius = spread(traced.inner, traced.outer, RADII[:, None], cosine)[0].ravel()
+    ray = np.tile(traced.ray, len(RADII))
+    v = np.repeat(RADII, len(traced.ray))
+    places = _Places(design[ray], panel[ray], np.tile(slot, len(RADII)), u.ravel()[ray], v)
+    z = designs.about + radius * np.exp(1j * theta[ray])
+    return places, designs.field.local(z, designs.of(places.design))
+
+
+def _best(design: Ints, height: Floats, count: int) -> Ints:
+    """The node of the largest value of each design; -1 where there is none."""
+    found = np.full(count, -1, dtype=np.intp)
+    good = np.flatnonzero(np.isfinite(height))
+    order = good[np.argsort(height[good], kind="stable")]
+    found[design[order]] = order
+    return found
+
+
+def _climb(
+    designs: Designs,
+    panels: Panels,
+    indices: Sequence[Prepared],
+    sign: Floats,
+    which: Ints,
+    samples: int,
+    tolerance: float,
+    at: _Places,
+) -> tuple[Floats, Floats]:
+    """Largest value of `sign` times the index `which` near each place, by shrinking grids, and its error."""
+    u, v = at.u.copy(), at.v.copy()
+    wide, deep = np.full(len(u), 2 / len(ANGLES)), np.full(len(u), 2 / len(RADII))
+    best, doubt = np.full(len(u), -np.inf), np.full(len(u), np.inf)
+
+    def look(lanes: Ints, us: Floats, vs: Floats) -> Floats:
+        found = sign[lanes] * _values(designs, panels, indices, which[lanes], samples, at.pick(lanes), us, vs)
+        return np.where(np.isfinite(found), found, -np.inf).reshape(-1, len(lanes))
+
+    left = np.arange(len(u))
+    for _ in range(MOST_ROUNDS):
+        if not left.size:
+            break
+        lane = np.arange(len(left))
+        us = np.clip(u[left] + STENCIL[:, None] * wide[left], EDGE_U, 1 - EDGE_U)
+        vs = np.clip(v[left] + STENCIL[:, None] * deep[left], EDGE_V, 1 - EDGE_V)
+        height = look(left, us, vs)
+        top = height.argmax(axis=0)
+        new, (i, j) = height[top, lane], np.divmod(top, len(STENCIL))
+        doubt[left] = new - np.where(np.isfinite(height), height, np.inf).min(axis=0)
+        better = new > best[left]
+        u[left], v[left] = np.where(better, us[i, lane], u[left]), np.where(better, vs[j, lane], v[left])
+        best[left] = np.maximum(best[left], new)
+        # A grid shrinks where its best node is inside it, or at an end of the map.
+        for width, step, places, edge in ((wide, i, us, EDGE_U), (deep, j, vs, EDGE_V)):
+            place = places[step, lane]
+            inner = (step > 0) & (step < len(STENCIL) - 1) | (place <= edge) | (place >= 1 - edge)
+            width[left] *= np.where(inner, SHRINK, 1.0)
+        left = left[~(doubt[left] <= tolerance * np.abs(best[left]))]
+    # In a corner an index may vanish or have no bound.
+    corner = np.flatnonzero((u <= EDGE_U) | (u >= 1 - EDGE_U))
+    endless = np.zeros(len(u), dtype=bool)
+    if corner.size:
+        back = np.where(u[corner] < 0.5, BACK * EDGE_U, 1 - BACK * EDGE_U)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            power = np.log(best[corner] / look(corner, back[None], v[corner][None])[0]) / np.log(BACK)
+        endless[corner] = sign[corner] * power > POWER
+    return np.where(endless, np.where(sign > 0, np.inf, 0.0), sign * best), np.where(endless, 0.0, doubt)
+
+
+def _values(
+    designs: Designs,
+    panels: Panels,
+    indices: Sequence[Prepared],
+    which: Ints,
+    samples: int,
+    at: _Places,
+    us: Floats,
+    vs: Floats,
+) -> Floats:
+    """Indices `which` on grids, shape (angles, radii, places); nan where the interval is not met."""
+    theta = spread(panels.low[at.panel], panels.high[at.panel], us, cubic)[0].ravel()
+    design, slot = np.tile(at.design, len(us)), np.tile(at.slot, len(us))
+    traced = trace(designs, design, theta, panels.reach[design], samples)
+    met = slot < traced.counts
+    place = np.where(met, np.searchsorted(traced.ray, np.arange(len(theta))) + slot, len(traced.ray))
+    shape = (len(us), 1, len(at.design))
+    inner, outer = (np.append(end, np.nan)[place].reshape(shape) for end in (traced.inner, traced.outer))
+    z = designs.about + spread(inner, outer, vs, cosine)[0] * np.exp(1j * theta.reshape(shape))
+    local = designs.field.local(z, designs.of(at.design))
+    found = np.full(z.shape, np.nan)
+    for k in np.unique(which):
+        found = np.where(which == k, indices[k].values(local), found)
+    return found

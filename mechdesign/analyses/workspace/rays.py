@@ -1,0 +1,298 @@
+"""Where rays about a point run inside the region: intervals between the roots of the margins.
+
+The region is where all margins of a `Field` are positive. Along a ray every margin is followed by itself, not only the
+smallest one: two margins that cross zero close together (a cusp of the region) bracket a thin interval exactly, however
+coarse the scan, and margins that are differences of squared distances are quadratic, so that few samples find all
+their roots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.roots import bracketed_roots
+from mechdesign.analyses.workspace.dips import hidden_places, sign_changes
+from mechdesign.analyses.workspace.field import Field, Places
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+# Rays traced at once, measured: fewer cost more in calls than their smaller arrays save.
+BLOCK = 8192
+ROUNDING = 1e-14
+# Roots nearer than this (relative to the reach) are the same boundary; of several margins the first is named.
+SAME = 1e-9
+# Five samples that a parabola meets to this fraction of their size are of a quadratic function.
+QUADRATIC = 1e-13
+# First and last sample of an interval, as fractions of it.
+INSET = 1e-7
+FIVE = np.linspace(0.0, 1.0, 5)
+
+
+@dataclass(frozen=True, eq=False)
+class Designs:
+    """Several designs of one mechanism, scanned about one point.
+
+    Parameters
+    ----------
+    places : mapping of str to ndarray, shape (designs,)
+        Dimensions that differ from the nominal ones.
+    count : int
+        Number of designs.
+    about : complex
+        Where the rays start.
+    """
+
+    field: Field
+    places: Places
+    count: int
+    about: complex
+
+    def of(self, index: Ints) -> Places:
+        """Dimensions of the designs `index`, in the shape of `index`."""
+        return {name: np.asarray(value)[index] for name, value in self.places.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Intervals:
+    """Inside intervals of rays, ordered by ray and radius.
+
+    Parameters
+    ----------
+    ray : ndarray of int, shape (n,)
+        Ray of each interval.
+    inner, outer : ndarray, shape (n,)
+        Radii where it begins and ends.
+    enters, leaves : ndarray of int, shape (n,)
+        Margin that is zero there; -1 where it begins at the centre or is not closed within the reach.
+    beyond : ndarray of bool, shape (rays,)
+        Rays still inside at their reach.
+    crossings : (ray, radius, margin, direction)
+        All roots of all margins; direction +1 where the margin becomes positive.
+    """
+
+    ray: Ints
+    inner: Floats
+    outer: Floats
+    enters: Ints
+    leaves: Ints
+    beyond: NDArray[np.bool_]
+    crossings: tuple[Ints, Floats, Ints, Ints]
+
+    @property
+    def counts(self) -> Ints:
+        """Intervals of each ray."""
+        return np.bincount(self.ray, minlength=len(self.beyond))
+
+
+def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float = 0.0) -> Intervals:
+    """Intersect rays with the region.
+
+    Parameters
+    ----------
+    design, theta, reach : ndarray, shape (rays,)
+        Design, direction (radians) and length of each ray.
+    samples : int
+        Samples of each interval, for margins that are not quadratic along rays.
+    slack : float
+        Intervals that rounding closed, up to this fraction of the reach, are kept (for rays through a cusp).
+    """
+    parts = [
+        _trace_block(designs, design[k : k + BLOCK], theta[k : k + BLOCK], reach[k : k + BLOCK], samples, slack)
+        for k in range(0, len(theta), BLOCK)
+    ]
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.arange(len(parts)) * BLOCK
+
+    def join(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    crossings: Any = tuple(np.concatenate([part.crossings[k] for part in parts]) for k in range(4))
+    lengths = [len(part.crossings[0]) for part in parts]
+    return Intervals(
+        join("ray") + np.repeat(starts, [len(part.ray) for part in parts]), join("inner"), join("outer"),
+        join("enters"), join("leaves"), join("beyond"),
+        (crossings[0] + np.repeat(starts, lengths), *crossings[1:]),
+    )  # fmt: skip
+
+
+def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
+    """First the margins that are quadratic along rays, whose roots are known; then the others, within what is left."""
+    places, direction = designs.of(design), np.exp(1j * theta)
+    values = designs.field.margins(designs.about + FIVE[:, None] * reach * direction, places, assembly=False)
+    quadratic, (a, b, c) = _parabolas(values)
+    rows = np.flatnonzero(quadratic)
+    margin, ray, turn, x, start = _quadratic_roots(a[rows], b[rows], c[rows])
+    found = _intervals(rows[margin], ray, turn, x * reach[ray], start, reach, slack)
+    whole = len(rows) == len(values) and not designs.field.same_assembly
+    return found if whole else _others(designs, places, direction, found, quadratic, samples, slack * reach)
+
+
+def _parabolas(values: Floats) -> tuple[NDArray[np.bool_], tuple[Floats, Floats, Floats]]:
+    """Coefficients of a + b x + c x^2 through margins at x = 0, 1/2, 1, and which margins are such on every ray.
+
+    Differences of squared distances are quadratic along a ray; the samples at 1/4 and 3/4 tell.
+    """
+    at_0, at_1, at_2, at_3, at_4 = (values[:, k] for k in range(5))
+    a, b, c = at_0, 4 * at_2 - 3 * at_0 - at_4, 2 * (at_0 + at_4) - 4 * at_2
+    with np.errstate(invalid="ignore"):
+        allowed = QUADRATIC * np.abs(values).max(axis=1)
+        fits = np.abs(a + 0.25 * (b + 0.25 * c) - at_1) <= allowed
+        fits &= np.abs(a + 0.75 * (b + 0.75 * c) - at_3) <= allowed
+    return fits.all(axis=1), (a, b, c)
+
+
+def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints, Floats, Ints]:
+    """Margin, ray, direction and place of all roots in (0, 1), and how many margins are negative just after 0."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
+        roots = np.stack([half / c, a / half])
+        margin_of = (roots > SAME) & (roots < 1)
+    which, margin, ray = np.nonzero(margin_of)
+    # The slope at the first of the two roots has the sign of -b, at the other that of b: also where they are one.
+    rising = np.signbit(b[margin, ray]) == (which == 0)
+    x, start = roots[which, margin, ray], (a + SAME * (b + SAME * c) <= 0).sum(axis=0)
+    return margin, ray, np.where(rising, 1, -1), x, start
+
+
+def _others(
+    designs: Designs,
+    places: Places,
+    direction: NDArray[np.complex128],
+    found: Intervals,
+    quadratic: NDArray[np.bool_],
+    samples: int,
+    thin: Floats,
+) -> Intervals:
+    """Cut intervals where one of the margins that are not quadratic is negative or unknown."""
+    owner, inner, width = found.ray, found.inner, found.outer - found.inner
+    local = {name: value[owner] for name, value in places.items()}
+    fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, samples))), INSET, 1 - INSET)
+    radii = inner + fraction[:, None] * width
+    values = designs.field.margins(designs.about + radii * direction[owner], local)
+    values = values[np.flatnonzero(np.append(~quadratic, np.ones(len(values) - len(quadratic), dtype=bool)))]
+    rows = np.flatnonzero(np.append(~quadratic, np.ones(len(designs.field.labels) - len(quadratic), dtype=bool)))
+    positive = values > 0
+    thick = width > thin[owner]
+
+    def margin_at(function: Ints, lane: Ints, radius: Floats) -> Floats:
+        z = designs.about + radius * direction[owner[lane]]
+        found_there = designs.field.margins(z, {name: value[lane] for name, value in local.items()})
+        return found_there[rows[function], np.arange(len(lane))]
+
+    dips = hidden_places(margin_at, radii, values)
+    cut = ~positive.all(axis=(0, 1)) & thick
+    cut[dips[1]] |= thick[dips[1]]
+    if not cut.any():
+        return found
+    lanes = np.flatnonzero(cut)
+    brackets = sign_changes(radii[:, lanes], values[:, :, lanes], _within(dips, lanes))
+    margin, lane = brackets.function, brackets.lane
+
+    def evaluate(which: Ints, radius: Floats) -> Floats:
+        return margin_at(margin[which], lanes[lane[which]], radius)
+
+    tolerance = ROUNDING * found.outer[lanes[lane]]
+    radius = bracketed_roots(evaluate, *brackets.low, *brackets.high, *brackets.third, tolerance)
+    turn = np.where(brackets.high[1] > 0, 1, -1)
+    start = (~positive[:, 0][:, lanes]).sum(axis=0)
+    part = _intervals(rows[margin], lane, turn, radius, start, found.outer[lanes], 0.0)
+    return _replace(found, lanes, part)
+
+
+def _within(dips: tuple[Ints, Ints, Floats, Floats], lanes: Ints) -> tuple[Ints, Ints, Floats, Floats]:
+    """Hidden places of the chosen lanes, numbered among them."""
+    use = np.isin(dips[1], lanes)
+    return dips[0][use], np.searchsorted(lanes, dips[1][use]), dips[2][use], dips[3][use]
+
+
+def _replace(found: Intervals, lanes: Ints, part: Intervals) -> Intervals:
+    """Intervals with those at `lanes` replaced by the parts of them that `part` has left."""
+    source = lanes[part.ray]
+    at_start, at_end = part.enters < 0, part.leaves < 0
+    keep = np.ones(len(found.ray), dtype=bool)
+    keep[lanes] = False
+    owner = np.concatenate([found.ray[keep], found.ray[source]])
+    inner = np.concatenate([found.inner[keep], np.where(at_start, found.inner[source], part.inner)])
+    outer = np.concatenate([found.outer[keep], np.where(at_end, found.outer[source], part.outer)])
+    enters = np.concatenate([found.enters[keep], np.where(at_start, found.enters[source], part.enters)])
+    leaves = np.concatenate([found.leaves[keep], np.where(at_end, found.leaves[source], part.leaves)])
+    order = np.lexsort((inner, owner))
+    beyond = np.zeros(len(found.beyond), dtype=bool)
+    beyond[owner[leaves < 0]] = True
+    ray, radius, margin, turn = (np.concatenate([a, b]) for a, b in zip(
+        found.crossings, (found.ray[lanes[part.crossings[0]]], *part.crossings[1:]), strict=True))  # fmt: skip
+    sort = np.lexsort((radius, ray))
+    return Intervals(
+        owner[order], inner[order], outer[order], enters[order], leaves[order], beyond,
+        (ray[sort], radius[sort], margin[sort], turn[sort]),
+    )  # fmt: skip
+
+
+def _intervals(
+    margin: Ints, ray: Ints, turn: Ints, radius: Floats, start: Ints, reach: Floats, slack: float
+) -> Intervals:
+    """Put the roots of each ray in order and keep the stretches where no margin is negative."""
+    rays = len(reach)
+    key = radius + np.where(turn < 0, slack * reach[ray], 0.0)
+    order = np.lexsort((margin, -turn, key, ray))
+    margin, ray, turn, radius = margin[order], ray[order], turn[order], radius[order]
+    first = np.searchsorted(ray, np.arange(rays))
+    total = np.cumsum(-turn)
+    before = np.where(first > 0, total[first - 1], 0) if len(total) else np.zeros(rays, dtype=int)
+    negative = total - before[ray] + start[ray]
+    # An interval begins at a root after which nothing is negative, or at the centre.
+    begins = np.nonzero(negative == 0)[0]
+    central = np.nonzero(start == 0)[0]
+    ends = np.append(ray, -1)
+    after = begins + 1
+    closed = ends[after] == ray[begins]
+    inner = np.concatenate([np.zeros(len(central)), radius[begins]])
+    enters = np.concatenate([np.full(len(central), -1), margin[begins]])
+    owner = np.concatenate([central, ray[begins]])
+    has = ends[np.minimum(first[central], len(ray))] == central
+    last = np.concatenate([np.where(has, first[central], -1), np.where(closed, after, -1)]).astype(np.intp)
+    outer = np.where(last >= 0, np.append(radius, 0.0)[last], reach[owner])
+    leaves = np.where(last >= 0, np.append(margin, -1)[last], -1)
+    sort = np.lexsort((inner, owner))
+    owner, inner, outer, enters, leaves = (v[sort] for v in (owner, inner, outer, enters, leaves))
+    beyond = np.zeros(rays, dtype=bool)
+    beyond[owner[leaves < 0]] = True
+    tie = SAME * reach
+    enters = _first_named(owner, inner, enters, margin[turn > 0], ray[turn > 0], radius[turn > 0], tie)
+    leaves = _first_named(owner, outer, leaves, margin[turn < 0], ray[turn < 0], radius[turn < 0], tie)
+    return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, (ray, radius, margin, turn))
+
+
+def _first_named(owner: Ints, at: Floats, label: Ints, margin: Ints, ray: Ints, radius: Floats, tie: Floats) -> Ints:
+    """The first of the margins that end an interval at the same place, so that rounding does not choose the name."""
+    best = label.copy()
+    begin = np.searchsorted(ray, owner)
+    end = np.searchsorted(ray, owner, side="right")
+    for k in range(int(np.max(end - begin, initial=0))):
+        at_k = np.minimum(begin + k, max(len(ray) - 1, 0))
+        match = (begin + k < end) & (label >= 0)
+        match[match] = np.abs(radius[at_k[match]] - at[match]) <= tie[owner[match]]
+        best[match] = np.minimum(best[match], margin[at_k[match]])
+    return best
+
+
+def clearances(intervals: Intervals, reach: Floats, among: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Distance from each interval's ends to the next root of a margin `among` some, below and above; inf where none."""
+    rays, radii, margins, _ = intervals.crossings
+    use = among[margins]
+    rays, radii = rays[use], radii[use]
+    begin, end = np.searchsorted(rays, intervals.ray), np.searchsorted(rays, intervals.ray, side="right")
+    below, above = np.full(len(begin), np.inf), np.full(len(begin), np.inf)
+    tie = SAME * reach[intervals.ray]
+    for k in range(int(np.max(end - begin, initial=0))):
+        at = radii[np.minimum(begin + k, len(radii) - 1)]
+        here = begin + k < end
+        under, over = intervals.inner - at, at - intervals.outer
+        below = np.where(here & (under > tie), np.minimum(below, under), below)
+        above = np.where(here & (over > tie), np.minimum(above, over), above)
+    return below, above

@@ -1,0 +1,309 @@
+"""The question of the workspace section, made ready: the field, the scan, the rule; and its answer for any designs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.jacobians import mixes
+from mechdesign.analyses.workspace.bounding import bounding_box
+from mechdesign.analyses.workspace.field import Field, Places
+from mechdesign.analyses.workspace.indices import INDICES, OF_JACOBIAN, Prepared, prepare
+from mechdesign.analyses.workspace.integrands import Integrand
+from mechdesign.analyses.workspace.panels import Effort, Panels, find_panels
+from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
+from mechdesign.analyses.workspace.quadrature import Integral, integrate, simple_means
+from mechdesign.analyses.workspace.rays import Designs, Floats
+from mechdesign.errors import MechanismError, Problem, StudyError
+from mechdesign.memory import keep_freed_memory
+from mechdesign.study import Study
+from mechdesign.study.workspace_models import Over, WorkspaceSection
+
+# One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
+CLOSE, BRISK = Effort(128, 48), Effort(16, 6)
+SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
+# Rays of the tables of local indices and of the boundary, unless the study says how many.
+RAYS = 181
+RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
+# The area that the rules of comparison divide is integrated to this relative tolerance.
+AREA_TOLERANCE = 1e-6
+# Relative tolerance of the integrals where the study says none: of one region, and of each design of many.
+TOLERANCE, GRID_TOLERANCE = 1e-5, 1e-4
+# Relative accuracy of the smallest and largest values of an index.
+PEAK_TOLERANCE = 1e-5
+# What every workspace has; of the local indices follow their statistics, as ``sigma_min_mean``.
+COLUMNS = ("GII", "GRI", "SUI", "area", "box_area")
+MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
+STATISTICS = ("mean", "min", "max", "std")
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What the workspace section asks, in radians.
+
+    Parameters
+    ----------
+    held : mapping of str to float
+        Values of the coordinates of ``at``, in the study's units.
+    scan : (float, float)
+        First and last angle of the rays.
+    counted : (float, float)
+        Range of angle that the means are taken over.
+    rays : int or None
+        As the study asks.
+    indices : tuple of Prepared
+        Local indices: those that the study asks for, and what `wanted` needs.
+    wanted : tuple of str
+        Columns of the answer.
+    """
+
+    field: Field
+    held: dict[str, float]
+    about: complex
+    scan: tuple[float, float]
+    counted: tuple[float, float]
+    rays: int | None
+    rule: str
+    tolerance: float
+    nodes: int | None
+    indices: tuple[Prepared, ...]
+    wanted: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The wanted columns for each design, and their estimated errors (0 where the rule has none)."""
+
+    values: dict[str, Floats]
+    errors: dict[str, Floats]
+    panels: Panels
+
+
+def columns(names: Iterable[str]) -> tuple[str, ...]:
+    """Columns of a workspace with these local indices."""
+    return (*COLUMNS, *(f"{name}_{kind}" for name in names for kind in STATISTICS))
+
+
+def split(column: str) -> tuple[str, str]:
+    """Local index and statistic of a column, ``("", "")`` of the area and its like."""
+    if column in MEANS:
+        return MEANS[column], "mean"
+    name, _, kind = column.rpartition("_")
+    return (name, kind) if name in INDICES and kind in STATISTICS else ("", "")
+
+
+def batched(column: str) -> bool:
+    """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
+    return column in COLUMNS or split(column)[0] in OF_JACOBIAN
+
+
+def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:
+    """One question a value of ``at``.
+
+    Parameters
+    ----------
+    tolerance : float
+        Of the integrals where the study says none.
+    wanted : sequence of str, optional
+        Columns of the answer; left out, all of those indices that the study asks for.
+
+    Raises
+    ------
+    StudyError
+        If the section lacks what cannot be assumed.
+    """
+    section = study.workspace
+    if section is None or section.point is None:
+        raise _problem(study, "workspace.point", "the point whose workspace is asked for is needed, e.g. {point: C}")
+    mechanism, unit = study.mechanism, study.units.angle_factor
+    outputs = (f"{section.point}.x", f"{section.point}.y")
+    if mechanism.mobility < 2:
+        raise _problem(
+            study, "workspace.point",
+            f"the mobility is {mechanism.mobility}: point {section.point} moves on a curve, not in a region; "
+            "use kinematics",
+        )  # fmt: skip
+    if len(section.at) != mechanism.mobility - 2:
+        raise _problem(
+            study, "workspace.at",
+            f"the mobility is {mechanism.mobility}: beside {section.point}.x and {section.point}.y "
+            f"{mechanism.mobility - 2 or 'no'} coordinates are held, not {len(section.at)}",
+        )  # fmt: skip
+    held = [values for values in section.at.values() if not isinstance(values, Over)]
+    if len(held) < len(section.at):
+        raise _problem(study, "workspace.at", "over a range of a coordinate only the command 'workspace' is answered")
+    try:
+        plan = mechanism.plan((*outputs, *section.at))
+    except MechanismError as error:
+        raise _problem(study, "workspace.point", str(error)) from None
+    field = Field(mechanism, plan, (), section.assembly == "same", section.characteristic_length)
+    if section.characteristic_length is None and mixes(plan.structure.given, mechanism.forward.structure.given):
+        raise _problem(
+            study, "workspace.characteristic_length",
+            "the Jacobian mixes lengths and angles: name the length by which a radian counts, e.g. "
+            "{characteristic_length: 0.1}",
+        )  # fmt: skip
+    sketch = mechanism.sketch_configuration
+    at_sketch = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
+    about = at_sketch if section.scan.about is None else complex(*section.scan.about)
+    start, stop = _scan(section, unit)
+    margin = section.margin * unit
+    if stop - start <= 2 * margin:
+        raise _problem(study, "workspace.margin", "the margin leaves nothing of the scan")
+    factors = [unit if c.quantity == "angle" else 1.0 for c in plan.structure.given[2:]]
+    integrate_by = section.integrate
+    asked = OF_JACOBIAN if section.indices is None else section.indices
+    wanted = columns(asked) if wanted is None else tuple(wanted)
+    indices = prepare(study, list(dict.fromkeys(filter(None, (split(column)[0] for column in wanted)))))
+    return [
+        Question(
+            replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True))),
+            dict(zip(section.at, values, strict=True)), about, (start, stop), (start + margin, stop - margin),
+            section.scan.rays, integrate_by.rule,
+            integrate_by.tolerance if "tolerance" in integrate_by.model_fields_set else tolerance, integrate_by.nodes,
+            indices, wanted,
+        )
+        for values in itertools.product(*held)
+    ]  # fmt: skip
+
+
+def _scan(section: WorkspaceSection, unit: float) -> tuple[float, float]:
+    if section.scan.from_ is None or section.scan.to is None:
+        return 0.0, 2 * np.pi
+    start, stop = section.scan.from_ * unit, section.scan.to * unit
+    return min(start, stop), max(start, stop)
+
+
+def _problem(study: Study, key: str, message: str) -> StudyError:
+    return StudyError((Problem(message, key, str(study.path or "")),))
+
+
+def answer(question: Question, places: Places, count: int, effort: Effort) -> Answer:
+    """Indices of `count` designs, whose changed places are arrays of shape (count,).
+
+    Raises
+    ------
+    AssemblyError
+        If a region has no end.
+    """
+    keep_freed_memory()
+    designs = Designs(question.field, places, count, question.about)
+    cuts = tuple(sorted(set(question.counted) - set(question.scan)))
+    panels = find_panels(designs, question.scan, effort, cuts)
+    if not panels.closes.any():
+        nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
+        return Answer(nothing, {name: np.zeros(count) for name in question.wanted}, panels)
+    samples, gauss = effort.samples, question.rule == "gauss"
+    tolerance = question.tolerance if gauss else AREA_TOLERANCE
+    integrands, peaks = _integrands(question), _peaks(question, designs, panels, samples)
+    endless = _endless(question, integrands, peaks, count)
+    means, doubts = np.full(endless.shape, np.inf), np.zeros(endless.shape)
+    means[:, ~panels.closes] = np.nan
+    # What is infinite for every design need not be looked at.
+    some = np.flatnonzero(~endless[:, panels.closes].all(axis=1))
+    finite = [integrands[k] for k in some]
+    integral = integrate(
+        designs,
+        panels,
+        tolerance,
+        samples,
+        question.counted,
+        finite if gauss else (),
+        endless[some[: len(some) * gauss]],
+    )
+    if gauss:
+        means[some], doubts[some] = integral.mean, integral.mean_error
+    else:
+        means[some] = _simple(question, designs, panels, samples, finite)
+    values: dict[str, Floats] = {"area": integral.area}
+    errors: dict[str, Floats] = {"area": integral.area_error}
+    if {"SUI", "box_area"} & set(question.wanted):
+        box = bounding_box(designs, panels, integral.boundary, samples)
+        values["box_area"], errors["box_area"] = box, np.zeros(count)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values["SUI"], errors["SUI"] = integral.area / box, integral.area_error / box
+    for column in question.wanted:
+        name, kind = split(column)
+        if name:
+            values[column], errors[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
+    pick = question.wanted
+    return Answer({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels)
+
+
+def _integrands(question: Question) -> tuple[Integrand, ...]:
+    """What the wanted means and standard deviations need: the indices, and their squares."""
+    asked = {split(column) for column in question.wanted}
+    return tuple(
+        Integrand(index, power)
+        for power, kinds in ((1, ("mean", "std")), (2, ("std",)))
+        for index in question.indices
+        if any((index.name, kind) in asked for kind in kinds)
+    )
+
+
+def _peaks(question: Question, designs: Designs, panels: Panels, samples: int) -> Peaks | None:
+    """Extremes, where they are wanted or an integral may be infinite."""
+    asked = {split(column) for column in question.wanted}
+    wanted = np.array([[(index.name, kind) in asked for index in question.indices] for kind in ("min", "max")])
+    squares = any(kind == "std" for _, kind in asked)
+    if not wanted.any() and not squares and all(index.index.crossing != np.inf for index in question.indices):
+        return None
+    return find_peaks(designs, panels, question.indices, samples, PEAK_TOLERANCE, wanted)
+
+
+def _endless(question: Question, integrands: Sequence[Integrand], peaks: Peaks | None, count: int) -> NDArray[np.bool_]:
+    """Integrals that are infinite: the integrand grows at least as 1/distance towards a curve."""
+    if peaks is None:
+        return np.zeros((len(integrands), count), dtype=bool)
+    order = dict(zip((index.name for index in question.indices), peaks.order, strict=True))
+    grows = [integrand.power * order[integrand.index.name] >= 1 for integrand in integrands]
+    return np.array(grows, dtype=bool).reshape(-1, count)
+
+
+def _statistic(
+    name: str, kind: str, question: Question, integrands: Sequence[Integrand], means: Floats, doubts: Floats,
+    peaks: Peaks | None,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Values and errors of one statistic of one index."""
+    if kind in ("min", "max"):
+        assert peaks is not None
+        at = (("min", "max").index(kind), [index.name for index in question.indices].index(name))
+        return peaks.value[at], peaks.error[at]
+    row = {(integrand.index.name, integrand.power): k for k, integrand in enumerate(integrands)}
+    mean, doubt = means[row[name, 1]], doubts[row[name, 1]]
+    if kind == "mean":
+        return mean, doubt
+    square, square_doubt = means[row[name, 2]], doubts[row[name, 2]]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = np.where(np.isinf(square), np.inf, np.sqrt(np.maximum(square - mean * mean, 0.0)))
+        total = square_doubt + 2 * np.abs(mean) * doubt
+        # Of a deviation that is nothing but its error the square is in doubt, not the root's slope.
+        error = np.where(np.isinf(spread), 0.0, np.minimum(total / (2 * spread), np.sqrt(total)))
+    return spread, error
+
+
+def _simple(
+    question: Question, designs: Designs, panels: Panels, samples: int, integrands: Sequence[Integrand]
+) -> Floats:
+    nodes = question.nodes or RADIAL_NODES[question.rule]
+    low, high = question.counted
+    if question.rule == "sector_mean":
+        theta = np.linspace(low, high, question.rays or SECTOR_RAYS)
+        fractions = np.arange(1, nodes + 1) / (nodes + 1)
+    else:
+        rays = question.rays or MIDPOINT_RAYS
+        theta = low + (high - low) * (np.arange(rays) + 0.5) / rays
+        fractions = (np.arange(nodes) + 0.5) / nodes
+    return simple_means(
+        designs, integrands, panels.reach, samples, theta, fractions, by_area=question.rule == "midpoint"
+    )
+
+
+__all__ = [
+    "BRISK", "CLOSE", "COLUMNS", "RAYS", "Answer", "Integral", "Question", "answer", "batched", "columns", "questions",
+    "split",
+]  # fmt: skip

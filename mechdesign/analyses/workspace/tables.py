@@ -1,0 +1,143 @@
+"""Tables of a region's boundary and of its singularities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.poses import in_study_units
+from mechdesign.analyses.workspace.curves import Patch
+from mechdesign.analyses.workspace.inscribed import Circle, Rectangle
+from mechdesign.analyses.workspace.loci import around, causes, inside
+from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.analyses.workspace.region import Question
+from mechdesign.results import Column, Table
+from mechdesign.study import Study
+
+# So far inside the boundary (as a part of the radius) the drives are read where rounding opens the mechanism.
+BESIDE = 1e-12
+
+
+def held_columns(study: Study, question: Question, rows: int) -> list[Column]:
+    """The held coordinates, the same in each row."""
+    return [
+        Column(name, np.full(rows, value), study.units.label(study.mechanism.quantity(name)), "held coordinate")
+        for name, value in question.held.items()
+    ]
+
+
+def stacked(parts: Sequence[Sequence[Column]]) -> tuple[Column, ...]:
+    """Columns of several regions below each other."""
+    return tuple(
+        Column(columns[0].name, np.concatenate([column.values for column in columns]), columns[0].unit,
+               columns[0].meaning)
+        for columns in zip(*parts, strict=True)
+    )  # fmt: skip
+
+
+def boundary_columns(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
+    """Points of the boundary curve by curve: what ends the region there, and the drives."""
+    field, told = question.field, causes(question.field)
+    curves = [
+        (patch.theta, radius, margin, side)
+        for side, names in (("inner", ("inner", "enters")), ("outer", ("outer", "leaves")))
+        for patch in found
+        for radius, margin in [(getattr(patch, names[0]), getattr(patch, names[1]))]
+        if margin >= 0
+    ]
+    theta = np.concatenate([curve[0] for curve in curves])
+    radius = np.concatenate([curve[1] for curve in curves])
+    lengths = [len(curve[0]) for curve in curves]
+    z = np.asarray(question.about + radius * np.exp(1j * theta))
+    inwards = np.concatenate([np.full(n, 1.0 if curve[3] == "inner" else -1.0)
+                              for n, curve in zip(lengths, curves, strict=True)])  # fmt: skip
+    within = np.asarray(question.about + radius * (1 + BESIDE * inwards) * np.exp(1j * theta))
+    drives = _drives(question, z, within, np.flatnonzero(np.diff(inwards)) + 1)
+    length, angle = study.units.label("length"), study.units.label("angle")
+    kinds = [field.labels[curve[2]][0] for curve in curves]
+    columns = [
+        *held_columns(study, question, len(z)),
+        Column("x", z.real, length, "place of the point"),
+        Column("y", z.imag, length, "place of the point"),
+        Column("kind", np.repeat(kinds, lengths), "", "what ends the region: limit or singularity"),
+    ]
+    for drive, value in zip(field.mechanism.forward.structure.given, drives, strict=True):
+        shown = np.asarray(in_study_units(study, drive, value))
+        columns.append(Column(drive.name, shown, study.units.label(drive.quantity), "drive's value there"))
+    return [
+        *columns,
+        Column("at", np.repeat([told[curve[2]][1] for curve in curves], lengths), "", "which limit or singularity"),
+        Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
+        Column("side", np.repeat([curve[3] for curve in curves], lengths), "", "which end of the ray's interval"),
+        Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth piece of the boundary"),
+    ]  # fmt: skip
+
+
+def singularity_columns(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
+    """Curves of singularities inside the region and around it."""
+    loci = [*inside(question.field, question.about, found), *around(question.field, question.about, found)]
+    lengths = [len(locus.points) for locus in loci]
+    z = np.concatenate([np.zeros(0, dtype=complex), *(locus.points for locus in loci)])
+    length = study.units.label("length")
+
+    def each(values: Sequence[str]) -> NDArray[np.str_]:
+        return np.repeat(np.array(values, dtype=str), lengths)
+
+    return [
+        *held_columns(study, question, len(z)),
+        Column("curve", np.repeat(np.arange(len(loci)), lengths), "", "points of one curve, in order"),
+        Column("kind", each([locus.kind for locus in loci]), "",
+               "forward: the drives do not hold the mechanism; inverse: a leg is stretched or folded"),
+        Column("x", z.real, length, "place of the point"),
+        Column("y", z.imag, length, "place of the point"),
+        Column("cause", each([locus.cause for locus in loci]), "", "which links, and what they do there"),
+    ]  # fmt: skip
+
+
+def inscribed_columns(study: Study, shapes: Sequence[tuple[Circle, Rectangle]]) -> list[Column]:
+    """The largest circle and rectangle inside each region; nan where it is empty."""
+    length = study.units.label("length")
+    circles, rectangles = [shape[0] for shape in shapes], [shape[1] for shape in shapes]
+    circle, rectangle = "the largest circle inside the region", "the largest axis-parallel rectangle inside the region"
+    return [
+        Column("circle_x", np.array([c.centre.real for c in circles]), length, f"centre of {circle}"),
+        Column("circle_y", np.array([c.centre.imag for c in circles]), length, f"centre of {circle}"),
+        Column("circle_radius", np.array([c.radius for c in circles]), length, f"radius of {circle}"),
+        Column("rectangle_x", np.array([r.centre.real for r in rectangles]), length, f"centre of {rectangle}"),
+        Column("rectangle_y", np.array([r.centre.imag for r in rectangles]), length, f"centre of {rectangle}"),
+        Column("rectangle_width", np.array([r.width for r in rectangles]), length, f"width of {rectangle}"),
+        Column("rectangle_height", np.array([r.height for r in rectangles]), length, f"height of {rectangle}"),
+    ]
+
+
+def outlines(regions: Sequence[tuple[Study, Question, Sequence[Patch]]]) -> list[Table]:
+    """Boundary and singularities of several regions."""
+    return [
+        Table("boundary", stacked([boundary_columns(*region) for region in regions]),
+              "boundary of the region, curve by curve"),
+        Table("singularities", stacked([singularity_columns(*region) for region in regions]),
+              "curves of singularities inside the region and around it"),
+    ]  # fmt: skip
+
+
+def _drives(
+    question: Question, z: NDArray[np.complex128], within: NDArray[np.complex128], sides: NDArray[np.intp]
+) -> list[Floats]:
+    """Drives on the boundary, or just inside where rounding opens the mechanism; angles continuous along each side.
+
+    Of the turns of an angle that is shown which is nearest to the sketch.
+    """
+    exact, near = question.field.configuration(z, {}), question.field.configuration(within, {})
+    found = []
+    for drive in question.field.mechanism.forward.structure.given:
+        here, beside = (np.broadcast_to(c.value(drive), z.shape) for c in (exact, near))
+        values = np.where(np.isfinite(here), here, beside)
+        if drive.quantity == "angle":
+            drawn = float(question.field.mechanism.sketch_configuration.value(drive))
+            parts = [np.unwrap(part) for part in np.split(values, sides)]
+            turns = [2 * np.pi * np.round((np.mean(part) - drawn) / (2 * np.pi)) for part in parts]
+            values = np.concatenate([part - turn for part, turn in zip(parts, turns, strict=True)])
+        found.append(values)
+    return found
