@@ -7,14 +7,14 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study import pose_checks, targets
+from mechdesign.study import pose_checks, reliability_checks, targets
 from mechdesign.study.document import Path
 from mechdesign.study.names import Names
 from mechdesign.study.numbers import suggestion
 from mechdesign.study.optimize_models import Condition, OptimizeSection
 from mechdesign.study.parameters import Parameters
 from mechdesign.study.pose_models import PoseSection
-from mechdesign.study.reliability_models import Dimension, ReliabilitySection
+from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter
 from mechdesign.study.sections import COMMANDS, KinematicsSection
 from mechdesign.study.stiffness_models import StiffnessSection
@@ -46,7 +46,7 @@ def check(
         elif isinstance(section, OptimizeSection):
             checker.optimize(section)
         elif isinstance(section, ReliabilitySection):
-            found[command] = checker.reliability(section)
+            found[command] = reliability_checks.check(checker, section)
         elif isinstance(section, StiffnessSection):
             found[command] = checker.stiffness(section)
     checker.conditions(("requirements",), parts["requirements"])
@@ -174,7 +174,7 @@ class Checker:
                     message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
                     self.reporter.report((*path, key), message)
             if name in self.parameters.factors:
-                quantity: Quantity = "angle" if self._is_angle(name) else "length"
+                quantity: Quantity = "angle" if self.is_angle(name) else "length"
                 for key in ("from", "to", "step"):
                     self.kind((*path, key), quantity)
             above.append(name)
@@ -189,7 +189,7 @@ class Checker:
                 self._result(goal, (*root, key, index))
         self.conditions((*root, "subject_to"), section.subject_to)
 
-    def _is_angle(self, place: str) -> bool:
+    def is_angle(self, place: str) -> bool:
         owner, _, last = place.rpartition(".")
         if owner.startswith("limits."):
             index = int(owner.split(".")[1])
@@ -213,76 +213,6 @@ class Checker:
                 self.reporter.report(path, f"there is no result {name!r}{hint}")
         else:
             self.known(command, COMMANDS, "command", path)
-
-    def reliability(self, section: ReliabilitySection) -> ReliabilitySection:
-        dimensions = self._dimensions(section)
-        clearances = {}
-        for point, clearance in section.clearances.items():
-            path: Path = ("reliability", "clearances", point)
-            if not self.known(point, self.names.owners, "point", path, at_key=True):
-                continue
-            links = self.names.owners[point]
-            held = [*links, *(j.slot for j in self.names.section.joints.values() if j.slot and j.point == point)]
-            if len(held) < 2:
-                self.reporter.report(
-                    path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True
-                )
-            link = clearance.link or links[-1]
-            if link not in links:
-                self.known(link, links, f"link at point {point!r} named", (*path, "link"))
-            elif clearance.effect == "length":
-                binary = self.names.section.links[link]
-                if point not in (binary.from_, binary.to) or binary.telescopic:
-                    message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
-                    self.reporter.report((*path, "effect"), message)
-            clearances[point] = clearance.model_copy(update={"link": link})
-        for name, limit in section.limits.items():
-            path = ("reliability", "limits", name)
-            if limit.radius is not None:
-                self.known(name, self.names.owners, "point", path, at_key=True)
-            elif name in self.names.owners:
-                self.reporter.report(
-                    path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True
-                )
-            else:
-                quantity = self.coordinate(name, path, at_key=True)
-                for key in ("min", "max"):
-                    if quantity in ("length", "angle"):
-                        self.kind((*path, key), quantity)
-        return section.model_copy(update={"dimensions": dimensions, "clearances": clearances})
-
-    def _dimensions(self, section: ReliabilitySection) -> dict[str, Dimension]:
-        """Dimensions with wildcards expanded; a dimension that is named itself wins over a wildcard."""
-        found: dict[str, Dimension] = {}
-        for name, dimension in section.dimensions.items():
-            path: Path = ("reliability", "dimensions", name)
-            if "*" in name or "?" in name:
-                matching = self.parameters.match(name)
-                if not matching:
-                    self.reporter.report(path, f"no dimension matches {name!r}", at_key=True)
-                for place in matching:
-                    self._dimension_kind(place, path)
-                    if place not in section.dimensions:
-                        found[place] = dimension
-                continue
-            if name in self.parameters.formulas:
-                message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
-                self.reporter.report(path, message, at_key=True)
-            known = [*self.parameters.known(), *self.names.drives]
-            if self.known(name, known, "parameter, dimension or drive", path, at_key=True):
-                self._dimension_kind(name, path)
-                found[name] = dimension
-        return found
-
-    def _dimension_kind(self, name: str, path: Path) -> None:
-        if name in self.parameters.nominal:
-            return
-        if name in self.parameters.factors:
-            kind: Quantity = "angle" if self._is_angle(name) else "length"
-        else:
-            kind = self.names.drives[name]
-        for key in ("tolerance", "sigma"):
-            self.kind((*path, key), kind)
 
     def stiffness(self, section: StiffnessSection) -> StiffnessSection:
         root: Path = ("stiffness",)

@@ -262,10 +262,9 @@ def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *forms: dict[str
 
 @dataclass(frozen=True)
 class Choice:
-    """Annotation of a word out of a list; `later` are words of the format that this version does not do yet."""
+    """Annotation of a word out of a list."""
 
     words: tuple[str, ...]
-    later: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self._validate)
@@ -277,23 +276,8 @@ class Choice:
         if isinstance(raw, str) and raw in self.words:
             return raw
         known = ", ".join(self.words)
-        if isinstance(raw, str) and raw in self.later:
-            raise failure(f"{raw!r} is not available in this version; available: {known}")
         hint = suggestion(raw, self.words) if isinstance(raw, str) else ""
         raise failure(f"expected one of {known}, not {shown(raw)}{hint}")
-
-
-class _Unavailable:
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"type": "null", "description": "not available in this version"}
-
-    @staticmethod
-    def _validate(raw: Any) -> None:
-        if raw is not None:
-            raise failure("is not available in this version")
 
 
 def check_parameter_name(name: str) -> str | None:
@@ -307,7 +291,6 @@ NAME_FORM: dict[str, Any] = {"type": "string"}
 NAMES_FORM: dict[str, Any] = {"type": "array", "items": NAME_FORM}
 NUMBER_FORM: dict[str, Any] = {"type": ["number", "string"]}
 
-Unavailable = Annotated[None, _Unavailable()]
 Number = Annotated[float, Reader()]
 Pure = Annotated[float, Reader("none")]
 Positive = Annotated[float, Reader("none", 0.0, True)]

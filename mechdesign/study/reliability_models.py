@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Callable
+from typing import Annotated, Any, NamedTuple, Protocol
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo, model_validator
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, core_schema
 
 from mechdesign.study.lists import CoordinateNames, one_or_many
 from mechdesign.study.models import Model
 from mechdesign.study.numbers import (
+    NAME_FORM,
     NUMBER_FORM,
     Choice,
     Context,
@@ -20,32 +22,102 @@ from mechdesign.study.numbers import (
     NonNegativeLength,
     Number,
     OrShort,
-    Unavailable,
+    Positive,
+    Reader,
     Whole,
     failure,
     or_short,
     read_number,
+    shown,
 )
 from mechdesign.study.pose_models import PoseSection
 
-DISTRIBUTIONS = ("normal", "uniform")
-PIN_MODELS = ("normal", "normal_in_disc", "uniform")
-METHODS = ("analytic", "monte_carlo")
+DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
+PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")
+METHODS = (
+    "analytic",
+    "second_order",
+    "monte_carlo",
+    "quasi_monte_carlo",
+    "form",
+    "importance_sampling",
+    "auto",
+)
+DEFAULT_METHODS = ("analytic", "monte_carlo")
+# Components of a random load, and their kinds of quantity.
+LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
+_ORDERS = {"_velocity": 1, "_acceleration": 2}
+
+
+def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
+    """The coordinate (or point) that a name is about, and whether it means the position, velocity or acceleration."""
+    for suffix, order in _ORDERS.items():
+        if not known(name) and name.endswith(suffix) and known(name.removesuffix(suffix)):
+            return name.removesuffix(suffix), order
+    return name, 0
+
+
+class _Tolerance:
+    """Annotation of a tolerance: a half-width, or the lowest and the highest deviation."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        pair = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
+        return {"anyOf": [NUMBER_FORM, pair], "description": "a half-width, or the lowest and highest deviation"}
+
+    @staticmethod
+    def _validate(raw: Any, info: ValidationInfo) -> tuple[float, float]:
+        context: Context = info.context or Context()
+        if not isinstance(raw, list):
+            half = read_number(raw, context).nominal
+            if half < 0:
+                raise failure(f"must be at least 0, not {half:g}; two bounds are written [-0.1, 0.3]")
+            return -half, half
+        if len(raw) != 2:
+            raise failure(f"expected a half-width or two bounds such as [-0.1, 0.3], not {shown(raw)}")
+        low, high = (read_number(each, context).nominal for each in raw)
+        if low > high:
+            raise failure(f"the lowest deviation {low:g} is above the highest {high:g}")
+        return low, high
+
+
+Tolerance = Annotated[tuple[float, float], _Tolerance()]
+
+
+class Spread(Protocol):
+    """How far something varies, and how."""
+
+    @property
+    def tolerance(self) -> tuple[float, float] | None:
+        """Lowest and highest deviation."""
+
+    @property
+    def sigma(self) -> float | None:
+        """Standard deviation, where there is no tolerance."""
+
+    @property
+    def distribution(self) -> str:
+        """One of `DISTRIBUTIONS`."""
 
 
 class Dimension(Model):
-    """A dimension's variation: nominal +- tolerance, or its standard deviation."""
+    """A dimension's variation: nominal +- tolerance, or its standard deviation.
 
-    tolerance: NonNegative | None = None
+    Of a tolerance ``normal`` makes three standard deviations, ``truncated_normal`` the same and cuts there; ``uniform``
+    fills it, ``triangular`` peaks at the nominal value, ``lognormal`` has the mean and the deviation of ``normal``.
+    """
+
+    tolerance: Tolerance | None = None
     sigma: NonNegative | None = None
     distribution: Annotated[str, Choice(DISTRIBUTIONS)] = "normal"
 
     @model_validator(mode="before")
     @classmethod
     def _bare(cls, raw: Any) -> Any:
-        if isinstance(raw, dict) and isinstance(raw.get("tolerance"), list):
-            raise failure("a tolerance with two bounds is not available in this version; give the half-width")
-        return {"tolerance": raw} if isinstance(raw, int | float | str) and not isinstance(raw, bool) else raw
+        short = isinstance(raw, int | float | str | list) and not isinstance(raw, bool)
+        return {"tolerance": raw} if short else raw
 
     @model_validator(mode="after")
     def _one_width(self) -> Dimension:
@@ -53,17 +125,10 @@ class Dimension(Model):
             raise failure("a dimension needs either 'tolerance' or 'sigma'")
         return self
 
-    @property
-    def standard_deviation(self) -> float:
-        """Sigma of the distribution: tolerance/3 (normal), tolerance/sqrt(3) (uniform)  [S2]."""
-        if self.sigma is not None:
-            return self.sigma
-        assert self.tolerance is not None
-        return self.tolerance / (3.0 if self.distribution == "normal" else 3.0**0.5)
-
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return or_short(schema, handler, NUMBER_FORM)
+        pair = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
+        return or_short(schema, handler, NUMBER_FORM, pair)
 
 
 class PinModel(Model):
@@ -87,7 +152,7 @@ class Clearance(Model):
 
     radial: NonNegativeLength | None = None
     diametral: NonNegativeLength | None = None
-    tolerance: NonNegativeLength = 0.0
+    tolerance: Tolerance = (0.0, 0.0)
     distribution: Annotated[str, Choice(DISTRIBUTIONS)] = "normal"
     pin: PinModel = PinModel()
     link: LinkName | None = None
@@ -105,9 +170,13 @@ class Clearance(Model):
         return self.radial if self.radial is not None else 0.5 * (self.diametral or 0.0)
 
     @property
-    def radius_tolerance(self) -> float:
-        """Tolerance of the radial clearance."""
-        return self.tolerance if self.radial is not None else 0.5 * self.tolerance
+    def radius_spread(self) -> Dimension | None:
+        """Variation of the radial clearance; None where it has none."""
+        if self.tolerance == (0.0, 0.0):
+            return None
+        factor = 1.0 if self.radial is not None else 0.5
+        low, high = (factor * end for end in self.tolerance)
+        return Dimension.model_construct(tolerance=(low, high), sigma=None, distribution=self.distribution)
 
 
 class ErrorLimit(Model):
@@ -115,7 +184,7 @@ class ErrorLimit(Model):
 
     min: Number | None = None
     max: Number | None = None
-    radius: NonNegativeLength | None = None
+    radius: NonNegative | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -142,26 +211,108 @@ class ErrorLimit(Model):
         return or_short(schema, handler, NUMBER_FORM)
 
 
+class Precision(Model):
+    """How precise a failure probability is wanted: half the width of its 99.7 % interval."""
+
+    relative: Annotated[float, Reader("none", 0.0, True)] | None = None
+    half_width: Annotated[float, Reader("none", 0.0, True)] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, raw: Any) -> Any:
+        return {"relative": raw} if isinstance(raw, int | float | str) and not isinstance(raw, bool) else raw
+
+    @model_validator(mode="after")
+    def _one(self) -> Precision:
+        if (self.relative is None) == (self.half_width is None):
+            raise failure("give either 'relative', a fraction of the failure probability, or 'half_width'")
+        return self
+
+    def reached(self, value: float, low: float, high: float) -> bool:
+        """Whether an interval of a failure probability is narrow enough."""
+        half = 0.5 * (high - low)
+        return half <= self.half_width if self.half_width is not None else half <= (self.relative or 0.0) * value
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return or_short(schema, handler, NUMBER_FORM)
+
+
+class Cost(Model):
+    """What a tolerance T costs: a/T^exponent."""
+
+    a: Positive = 1.0
+    exponent: Positive = 1.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, raw: Any) -> Any:
+        return {"a": raw} if isinstance(raw, int | float | str) and not isinstance(raw, bool) else raw
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return or_short(schema, handler, NUMBER_FORM)
+
+
+class Allocate(Model):
+    """The cheapest tolerances that reach a reliability."""
+
+    reliability: Annotated[float, Reader("none", 0.0, True)]
+    cost: dict[str, Cost] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _possible(self) -> Allocate:
+        if not 0.0 < self.reliability < 1.0:
+            raise failure(f"a reliability lies between 0 and 1, not {self.reliability:g}")
+        return self
+
+
+class Correlated(NamedTuple):
+    """Two dimensions and the correlation coefficient of their deviations."""
+
+    one: str
+    other: str
+    coefficient: float
+
+
+class _Correlation:
+    """Annotation of one correlation: [name, name, coefficient]."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"type": "array", "prefixItems": [NAME_FORM, NAME_FORM, NUMBER_FORM], "minItems": 3, "maxItems": 3}
+
+    @staticmethod
+    def _validate(raw: Any, info: ValidationInfo) -> Correlated:
+        if not isinstance(raw, list) or len(raw) != 3 or not all(isinstance(name, str) for name in raw[:2]):
+            raise failure(f"a correlation is [name, name, coefficient], for example [r1, r2, 0.5], not {shown(raw)}")
+        coefficient = read_number(raw[2], info.context or Context(), "none").nominal
+        if not -1.0 < coefficient < 1.0 and coefficient == coefficient:
+            raise failure(
+                f"a correlation lies between -1 and 1, not {coefficient:g}; what is the same is one parameter"
+            )
+        if raw[0] == raw[1]:
+            raise failure(f"{raw[0]!r} is correlated with itself")
+        return Correlated(raw[0], raw[1], coefficient)
+
+
 class ReliabilitySection(PoseSection):
     """How precise is it when it is really made?"""
 
     dimensions: dict[str, Dimension] = Field(default_factory=dict)
     clearances: dict[str, Clearance] = Field(default_factory=dict)
+    correlation: tuple[Annotated[Correlated, _Correlation()], ...] = ()
     outputs: CoordinateNames | None = None
     rates: dict[CoordinateName, Number] = Field(default_factory=dict)
     accelerations: dict[CoordinateName, Number] = Field(default_factory=dict)
     limits: dict[CoordinateName, ErrorLimit] = Field(default_factory=dict)
     methods: Annotated[
-        tuple[
-            Annotated[
-                str, Choice(METHODS, ("second_order", "quasi_monte_carlo", "form", "importance_sampling", "auto"))
-            ],
-            ...,
-        ],
+        tuple[Annotated[str, Choice(METHODS)], ...],
         BeforeValidator(one_or_many),
         OrShort(({"enum": list(METHODS)},)),
-    ] = METHODS
+    ] = DEFAULT_METHODS
     samples: Annotated[int, Whole(2, 10**15)] = 40_000
-    precision: Unavailable = None
-    correlation: Unavailable = None
-    allocate: Unavailable = None
+    precision: Precision | None = None
+    allocate: Allocate | None = None

@@ -109,3 +109,33 @@ def test_simulation_error_is_that_of_the_paper() -> None:
 def test_a_correlation_beyond_one_by_rounding_is_one(rho: float) -> None:
     found = rectangle_failure(np.array([-2.0, -3.0]), np.array([2.0, 3.0]), rho)
     assert found == pytest.approx(2 * ndtr(-2.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("covariance", [np.eye(2), np.array([[2.0, 0.6], [0.6, 1.0]]), np.diag([1.0, 1e-4])])
+@pytest.mark.parametrize("mean", [(0.5, -0.3), (2.5, 1.0), (0.0, 4.0)])
+def test_disc_about_another_place_than_the_mean(covariance: np.ndarray, mean: tuple[float, float]) -> None:
+    """Against the integral over the direction from zero of the closed radial one, by the trapezoidal rule."""
+    radius, inverse = 2.0, np.linalg.inv(covariance)
+    turn = 2 * np.pi * np.arange(40000) / 40000
+    around = np.stack([np.cos(turn), np.sin(turn)])
+    a = np.einsum("it,ij,jt->t", around, inverse, around)
+    b = np.einsum("it,ij,j->t", around, inverse, mean)
+    c = np.asarray(mean) @ inverse @ np.asarray(mean)
+    # The integral of r exp(-(a r^2 - 2 b r + c)/2) from the radius on.
+    far = np.sqrt(2 * np.pi / a) * ndtr(-(radius - b / a) * np.sqrt(a)) * b / a * np.exp(-0.5 * (c - b * b / a))
+    expected = np.mean(np.exp(-0.5 * (a * radius**2 - 2 * b * radius + c)) / a + far) / np.sqrt(
+        np.linalg.det(covariance)
+    )
+    assert disc_failure(covariance, radius, np.array(mean)) == pytest.approx(expected, rel=1e-11)
+
+
+def test_limits_about_another_place_than_the_mean() -> None:
+    covariance, mean = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([0.4, -0.7])
+    one, two = Band(0, -2.0, 3.0), Band(1, -4.0, 2.0)
+    moved = [Band(0, -2.4, 2.6), Band(1, -3.3, 2.7)]
+    assert failure_probability(covariance, (one, two), (), mean) == failure_probability(covariance, moved, ())
+    # By the lattice, which takes bands and discs together.
+    disc = Disc(0, 1, 2.5)
+    alone = disc_failure(covariance, 2.5, mean)
+    wide = (Band(0, -50.0, 50.0),)
+    assert failure_probability(covariance, wide, (disc,), mean) == pytest.approx(alone, rel=1e-4)

@@ -1,54 +1,158 @@
-"""Moments of every distribution and pin law, and streams that depend on nothing but seed, pose and chunk."""
+"""Random draws against the moments, ends and quantiles of their distributions."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
-from mechdesign.analyses.reliability.sampling import PIN_VARIANCE, deviations, generator, pins
+from mechdesign.analyses.reliability.correlation import Correlation
+from mechdesign.analyses.reliability.marginals import (
+    Lognormal,
+    Marginal,
+    Normal,
+    Triangular,
+    TruncatedNormal,
+    Uniform,
+    marginal,
+)
+from mechdesign.analyses.reliability.pins import PIN_LAWS
+from mechdesign.analyses.reliability.sampling import generator
+from mechdesign.errors import StudyError
+from mechdesign.study.reliability_models import DISTRIBUTIONS, Dimension
 
-SAMPLES = 400_000
+SAMPLES = 200_000
+LAWS: dict[str, Marginal] = {
+    "normal": Normal(0.1, 0.2),
+    "truncated": TruncatedNormal(-0.1, 0.2),
+    "uniform": Uniform(-0.1, 0.3),
+    "triangular": Triangular(-0.1, 0.0, 0.3),
+    "lognormal": Lognormal(1.0, 1.1, 0.2),
+}
+# Panels fine enough for the kink of a triangular law's density, in standard normal variables.
+EDGES = np.linspace(-12, 12, 4001)
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+U = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + 0.5 * np.diff(EDGES)[:, None] * NODES).ravel()
+DENSITY = (0.5 * np.diff(EDGES)[:, None] * WEIGHTS).ravel() * np.exp(-0.5 * U * U) / np.sqrt(2 * np.pi)
 
 
-@pytest.mark.parametrize(("distribution", "kurtosis"), [("normal", 3.0), ("uniform", 1.8)])
-def test_deviations(distribution: str, kurtosis: float) -> None:
-    drawn = deviations(generator(1, 0, 0), distribution, 0.2, SAMPLES)
-    assert abs(drawn.mean()) < 4 * 0.2 / np.sqrt(SAMPLES)
-    assert drawn.std() == pytest.approx(0.2, rel=4 * np.sqrt((kurtosis - 1) / 4 / SAMPLES))
-    assert np.mean((drawn / drawn.std()) ** 4) == pytest.approx(kurtosis, rel=0.02)
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_moments_are_those_of_the_quantiles(law: Marginal) -> None:
+    mean, *central = law.moments
+    x = law.at(U)
+    assert DENSITY @ x == pytest.approx(mean, rel=1e-9)
+    for order, moment in zip((2, 3, 4), central, strict=True):
+        scale = central[0] ** (order / 2)
+        assert DENSITY @ (x - mean) ** order == pytest.approx(moment, rel=1e-6, abs=1e-6 * scale)
 
 
-def test_uniform_deviations_stay_within_the_half_width() -> None:
-    drawn = deviations(generator(1, 0, 0), "uniform", 1.0, SAMPLES)
-    assert np.abs(drawn).max() <= np.sqrt(3.0)
-    assert np.abs(drawn).max() == pytest.approx(np.sqrt(3.0), abs=1e-4)
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_draws_have_the_law_of_the_quantiles(law: Marginal) -> None:
+    """Kolmogorov's distance; 1.95/sqrt(n) is passed once in a thousand."""
+    drawn = np.sort(law.draw(generator(1, 0, 0), SAMPLES))
+    u = np.linspace(-4, 4, 400)
+    share = np.searchsorted(drawn, law.at(u)) / SAMPLES
+    assert np.abs(share - ndtr(u)).max() < 1.95 / np.sqrt(SAMPLES)
 
 
-@pytest.mark.parametrize("law", PIN_VARIANCE)
-def test_pins_have_the_variance_that_the_analytic_method_takes(law: str) -> None:
-    x, y = pins(generator(2, 0, 0), law, SAMPLES)
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_quantiles_rise_and_keep_their_digits_far_out(law: Marginal) -> None:
+    u = np.linspace(-9, 9, 181)
+    x = law.at(u)
+    assert np.all(np.diff(x) >= 0)
+    if isinstance(law, Uniform | Triangular):
+        # The chance of being nearer to an end than this is that of the variable behind.
+        assert law.at(np.array([-8.0]))[0] - law.low == pytest.approx(
+            0.4 * ndtr(-8.0) if isinstance(law, Uniform) else np.sqrt(ndtr(-8.0) * 0.4 * 0.1), rel=1e-3, abs=1e-16
+        )
+
+
+def test_a_tolerance_is_three_sigma_its_ends_or_its_peak() -> None:
+    found = {
+        name: marginal(Dimension(tolerance=[-0.1, 0.3], distribution=name), 2.0, 10.0)  # type: ignore[arg-type]
+        for name in DISTRIBUTIONS
+    }
+    assert found["normal"] == Normal(1.0, pytest.approx(2.0 / 3.0))
+    assert found["truncated_normal"] == TruncatedNormal(1.0, pytest.approx(2.0 / 3.0))
+    assert found["uniform"] == Uniform(-1.0, 3.0)
+    assert found["triangular"] == Triangular(-1.0, 0.0, 3.0)
+    assert found["lognormal"] == Lognormal(2.0, 3.0, pytest.approx(2.0 / 3.0))
+    for name in DISTRIBUTIONS:
+        law = marginal(Dimension(sigma=0.2, distribution=name), 2.0)
+        # What is cut loses a little of the deviation that is asked for before the cut.
+        cut = 0.9733369 if name == "truncated_normal" else 1.0
+        assert law.moments[1] == pytest.approx(0.04 * cut, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", PIN_LAWS)
+def test_pins(name: str) -> None:
+    law = PIN_LAWS[name]
+    x, y = law.draw(generator(2, 0, 0), SAMPLES)
     for drawn in (x, y):
-        error = np.sqrt((np.mean(drawn**4) - np.mean(drawn**2) ** 2) / SAMPLES)
-        assert abs(np.mean(drawn**2) - PIN_VARIANCE[law]) < 4 * error
-        assert abs(drawn.mean()) < 4 * drawn.std() / np.sqrt(SAMPLES)
-    assert abs(np.mean(x * y)) < 4 * np.std(x * y) / np.sqrt(SAMPLES)
+        error = np.sqrt(np.mean(drawn**4) / SAMPLES)
+        assert abs(np.mean(drawn**2) - law.variance) < 4 * error
+        assert abs(np.mean(drawn**4) - law.fourth) < 4 * np.std(drawn**4) / np.sqrt(SAMPLES) + 1e-12
+    assert abs(np.mean(x * y)) < 4 * law.variance / np.sqrt(SAMPLES)
+    assert np.mean(x * x * y * y) == pytest.approx(law.fourth / 3, rel=0.02)
 
 
-def test_variance_of_the_normal_law_cut_to_the_circle() -> None:
-    assert PIN_VARIANCE["normal_in_disc"] == pytest.approx(0.1054942148, abs=5e-11)
+@pytest.mark.parametrize("name", PIN_LAWS)
+def test_pins_from_normal_variables_have_the_same_law(name: str) -> None:
+    law = PIN_LAWS[name]
+    x, y = law.at(*generator(3, 0, 0).standard_normal((2, SAMPLES)))
+    other = np.sort(np.hypot(*law.draw(generator(4, 0, 0), SAMPLES)))
+    radius = np.sort(np.hypot(x, y))
+    levels = np.linspace(0, 1.2, 200)
+    gap = np.searchsorted(radius, levels) - np.searchsorted(other, levels)
+    if name != "contact":
+        assert np.abs(gap).max() / SAMPLES < 1.95 * np.sqrt(2 / SAMPLES)
+    turn = np.sort(np.arctan2(y, x))
+    even = (turn + np.pi) / (2 * np.pi)
+    assert np.abs(even - (np.arange(SAMPLES) + 0.5) / SAMPLES).max() < 1.95 / np.sqrt(SAMPLES)
 
 
-def test_pins_in_the_disc_stay_there_and_normal_ones_do_not() -> None:
-    reach = {law: np.hypot(*pins(generator(2, 0, 0), law, SAMPLES)).max() for law in PIN_VARIANCE}
-    assert reach["normal_in_disc"] <= 1.0
-    assert reach["uniform"] <= 1.0
-    assert reach["normal"] > 1.0
+def test_pins_near_the_middle_of_normal_variables_have_no_kink() -> None:
+    for law in PIN_LAWS.values():
+        if law is not PIN_LAWS["contact"]:
+            small = np.array([1e-160, 1e-9, 1e-5])
+            x, y = law.at(small, -small)
+            assert x / small == pytest.approx(np.full(3, x[2] / small[2]), rel=1e-9)
+            assert y == pytest.approx(-x)
 
 
-def test_uniform_pins_fill_the_disc_evenly() -> None:
-    radius = np.hypot(*pins(generator(2, 0, 0), "uniform", SAMPLES))
+def test_the_normal_law_cut_to_the_disc_has_the_variance_of_s2() -> None:
+    assert PIN_LAWS["normal_in_disc"].variance == pytest.approx(0.1054942148, abs=5e-11)
+
+
+def test_which_pins_leave_their_hole() -> None:
+    reach = {name: np.hypot(*law.draw(generator(2, 0, 0), SAMPLES)).max() for name, law in PIN_LAWS.items()}
+    assert reach["normal"] > 1
+    assert 0.99 < reach["normal_in_disc"] <= 1
+    assert 0.99 < reach["uniform"] <= 1
+    assert reach["contact"] == pytest.approx(1)
+
+
+def test_pins_that_are_uniform_fill_the_disc_evenly() -> None:
+    radius = np.hypot(*PIN_LAWS["uniform"].draw(generator(2, 0, 0), SAMPLES))
     shares, _ = np.histogram(radius**2, 10, (0, 1))
     assert np.abs(shares / SAMPLES - 0.1).max() < 4 * np.sqrt(0.09 / SAMPLES)
+
+
+@pytest.mark.parametrize("names", [("normal", "uniform"), ("lognormal", "triangular"), ("uniform", "uniform")])
+def test_correlation_of_any_two_laws_is_what_was_asked(names: tuple[str, str]) -> None:
+    laws = [LAWS[name] for name in names]
+    for asked in (0.7, -0.4):
+        mixed = Correlation.of(laws, {(0, 1): asked}).mix(generator(5, 0, 0).standard_normal((2, SAMPLES)))
+        found = np.corrcoef(*(law.at(u) for law, u in zip(laws, mixed, strict=True)))[0, 1]
+        assert found == pytest.approx(asked, abs=4 / np.sqrt(SAMPLES))
+
+
+def test_correlations_that_no_laws_have() -> None:
+    three = [Normal(0, 1)] * 3
+    with pytest.raises(StudyError, match="contradict"):
+        Correlation.of(three, {(0, 1): 0.9, (1, 2): 0.9, (0, 2): -0.9})
+    with pytest.raises(StudyError, match="cannot have"):
+        Correlation.of([Lognormal(1, 1, 2.0), Lognormal(1, 1, 2.0)], {(0, 1): -0.9})
 
 
 def test_streams_are_told_apart_by_seed_pose_and_chunk() -> None:

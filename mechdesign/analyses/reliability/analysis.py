@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,16 @@ from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.error_limits import Band, Disc
 from mechdesign.analyses.reliability.first_order import Channel, FirstOrder, Rates, linear_errors, nominal_values
 from mechdesign.analyses.reliability.simulation import Setting, Sums, simulate
-from mechdesign.analyses.reliability.sources import Source, find_sources
-from mechdesign.errors import StudyError
-from mechdesign.mechanism import Configuration, Reason
+from mechdesign.analyses.reliability.sources import Sources, find_sources
+from mechdesign.errors import MechanismError, StudyError
+from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.memory import keep_freed_memory
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.reliability_models import ReliabilitySection
+from mechdesign.study.reliability_models import ReliabilitySection, split_order
 
 Floats = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     poses = study.poses("reliability")
     nominal = NominalPoses.solve(study, poses, question)
     failures, failed = judge_failures(study, poses, nominal.reason)
-    linear = first_order(study, nominal, question, sources.first_order()) if "analytic" in section.methods else None
+    linear = first_order(study, nominal, question, sources) if "analytic" in section.methods else None
     sums: list[Sums | None] = [None] * poses.count
     if "monte_carlo" in section.methods:
         settings = _settings(study, nominal, question, linear, poses.listed)
@@ -133,7 +133,7 @@ def first_order_tables(
     assert section is not None
     question = ask(study, section)
     nominal = NominalPoses.solve(study, poses, question)
-    linear = first_order(study, nominal, question, sources.first_order())
+    linear = first_order(study, nominal, question, sources)
     centres = _in_order(study, poses, question, nominal)
     none: list[Sums | None] = [None] * poses.count
     answer = tables.Answer(study, poses, question, ("analytic",), nominal.reason, centres, linear, none)
@@ -146,9 +146,12 @@ def first_order_tables(
 def ask(study: Study, section: ReliabilitySection) -> Question:
     """Channels and limits of a section; limited coordinates are outputs too."""
     mechanism = study.mechanism
-    limited = [f"{name}.{axis}" if limit.radius is not None else name
-               for name, limit in section.limits.items()
-               for axis in ("xy" if limit.radius is not None else "x")]  # fmt: skip
+    limits = [(*_limited(mechanism, name), limit) for name, limit in section.limits.items()]
+    limited = [
+        part
+        for base, _, limit in limits
+        for part in ((f"{base}.x", f"{base}.y") if limit.radius is not None else (base,))
+    ]
     names = section.outputs or (() if limited else default_outputs(mechanism))
     outputs = expand_outputs(study, tuple(names))
     known = [output.name for output in outputs]
@@ -165,15 +168,16 @@ def ask(study: Study, section: ReliabilitySection) -> Question:
     ))  # fmt: skip
     orders = 3 if section.rates or section.accelerations else 1
     bands, discs = [], []
-    for name, limit in section.limits.items():
+    for base, order, limit in limits:
+        begin = order * len(outputs)
         if limit.radius is not None:
-            discs.append(Disc(known.index(f"{name}.x"), known.index(f"{name}.y"), limit.radius))
+            discs.append(Disc(begin + known.index(f"{base}.x"), begin + known.index(f"{base}.y"), limit.radius))
         else:
             low, high = (
-                float(radians(study, mechanism.coordinate(name), value)) if value is not None else bound
+                float(radians(study, mechanism.coordinate(base), value)) if value is not None else bound
                 for value, bound in ((limit.min, -np.inf), (limit.max, np.inf))
             )
-            bands.append(Band(known.index(name), low, high))
+            bands.append(Band(begin + known.index(base), low, high))
     pair: tuple[int, int] | None = None
     if len(bands) == 2 and not discs:
         pair = (bands[0].output, bands[1].output)
@@ -183,6 +187,18 @@ def ask(study: Study, section: ReliabilitySection) -> Question:
         pair = (0, 1)
     channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
     return Question(tuple(outputs), orders, channels, rates, tuple(bands), tuple(discs), pair)
+
+
+def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
+    """The coordinate or point of a limit, and the order that is limited."""
+
+    def known(name: str) -> bool:
+        try:
+            return name in mechanism.points or bool(mechanism.coordinate(name))
+        except MechanismError:
+            return False
+
+    return split_order(name, known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +240,7 @@ class NominalPoses:
         return np.isin(self.reason, (Reason.OK, Reason.LIMIT))
 
 
-def first_order(study: Study, nominal: NominalPoses, question: Question, sources: tuple[Source, ...]) -> FirstOrder:
+def first_order(study: Study, nominal: NominalPoses, question: Question, sources: Sources) -> FirstOrder:
     """Linear error model at every pose; nan where the pose is not assembled."""
     parts: FirstOrder | None = None
     components = np.zeros((len(question.channels), 0, 0))
@@ -240,14 +256,14 @@ def first_order(study: Study, nominal: NominalPoses, question: Question, sources
             components[:, :, rows[block]] = parts.components
     assert parts is not None
     components[:, :, ~nominal.assembled] = np.nan
-    return FirstOrder(sources, components, parts.owner, parts.variance)
+    return replace(parts, components=components)
 
 
 def _settings(
     study: Study, nominal: NominalPoses, question: Question, linear: FirstOrder | None, listed: bool
 ) -> list[Setting]:
     mechanism = study.mechanism
-    sigma = None if linear is None else np.sqrt(np.einsum("czp,z->cp", linear.components**2, linear.variance))
+    sigma = None if linear is None else linear.deviation()
     assembled = np.flatnonzero(nominal.assembled)
     settings = []
     for rows, configuration, drives, given in nominal.groups:

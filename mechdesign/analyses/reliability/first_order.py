@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.reliability.sources import Source
+from mechdesign.analyses.reliability.sources import Source, Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
@@ -47,18 +47,42 @@ class FirstOrder:
         Derivative of each channel (radians, lengths) by each independent component of the sources.
     owner : ndarray of int, shape (components,)
         The source of each component.
-    variance : ndarray, shape (components,)
+    mean, variance : ndarray, shape (components,)
+    correlation : ndarray, shape (components, components), or None
+        Correlation coefficients of the components; None where they are independent.
     """
 
     sources: tuple[Source, ...]
     components: Floats
     owner: NDArray[np.intp]
+    mean: Floats
     variance: Floats
+    correlation: Floats | None
 
     def covariance(self) -> Floats:
         """Covariance of the channels, shape (poses, channels, channels) [S2, eq. 9]."""
         moved = np.moveaxis(self.components, 2, 0)
-        return np.asarray((moved * self.variance) @ np.swapaxes(moved, 1, 2))
+        return (
+            np.asarray((moved * self.variance) @ np.swapaxes(moved, 1, 2))
+            if self.correlation is None
+            else (np.asarray(moved @ self._spread @ np.swapaxes(moved, 1, 2)))
+        )
+
+    @property
+    def _spread(self) -> Floats:
+        """Covariance of the components."""
+        sigma = np.sqrt(self.variance)
+        return np.diag(self.variance) if self.correlation is None else self.correlation * np.outer(sigma, sigma)
+
+    def deviation(self) -> Floats:
+        """Standard deviation of each channel, shape (channels, poses)."""
+        if self.correlation is None:
+            return np.asarray(np.sqrt(np.einsum("czp,z->cp", self.components**2, self.variance)))
+        return np.asarray(np.sqrt(np.einsum("czp,zy,cyp->cp", self.components, self._spread, self.components)))
+
+    def shift(self) -> Floats:
+        """Mean error of each channel, shape (channels, poses): of tolerances that are not symmetric."""
+        return np.asarray(np.einsum("czp,z->cp", self.components, self.mean))
 
     def sensitivity(self) -> Floats:
         """Per source, shape (channels, sources, poses): the derivative, of a pin sqrt(s_x^2 + s_y^2)."""
@@ -68,9 +92,15 @@ class FirstOrder:
             found[:, k] = own[:, 0] if own.shape[1] == 1 else np.sqrt((own * own).sum(axis=1))
         return found
 
-    def share(self, sensitivity: Floats) -> Floats:
-        """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies."""
-        parts = sensitivity**2 * np.array([source.variance for source in self.sources])[:, None]
+    def share(self) -> Floats:
+        """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies.
+
+        Of correlated sources each has its covariance with the error, which may be negative.
+        """
+        owned = np.zeros((len(self.sources), len(self.owner)))
+        owned[self.owner, np.arange(len(self.owner))] = 1.0
+        each = self.components * np.einsum("zy,cyp->czp", self._spread, self.components)
+        parts = np.einsum("sz,czp->csp", owned, each)
         total = parts.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
 
@@ -106,7 +136,7 @@ def linear_errors(
     mechanism: Mechanism,
     configuration: Configuration,
     channels: Sequence[Channel],
-    sources: tuple[Source, ...],
+    sources: Sources,
     rates: Rates,
 ) -> FirstOrder:
     """Linear error model at a flat batch of nominal configurations, the drives held.
@@ -116,7 +146,8 @@ def linear_errors(
     MechanismError
         For the acceleration of a measure that is an expression.
     """
-    directions = [(k, direction) for k, source in enumerate(sources) for direction in source.directions]
+    linear_sources = sources.first_order
+    directions = [(k, direction) for k, source in enumerate(linear_sources) for direction in source.directions]
     names = list(dict.fromkeys(name for _, direction in directions for name in direction))
     by_place = np.zeros((len(channels), len(names), *configuration.shape))
     if names:
@@ -141,8 +172,10 @@ def linear_errors(
         for name, slope in direction.items():
             slopes[row, names.index(name)] = slope
     return FirstOrder(
-        sources,
+        linear_sources,
         np.einsum("zn,cnp->czp", slopes, by_place),
         np.array([k for k, _ in directions], dtype=np.intp),
-        np.array([sources[k].variance for k, _ in directions]),
+        np.array([linear_sources[k].mean for k, _ in directions]),
+        np.array([linear_sources[k].variance for k, _ in directions]),
+        sources.correlated(),
     )

@@ -26,8 +26,10 @@ _LATTICE = 8191
 _SHIFTS = 8
 
 
-def failure_probability(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc]) -> float:
-    """Probability that normal errors of mean zero break any limit.
+def failure_probability(
+    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats | None = None
+) -> float:
+    """Probability that normal errors break any limit.
 
     Parameters
     ----------
@@ -36,10 +38,14 @@ def failure_probability(covariance: Floats, bands: Sequence[Band], discs: Sequen
     bands, discs
         All limits must hold. One or two limited outputs are integrated to about 1e-14 of the result; more by a
         randomised lattice, to about 1e-5 of it.
+    mean : ndarray, shape (outputs,), optional
+        Of the errors; left out, zero.
     """
     sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    if not np.isfinite(covariance).all():
+    mean = np.zeros(len(covariance)) if mean is None else mean
+    if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
         return float("nan")
+    bands = [Band(b.output, b.low - float(mean[b.output]), b.high - float(mean[b.output])) for b in bands]
     if len(bands) == 1 and not discs:
         (band,) = bands
         return _outside(band.low, band.high, float(sigma[band.output]))
@@ -48,8 +54,9 @@ def failure_probability(covariance: Floats, bands: Sequence[Band], discs: Sequen
         return _rectangle(one, two, covariance)
     if len(discs) == 1 and not bands:
         (disc,) = discs
-        return disc_failure(covariance[np.ix_([disc.x, disc.y], [disc.x, disc.y])], disc.radius)
-    return _lattice(covariance, bands, discs)
+        pair = [disc.x, disc.y]
+        return disc_failure(covariance[np.ix_(pair, pair)], disc.radius, mean[pair])
+    return _lattice(covariance, bands, discs, mean)
 
 
 def _outside(low: float, high: float, sigma: float) -> float:
@@ -107,28 +114,34 @@ def rectangle_failure(low: Floats, high: Floats, rho: float) -> float:
     return float(total + np.sum(weight * density * tails))
 
 
-def disc_failure(covariance: Floats, radius: float) -> float:
-    """P(bivariate normal of mean zero outside a circle about zero); `covariance` of shape (2, 2).
+def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) -> float:
+    """P(bivariate normal outside a circle about zero); `covariance` of shape (2, 2), `mean` of shape (2,), else zero.
 
     Notes
     -----
     In principal axes with standard deviations a >= b, over x = radius sin t, which removes the root at the rim.
     """
-    b, a = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 0.0))
+    squares, axes = np.linalg.eigh(covariance)
+    b, a = np.sqrt(np.maximum(squares, 0.0))
+    n, m = (0.0, 0.0) if mean is None else axes.T @ mean
     if radius <= 0 or a == 0:
-        return 0.0 if a == 0 else 1.0
-    total = _outside(-radius, radius, float(a))
+        return 0.0 if a == 0 and np.hypot(m, n) <= radius > 0 else 1.0
     if b < 1e-12 * a:
+        half = np.sqrt(radius**2 - n * n) if abs(n) <= radius else 0.0
+        return _outside(-half - m, half - m, float(a)) if half else 1.0
+    total = _outside(-radius - m, radius - m, float(a))
+    begin, end = (np.arcsin(np.clip((m + way * _FAR * a) / radius, -1.0, 1.0)) for way in (-1, 1))
+    if begin == end:
         return total
-    reach = np.arcsin(min(1.0, _FAR * a / radius))
-    # The chance that y is outside falls within b of the rim: panels shrink towards it.
-    near = np.sqrt(np.minimum(1.0, np.array([1e-3, 1e-2, 0.1, 1.0, 4.0, 16.0, 40.0]) * (b / radius)))
-    count = int(np.ceil(reach * radius / a)) + 4
-    edges = np.concatenate([np.linspace(0.0, reach, min(count, 400)), np.arccos(near)])
-    t, weight = _panels(np.unique(edges[(edges >= 0) & (edges <= reach)]))
+    # The chance that y is outside changes within b of where the circle is as high as y's mean: panels shrink there.
+    spread = np.array([0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0, 16.0, 40.0]) * b
+    near = np.arccos(np.clip(np.concatenate([abs(n) + spread, abs(n) - spread]) / radius, 0.0, 1.0))
+    count = min(int(np.ceil((end - begin) * radius / a)) + 8, 800)
+    edges = np.unique(np.concatenate([np.linspace(begin, end, count), near, -near]))
+    t, weight = _panels(edges[(edges >= begin) & (edges <= end)])
     x, height = radius * np.sin(t), radius * np.cos(t)
-    density = np.exp(-0.5 * (x / a) ** 2) / (a * np.sqrt(2 * np.pi))
-    return float(total + 4.0 * np.sum(weight * density * height * ndtr(-height / b)))
+    density = np.exp(-0.5 * ((x - m) / a) ** 2) / (a * np.sqrt(2 * np.pi))
+    return float(total + np.sum(weight * density * height * (ndtr((-height - n) / b) + ndtr((n - height) / b))))
 
 
 def _panels(edges: Floats) -> tuple[Floats, Floats]:
@@ -138,11 +151,12 @@ def _panels(edges: Floats) -> tuple[Floats, Floats]:
     return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
 
 
-def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc]) -> float:
+def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], centre: Floats) -> float:
     """Sequential conditioning (Genz 1992) over a shifted Richtmyer lattice; a disc limits y by the x before it."""
     order: list[tuple[int, float, float, float]] = [(b.output, b.low, b.high, 0.0) for b in bands]
     for disc in discs:
-        order += [(disc.x, -disc.radius, disc.radius, 0.0), (disc.y, -disc.radius, disc.radius, disc.radius)]
+        low, high = (way * disc.radius - float(centre[disc.x]) for way in (-1, 1))
+        order += [(disc.x, low, high, 0.0), (disc.y, low, high, disc.radius)]
     chosen = [output for output, *_ in order]
     root = _pivot_free_cholesky(covariance[np.ix_(chosen, chosen)])
     primes = np.array([2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71], dtype=float)
@@ -157,19 +171,20 @@ def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc]) -
         drawn = np.zeros((len(order), _LATTICE))
         log_success = np.zeros(_LATTICE)
         before = np.zeros(_LATTICE)
-        for k, (_, low, high, radius) in enumerate(order):
+        for k, (output, low, high, radius) in enumerate(order):
             mean = root[k, :k] @ drawn[:k]
             lower, upper = low - mean, high - mean
             if radius:
                 chord = np.sqrt(np.maximum(radius * radius - before * before, 0.0))
-                lower, upper = -chord - mean, chord - mean
+                lower, upper = (way * chord - centre[output] - mean for way in (-1, 1))
             if root[k, k] > 0:
                 a, b = ndtr(lower / root[k, k]), ndtr(-upper / root[k, k])
-                log_success += np.log1p(-np.minimum(a + b, 1.0 - 1e-300))
+                with np.errstate(divide="ignore"):
+                    log_success += np.log1p(-np.minimum(a + b, 1.0))
                 drawn[k] = ndtri(np.clip(a + points[:, k] * (1.0 - a - b), 1e-300, 1.0 - 1e-16))
             else:
                 log_success = np.where((lower <= 0) & (upper >= 0), log_success, -np.inf)
-            before = mean + root[k, k] * drawn[k]
+            before = mean + root[k, k] * drawn[k] + centre[output]
         means.append(-np.expm1(log_success).mean())
     return float(np.mean(means))
 

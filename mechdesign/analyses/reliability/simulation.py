@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.reliability.error_limits import Band, Disc
 from mechdesign.analyses.reliability.first_order import Channel, Rates, nominal_values
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
-from mechdesign.analyses.reliability.sources import Sources
+from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, wrap
 from mechdesign.mechanism.plan import Plan
@@ -165,22 +165,26 @@ def sample_errors(
     setting: Setting, sources: Sources, seed: int, chunk: int, count: int
 ) -> tuple[list[Floats], NDArray[np.bool_]]:
     """Errors (value minus nominal) of each channel for the samples of a chunk, and which samples are assembled."""
-    places, deviations = sources.draw(generator(seed, setting.pose, chunk), count)
+    return errors_of(setting, sources.made(sources.draw(generator(seed, setting.pose, chunk), count)), count)
+
+
+def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], NDArray[np.bool_]]:
+    """Errors (value minus nominal) of each channel for made mechanisms, and which of them are assembled."""
     mechanism = setting.plan.mechanism
     given: list[Value] = [
-        value + deviations[name] if name in deviations else value
+        value + made.drives[name] if name in made.drives else value
         for name, value in zip(mechanism.drives, setting.drives, strict=True)
     ]
-    made = setting.plan.solve(given, places, start=setting.nominal, limits=False)
+    solved = setting.plan.solve(given, made.places, start=setting.nominal, limits=False)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        values = nominal_values(mechanism, made, setting.channels, setting.rates)
+        values = nominal_values(mechanism, solved, setting.channels, setting.rates)
     errors = []
     for channel, value, centre in zip(setting.channels, values, setting.centres, strict=True):
         error = np.broadcast_to(value - centre, (count,))
         if channel.order == 0 and channel.coordinate.quantity == "angle":
             error = wrap(error)
         errors.append(error)
-    return errors, np.broadcast_to(made.valid, (count,))
+    return errors, np.broadcast_to(solved.valid, (count,))
 
 
 def _successes(setting: Setting, errors: Sequence[Floats], count: int) -> int:

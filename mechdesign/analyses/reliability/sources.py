@@ -1,20 +1,22 @@
-"""What varies when a mechanism is made: dimensions, clearances and drives, mapped onto places of the geometry."""
+"""What varies when a mechanism is made: dimensions, clearances, drives and loads, mapped onto the geometry."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.reliability.sampling import PIN_VARIANCE, deviations, pins
+from mechdesign.analyses.reliability.correlation import Correlation
+from mechdesign.analyses.reliability.marginals import Marginal, marginal
+from mechdesign.analyses.reliability.pins import PIN_LAWS
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names
 from mechdesign.study import Study
-from mechdesign.study.reliability_models import Clearance, Dimension
+from mechdesign.study.reliability_models import LOADS, Clearance
 
 Floats = NDArray[np.float64]
 
@@ -26,10 +28,10 @@ class Source:
     Parameters
     ----------
     name : str
-        As the study names it: a parameter, a place, a drive or a joint.
+        As the study names it: a parameter, a place, a drive, a load or a joint.
     directions : tuple of mapping
-        Per independent component (one, or a pin's x and y), derivatives of places and drives (radians, lengths).
-    variance : float
+        Per independent component (one, or a pin's x and y), derivatives of places, drives and loads (radians, lengths).
+    mean, variance : float
         Of each component (a parameter's in its own unit, an angle's in radians).
     reach : float
         Largest magnitude, over all directions: the tolerance, or the largest radial clearance.
@@ -37,8 +39,76 @@ class Source:
 
     name: str
     directions: tuple[Mapping[str, float], ...]
+    mean: float
     variance: float
     reach: float
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A dimension that varies: a ``parameter``, a ``place``, a ``drive`` or a ``load``."""
+
+    name: str
+    kind: str
+    law: Marginal
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A clearance.
+
+    Parameters
+    ----------
+    radius : float
+        Mean radial clearance.
+    spread : Marginal or None
+        Law of its deviation.
+    places : tuple of str
+        What the pin moves: the offsets of its point in its link, or the link's length.
+    """
+
+    name: str
+    radius: float
+    spread: Marginal | None
+    analytic: str
+    sampled: str
+    places: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Values of all that varies, each array of shape (count,) or a number.
+
+    Parameters
+    ----------
+    scalars : list of ndarray
+        Deviations, in the order of `Sources.scalars`.
+    radii : list of (ndarray or float)
+        Radial clearances, in the order of `Sources.pins`.
+    pins : list of (ndarray, ndarray)
+        Places of the pins for a radial clearance of 1.
+    """
+
+    scalars: list[Floats]
+    radii: list[Floats | float]
+    pins: list[tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """Made mechanisms.
+
+    Parameters
+    ----------
+    places : dict of str to ndarray, shape (count,)
+        Places that vary (radians, lengths).
+    drives, loads : dict of str to ndarray, shape (count,)
+        Errors of drives (radians, lengths), and of components of the load.
+    """
+
+    places: dict[str, Floats]
+    drives: dict[str, Floats]
+    loads: dict[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -47,81 +117,103 @@ class Sources:
 
     Parameters
     ----------
-    parameters, places, drives : mapping of str to Dimension
-        Dimensions by what they vary.
-    clearances : mapping of str to Clearance
-        By joint; each names its link.
+    scalars : tuple of Scalar
+        Parameters first, then places, drives and loads.
+    correlation : Correlation or None
+        Of the scalars.
     """
 
     study: Study
-    parameters: Mapping[str, Dimension]
-    places: Mapping[str, Dimension]
-    drives: Mapping[str, Dimension]
-    clearances: Mapping[str, Clearance]
+    scalars: tuple[Scalar, ...]
+    pins: tuple[Pin, ...]
+    correlation: Correlation | None
 
+    @property
+    def owners(self) -> tuple[str, ...]:
+        """The source of each standard normal variable of `at`: scalars, then each pin's radius, x and y."""
+        return (*(scalar.name for scalar in self.scalars),
+                *(pin.name for pin in self.pins for _ in range(2 + (pin.spread is not None))))  # fmt: skip
+
+    @cached_property
     def first_order(self) -> tuple[Source, ...]:
         """Sources with the pins' variances of the analytic method [S2, eqs. 5, 6]."""
         found = []
-        for name, dimension in self.parameters.items():
-            slopes = _geometric(self.study.parameters.derivatives(name))
-            found.append(Source(name, (slopes,), dimension.standard_deviation**2, _half_width(dimension)))
-        for name, dimension in {**self.places, **self.drives}.items():
-            factor = self._factor(name)
-            sigma, reach = factor * dimension.standard_deviation, factor * _half_width(dimension)
-            found.append(Source(name, ({name: 1.0},), sigma**2, reach))
-        for point, clearance in self.clearances.items():
-            spread = PIN_VARIANCE[clearance.pin.analytic] * (_radius_sigma(clearance) ** 2 + clearance.radius**2)
-            link = _link(point, clearance)
+        for scalar in self.scalars:
+            mean, variance, _, _ = scalar.law.moments
+            slopes = _geometric(self.study.parameters.derivatives(scalar.name)) if scalar.kind == "parameter" else None
+            found.append(Source(scalar.name, (slopes or {scalar.name: 1.0},), mean, variance, scalar.law.reach))
+        for pin in self.pins:
+            mean, variance, _, _ = (0.0, 0.0, 0.0, 0.0) if pin.spread is None else pin.spread.moments
+            spread = PIN_LAWS[pin.analytic].variance * (variance + (pin.radius + mean) ** 2)
+            reach = pin.radius + (0.0 if pin.spread is None else pin.spread.reach)
             # Along a binary link the pin changes its length; across it, only in the second order.
-            names = (f"{link}.length",) if clearance.effect == "length" else offset_names(link, point)
-            reach = clearance.radius + clearance.radius_tolerance
-            found.append(Source(point, tuple({name: 1.0} for name in names), spread, reach))
+            found.append(Source(pin.name, tuple({name: 1.0} for name in pin.places), 0.0, spread, reach))
         return tuple(found)
 
-    def draw(self, rng: np.random.Generator, count: int) -> tuple[dict[str, Floats], dict[str, Floats]]:
-        """Draw made mechanisms.
+    def correlated(self) -> Floats | None:
+        """Correlation coefficients of the components of `first_order`; None where all are independent."""
+        if self.correlation is None:
+            return None
+        count = len(self.scalars) + sum(len(pin.places) for pin in self.pins)
+        found = np.eye(count)
+        found[: len(self.scalars), : len(self.scalars)] = self.correlation.coefficients
+        return found
 
-        Returns
-        -------
-        places : dict of str to ndarray, shape (count,)
-            Places that vary (radians, lengths).
-        drives : dict of str to ndarray, shape (count,)
-            Errors of drives (radians, lengths).
-        """
+    def draw(self, rng: np.random.Generator, count: int) -> Drawn:
+        """Draw what varies in `count` mechanisms."""
+        if self.correlation is None:
+            scalars = [scalar.law.draw(rng, count) for scalar in self.scalars]
+        else:
+            normal = self.correlation.mix(rng.standard_normal((len(self.scalars), count)))
+            scalars = [scalar.law.at(u) for scalar, u in zip(self.scalars, normal, strict=True)]
+        radii: list[Floats | float] = []
+        pins = []
+        for pin in self.pins:
+            radii.append(pin.radius if pin.spread is None else pin.radius + pin.spread.draw(rng, count))
+            pins.append(PIN_LAWS[pin.sampled].draw(rng, count))
+        return Drawn(scalars, radii, pins)
+
+    def redraw_pins(self, drawn: Drawn, rng: np.random.Generator, count: int) -> Drawn:
+        """The same mechanisms with their pins elsewhere in their holes."""
+        return Drawn(drawn.scalars, drawn.radii, [PIN_LAWS[pin.sampled].draw(rng, count) for pin in self.pins])
+
+    def at(self, u: Floats) -> Drawn:
+        """What varies at values of independent standard normal variables, shape (len(owners), count)."""
+        count = len(self.scalars)
+        normal = u[:count] if self.correlation is None else self.correlation.mix(u[:count])
+        scalars = [scalar.law.at(row) for scalar, row in zip(self.scalars, normal, strict=True)]
+        rest = iter(u[count:])
+        radii: list[Floats | float] = []
+        pins = []
+        for pin in self.pins:
+            radii.append(pin.radius if pin.spread is None else pin.radius + pin.spread.at(next(rest)))
+            pins.append(PIN_LAWS[pin.sampled].at(next(rest), next(rest)))
+        return Drawn(scalars, radii, pins)
+
+    def made(self, drawn: Drawn) -> Made:
+        """The mechanisms that are made so."""
         study, nominal = self.study, self.study.mechanism.nominal
-        changed = {
-            name: study.parameters.nominal[name] + deviations(rng, d.distribution, d.standard_deviation, count)
-            for name, d in self.parameters.items()
-        }
+        by_kind: dict[str, dict[str, Floats]] = {"parameter": {}, "place": {}, "drive": {}, "load": {}}
+        for scalar, deviation in zip(self.scalars, drawn.scalars, strict=True):
+            by_kind[scalar.kind][scalar.name] = deviation
+        changed = {name: study.parameters.nominal[name] + value for name, value in by_kind["parameter"].items()}
         places: dict[str, Floats] = {
             name: np.asarray(value, dtype=float) for name, value in _geometric(study.parameters.places(changed)).items()
         }
-        for name, d in self.places.items():
-            deviation = deviations(rng, d.distribution, d.standard_deviation * self._factor(name), count)
+        for name, deviation in by_kind["place"].items():
             places[name] = places.get(name, nominal[name]) + deviation
-        drives = {
-            name: deviations(rng, d.distribution, d.standard_deviation * self._factor(name), count)
-            for name, d in self.drives.items()
-        }
-        for point, clearance in self.clearances.items():
-            x, y = _pin(rng, clearance, count)
-            link = _link(point, clearance)
-            if clearance.effect == "length":
-                length = places.get(f"{link}.length", nominal[f"{link}.length"])
-                x += length
-                x *= x
-                y *= y
-                x += y
-                places[f"{link}.length"] = np.sqrt(x, out=x)
+        for pin, radius, (x, y) in zip(self.pins, drawn.radii, drawn.pins, strict=True):
+            along, across = radius * x, radius * y
+            if len(pin.places) == 1:
+                (name,) = pin.places
+                along += places.get(name, nominal[name])
+                along *= along
+                across *= across
+                along += across
+                places[name] = np.sqrt(along, out=along)
             else:
-                for name, value in zip(offset_names(link, point), (x, y), strict=True):
-                    places[name] = value
-        return places, drives
-
-    def _factor(self, name: str) -> float:
-        mechanism = self.study.mechanism
-        angle = mechanism.quantity(name) if name in mechanism.drives else mechanism.description.places[name].quantity
-        return self.study.units.angle_factor if angle == "angle" else 1.0
+                places.update(zip(pin.places, (along, across), strict=True))
+        return Made(places, by_kind["drive"], by_kind["load"])
 
 
 def find_sources(study: Study) -> tuple[Sources, list[str]]:
@@ -130,7 +222,7 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
     Raises
     ------
     StudyError
-        If nothing varies.
+        If nothing varies, or the correlations do not go together.
     """
     section = study.reliability
     if section is None or not (section.dimensions or section.clearances):
@@ -139,49 +231,52 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
             "reliability.clearances"
         )
     mechanism: Mechanism = study.mechanism
-    kinds: dict[str, dict[str, Dimension]] = {"parameter": {}, "place": {}, "drive": {}}
+    scalars = []
     warnings = []
     for name, dimension in section.dimensions.items():
+        nominal, factor = 0.0, 1.0
         if name in study.parameters.nominal:
-            kinds["parameter"][name] = dimension
+            kind, nominal = "parameter", study.parameters.nominal[name]
             moved = [place for place, slope in _geometric(study.parameters.derivatives(name)).items() if slope]
             if not moved:
                 warnings.append(f"parameter '{name}' changes no dimension of the mechanism")
             elif len(moved) > 1:
                 warnings.append(f"parameter '{name}' varies {', '.join(moved)} together")
+        elif name in LOADS:
+            kind = "load"
         else:
-            kinds["drive" if name in mechanism.drives else "place"][name] = dimension
-    return Sources(study, kinds["parameter"], kinds["place"], kinds["drive"], section.clearances), warnings
+            kind = "drive" if name in mechanism.drives else "place"
+            quantity = mechanism.quantity(name) if kind == "drive" else mechanism.description.places[name].quantity
+            factor = study.units.angle_factor if quantity == "angle" else 1.0
+            nominal = mechanism.nominal[name] if kind == "place" else 0.0
+        scalars.append(Scalar(name, kind, marginal(dimension, nominal, factor)))
+    scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
+    pins = tuple(_pin(point, clearance) for point, clearance in section.clearances.items())
+    return Sources(study, tuple(scalars), pins, _correlation(study, scalars)), warnings
+
+
+def _correlation(study: Study, scalars: Sequence[Scalar]) -> Correlation | None:
+    assert study.reliability is not None
+    given = study.reliability.correlation
+    if not given:
+        return None
+    place = {scalar.name: k for k, scalar in enumerate(scalars)}
+    pairs = {(place[pair.one], place[pair.other]): pair.coefficient for pair in given}
+    return Correlation.of([scalar.law for scalar in scalars], pairs)
+
+
+def _pin(point: str, clearance: Clearance) -> Pin:
+    link = clearance.link
+    if link is None:
+        raise StudyError(f"reliability.clearances.{point}: name the 'link' whose pin moves")
+    spread = clearance.radius_spread
+    return Pin(
+        point, clearance.radius, None if spread is None else marginal(spread, clearance.radius),
+        clearance.pin.analytic, clearance.pin.monte_carlo,
+        (f"{link}.length",) if clearance.effect == "length" else offset_names(link, point),
+    )  # fmt: skip
 
 
 def _geometric(values: Mapping[str, object]) -> dict[str, float]:
     """Leave out the limits of motion: they are judged on the nominal mechanism."""
     return {name: value for name, value in values.items() if not name.startswith("limits.")}  # type: ignore[misc]
-
-
-def _half_width(dimension: Dimension) -> float:
-    if dimension.tolerance is not None:
-        return dimension.tolerance
-    return dimension.standard_deviation * (3.0 if dimension.distribution == "normal" else math.sqrt(3.0))
-
-
-def _radius_sigma(clearance: Clearance) -> float:
-    return clearance.radius_tolerance / (3.0 if clearance.distribution == "normal" else math.sqrt(3.0))
-
-
-def _link(point: str, clearance: Clearance) -> str:
-    if clearance.link is None:
-        raise StudyError(f"reliability.clearances.{point}: name the 'link' whose pin moves")
-    return clearance.link
-
-
-def _pin(rng: np.random.Generator, clearance: Clearance, count: int) -> tuple[Floats, Floats]:
-    radius: float | Floats = clearance.radius
-    if clearance.radius_tolerance > 0:
-        # A negative radius is not clipped: the pin's law is symmetric, so it is harmless, and clipping biases [S3].
-        radius = deviations(rng, clearance.distribution, _radius_sigma(clearance), count)
-        radius += clearance.radius
-    x, y = pins(rng, clearance.pin.monte_carlo, count)
-    x *= radius
-    y *= radius
-    return x, y

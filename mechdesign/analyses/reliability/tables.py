@@ -95,10 +95,8 @@ def moments(answer: Answer) -> Table:
         worst[:] = (answer.linear.worst_case(answer.linear.sensitivity()).T * answer.scale)[:, None]
     for m, method in enumerate(answer.methods):
         if method == "analytic" and answer.linear is not None:
-            linear = answer.linear
-            variance = np.einsum("czp,z->cp", linear.components**2, linear.variance)
-            mean[:, m] = np.where(np.isfinite(variance.T), answer.nominal.T, np.nan)
-            sigma[:, m] = np.sqrt(variance).T * answer.scale
+            mean[:, m] = answer.nominal.T + answer.linear.shift().T * answer.scale
+            sigma[:, m] = answer.linear.deviation().T * answer.scale
         elif method == "monte_carlo":
             for row, sums in enumerate(answer.sums):
                 if sums is not None and sums.valid:
@@ -112,7 +110,7 @@ def moments(answer: Answer) -> Table:
         Column("output", np.tile(output, count * methods), meaning="coordinate"),
         Column("order", np.tile(order, count * methods), meaning="position, velocity or acceleration"),
         Column("nominal", nominal.ravel(), meaning="value of the nominal mechanism, in `unit`"),
-        Column("mean", mean.ravel(), meaning="mean over made mechanisms, in `unit`; first order: the nominal value"),
+        Column("mean", mean.ravel(), meaning="mean over made mechanisms, in `unit`"),
         Column("sigma", sigma.ravel(), meaning="standard deviation of the error, in `unit`"),
         Column("worst_case", worst.ravel(), meaning="sum of |sensitivity| times tolerance, in `unit`"),
         Column("unit", np.tile(unit, count * methods), meaning="unit of the four columns before"),
@@ -139,9 +137,9 @@ def success(answer: Answer) -> Table:
     samples, invalid = np.zeros((count, methods), dtype=np.int64), np.zeros((count, methods), dtype=np.int64)
     for m, method in enumerate(answer.methods):
         if method == "analytic" and answer.linear is not None:
-            covariance = answer.linear.covariance()
+            covariance, shift = answer.linear.covariance(), answer.linear.shift()
             for row in range(count):
-                failure = failure_probability(covariance[row], question.bands, question.discs)
+                failure = failure_probability(covariance[row], question.bands, question.discs, shift[:, row])
                 for name in ("failure", "failure_low", "failure_high"):
                     values[name][row, m] = failure
                 values["error"][row, m] = 0.0 if np.isfinite(failure) else np.nan
@@ -197,7 +195,7 @@ def contributions(answer: Answer) -> Table:
     linear, count, channels = answer.linear, answer.poses.count, len(answer.question.channels)
     names = [source.name for source in linear.sources]
     sensitivity = linear.sensitivity()
-    share = linear.share(sensitivity)
+    share = linear.share()
     output, order, _ = answer.labels
     rows = np.repeat(np.arange(count), channels * len(names))
     columns = [
@@ -223,10 +221,11 @@ def density(answer: Answer) -> Table | None:
     centres = (np.arange(CELLS) + 0.5) * (2 * REACH / CELLS) - REACH
     x, y = (grid.ravel() for grid in np.meshgrid(centres, centres, indexing="ij"))
     rows, normal, simulated, scales = [], [], [], []
+    covariance = linear.covariance()
     for row, sums in enumerate(answer.sums):
         if sums is None or not len(sums.density):
             continue
-        block = np.einsum("cz,dz,z->cd", *(linear.components[list(pair), :, row],) * 2, linear.variance)
+        block = covariance[row][np.ix_(pair, pair)]
         rho, rest = correlation(block), 1.0 - correlation(block) ** 2
         if not rest > 0:
             continue

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.special import ndtr
 
 from mechdesign.analyses.reliability.error_limits import Band
-from mechdesign.analyses.reliability.first_order import Rates, linear_errors
+from mechdesign.analyses.reliability.first_order import linear_errors
 from mechdesign.analyses.reliability.probability import failure_probability
-from mechdesign.analyses.reliability.sources import Source, find_sources
+from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index, number
 from mechdesign.analyses.workspace.indices.local import Floats
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from mechdesign.analyses.reliability.analysis import Question
     from mechdesign.study import Study
 
-STILL = Rates((), ())
 # Standard deviations beyond which nothing counts, and nodes between there and here.
 FAR = 7.0
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)
@@ -35,7 +34,7 @@ def prepare(study: Study) -> Evaluate:
     # Here, for the poses of a reliability question may themselves be nodes of a workspace.
     from mechdesign.analyses.reliability.analysis import ask
 
-    sources = find_sources(study)[0].first_order()
+    sources = find_sources(study)[0]
     assert study.reliability is not None
     question = ask(study, study.reliability)
     if not question.limited:
@@ -44,15 +43,16 @@ def prepare(study: Study) -> Evaluate:
     return assembled_only(partial(evaluate, study.mechanism, question, sources))
 
 
-def evaluate(
-    mechanism: Mechanism, question: Question, sources: tuple[Source, ...], configuration: Configuration
-) -> Floats:
+def evaluate(mechanism: Mechanism, question: Question, sources: Sources, configuration: Configuration) -> Floats:
     """Probability that all limits hold, the drives held [S2, eqs. 10, 11]."""
-    positions = tuple(channel for channel in question.channels if channel.order == 0)
-    covariance = linear_errors(mechanism, configuration, positions, sources, STILL).covariance()
-    if len(question.bands) == 2 and not question.discs:
+    linear = linear_errors(mechanism, configuration, question.channels, sources, question.rates)
+    covariance, mean = linear.covariance(), linear.shift()
+    if len(question.bands) == 2 and not question.discs and not mean.any():
         return _rectangle(question.bands[0], question.bands[1], covariance)
-    return 1 - np.array([failure_probability(each, question.bands, question.discs) for each in covariance])
+    return 1 - np.array([
+        failure_probability(each, question.bands, question.discs, shift)
+        for each, shift in zip(covariance, mean.T, strict=True)
+    ])  # fmt: skip
 
 
 def _rectangle(one: Band, two: Band, covariance: Floats) -> Floats:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechdesign.analyses.reliability.first_order import Channel, Rates, linear_errors
-from mechdesign.analyses.reliability.sources import Source, find_sources
+from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index
 from mechdesign.analyses.workspace.indices.local import Floats
@@ -25,16 +25,15 @@ def prepare(study: Study) -> Evaluate:
     assert study.workspace is not None
     mechanism, point = study.mechanism, study.workspace.point
     channels = tuple(Channel(mechanism.coordinate(f"{point}.{axis}"), 0) for axis in "xy")
-    sources = find_sources(study)[0].first_order()
-    return assembled_only(partial(evaluate, mechanism, channels, sources))
+    return assembled_only(partial(evaluate, mechanism, channels, find_sources(study)[0]))
 
 
 def evaluate(
-    mechanism: Mechanism, channels: tuple[Channel, ...], sources: tuple[Source, ...], configuration: Configuration
+    mechanism: Mechanism, channels: tuple[Channel, ...], sources: Sources, configuration: Configuration
 ) -> Floats:
     """sqrt(var x + var y), the drives held [S2, eq. 9]."""
     linear = linear_errors(mechanism, configuration, channels, sources, STILL)
-    return np.asarray(np.sqrt(np.einsum("czp,z->p", linear.components**2, linear.variance)))
+    return np.asarray(np.sqrt((linear.deviation() ** 2).sum(axis=0)))
 
 
 INDEX = Index(
