@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,7 +26,7 @@ def overlooked(designs: Designs, reach: float, samples: int, angles: Floats, int
     """
     places, inside = [np.zeros(0, dtype=complex)], [np.zeros(0, dtype=bool)]
     for view in VIEWS:
-        seen = Designs(designs.field, designs.places, 1, designs.about + reach * view)
+        seen = replace(designs, about=designs.about + reach * view)
         theta = np.linspace(0.0, 2 * np.pi, RAYS, endpoint=False)
         zero = np.zeros(RAYS, dtype=np.intp)
         found = trace(seen, zero, theta, np.full(RAYS, 2 * reach), samples)

@@ -55,6 +55,10 @@ class Designs:
         """Dimensions of the designs `index`, in the shape of `index`."""
         return {name: np.asarray(value)[index] for name, value in self.places.items()}
 
+    def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
+        """Intersect a block of rays with the region, as `trace` does."""
+        return _trace_block(self, design, theta, reach, samples, slack)
+
 
 @dataclass(frozen=True, eq=False)
 class Intervals:
@@ -101,7 +105,7 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
         Intervals that rounding closed, up to this fraction of the reach, are kept (for rays through a cusp).
     """
     parts = [
-        _trace_block(designs, design[k : k + BLOCK], theta[k : k + BLOCK], reach[k : k + BLOCK], samples, slack)
+        designs.traced(design[k : k + BLOCK], theta[k : k + BLOCK], reach[k : k + BLOCK], samples, slack)
         for k in range(0, len(theta), BLOCK)
     ]
     if len(parts) == 1:
