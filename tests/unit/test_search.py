@@ -10,7 +10,9 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.optimize.cube import from_cube
-from mechdesign.analyses.optimize.explorer import Explorer, Spent
+from mechdesign.analyses.optimize.explorer import Explorer, Objective, Outcome, Part, Spent
+from mechdesign.analyses.optimize.goals import Evaluator
+from mechdesign.analyses.optimize.objectives import goal
 from mechdesign.analyses.optimize.search import descend, evolve, sample, search
 from mechdesign.errors import AssemblyError, StudyError
 
@@ -30,6 +32,7 @@ optimize:
   minimize: kinematics.P.x
   subject_to: [{result: kinematics.P.y, at_least: 12}]
 """
+FIRST = Objective(np.ones(1))
 C30, S30 = np.sqrt(3) / 2, 0.5
 
 
@@ -47,7 +50,11 @@ def rastrigin(u):
 
 def explorer(function, dimensions, margins=None, budget=3000):
     return Explorer(
-        lambda u: (function(u).reshape(len(u), -1), np.empty((len(u), 0)) if margins is None else margins(u)),
+        lambda u: Outcome(
+            function(u).reshape(len(u), -1),
+            np.empty((len(u), 0)) if margins is None else margins(u),
+            np.empty((len(u), 0)),
+        ),
         dimensions, budget,
     )  # fmt: skip
 
@@ -56,9 +63,9 @@ def least(function, dimensions, margins=None, seed=0):
     known = explorer(function, dimensions, margins)
     rng = np.random.default_rng(seed)
     known(sample(dimensions, rng, 16 * (dimensions + 1), 1000))
-    evolve(known, lambda values: values[:, 0], rng)
-    descend(known, [lambda values: values[:, 0]])
-    row = int(np.argmin(known.known.merit(lambda values: values[:, 0])))
+    evolve(known, FIRST, rng)
+    descend(known, [FIRST])
+    row = int(np.argmin(known.known.merit(FIRST)))
     return known.known.u[row], known.known.values[row, 0]
 
 
@@ -100,6 +107,73 @@ def test_noise_of_a_millionth_does_not_mislead():
     at, value = least(rough, 3)
     assert value < 1e-5
     assert at == pytest.approx([0.3, 0.6, 0.8], abs=2e-3)
+
+
+def worst_of(rows, dimensions, margins=None):
+    """What a search finds where a goal is the largest absolute value of rows, of which the search knows."""
+
+    def outcome(u):
+        found = rows(u)
+        values = np.abs(found).max(axis=1, keepdims=True)
+        return Outcome(values, np.empty((len(u), 0)) if margins is None else margins(u), found)
+
+    places = slice(0, rows(np.zeros((1, dimensions))).shape[1])
+    known = Explorer(outcome, dimensions, 5000, [Part(0, 1.0, True, places)])
+    assert search(known, [True], [[1.0]], 0)
+    row = int(np.argmin(known.known.merit(FIRST)))
+    return known.known.u[row], known.known.values[row, 0]
+
+
+def test_the_worst_of_many_rows():
+    """Of x^3 the nearest quadratic on [-1, 1] is 3/4 x, 1/4 away at four places: it lacks a Chebyshev polynomial."""
+    x = np.linspace(-1, 1, 81)
+    at, value = worst_of(lambda u: x**3 - (4 * u - 2) @ np.array([x**0, x, x**2]), 3)
+    assert value == pytest.approx(0.25, abs=1e-9)
+    assert 4 * at - 2 == pytest.approx([0, 0.75, 0], abs=1e-6)
+
+
+def test_along_a_narrow_valley_of_two_rows():
+    """The rows of Rosenbrock's function, whose worst has an edge along a parabola."""
+
+    def rows(u):
+        x, y = 4 * u[:, 0] - 2, 4 * u[:, 1] - 1
+        return np.column_stack([10 * (y - x**2), 1 - x])
+
+    at, value = worst_of(rows, 2)
+    assert value < 1e-9
+    assert at == pytest.approx([0.75, 0.5], abs=1e-9)
+
+
+def test_two_worst_rows_weighed_under_a_condition_that_is_one():
+    """|x - 1/2| and |y - 1/2|, and both x and y at most 0.4: the nearest corner."""
+
+    def outcome(u):
+        off = u - 0.5
+        rows = np.concatenate([off, -off, u], axis=1)
+        return Outcome(np.abs(off), 0.4 - u.max(axis=1, keepdims=True), rows)
+
+    parts = [Part(0, 1.0, False, slice(0, 3, 2)), Part(1, 1.0, False, slice(1, 4, 2)),
+             Part(2, 1.0, False, slice(4, 6), bound=0.4)]  # fmt: skip
+    known = Explorer(outcome, 2, 5000, parts)
+    assert search(known, [True, True], [[1.0, 3.0]], 0)
+    best = int(np.argmin(known.known.merit(Objective(np.array([1.0, 3.0])))))
+    assert known.known.u[best] == pytest.approx([0.4, 0.4], abs=1e-8)
+
+
+def test_rows_of_goals_are_those_of_the_tables():
+    study = study_of(ARM, "kinematics={sweep: {theta1: {from: 0, to: 50, step: 10}, theta2: 60}, outputs: [P]}")
+    goals = [goal("kinematics.P.x", smallest=True), goal("kinematics.P.y"), goal("kinematics.extremes.P.x.max")]
+    designs = {"r1": np.array([3.0, 4.0, 5.0]), "r2": np.array([6.0, 5.0, 6.0])}
+    evaluator = Evaluator(study, goals, most_rows=12)
+    found = evaluator(designs)
+    # An extreme is one row.
+    assert evaluator.rows == {goals[0]: 6, goals[1]: 6}
+    turn = np.exp(1j * np.radians([0, 10, 20, 30, 40, 50]))
+    path = designs["r1"][:, None] * turn + designs["r2"][:, None] * np.exp(1j * np.radians(60))
+    assert found.rows[goals[0]] == pytest.approx(path.real)
+    assert found.rows[goals[1]] == pytest.approx(path.imag)
+    assert found.values[goals[0]] == pytest.approx(path.real.max(axis=1))
+    assert not Evaluator(study, goals, most_rows=11)(designs).rows
 
 
 def test_no_point_is_evaluated_twice_nor_more_than_allowed():

@@ -9,10 +9,10 @@ import numpy as np
 from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.cube import from_cube
 from mechdesign.analyses.optimize.designs import grid, in_words
-from mechdesign.analyses.optimize.explorer import Explorer
+from mechdesign.analyses.optimize.explorer import Explorer, Outcome
 from mechdesign.analyses.optimize.files import optimum_files
 from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, goal
-from mechdesign.analyses.optimize.judging import Batch, Designs, Judge
+from mechdesign.analyses.optimize.judging import CHUNK, Batch, Designs, Judge
 from mechdesign.analyses.optimize.sensitivity import active_bounds, neighbours, sensitivity_table
 from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
 from mechdesign.analyses.workspace.analysis import index_meanings
@@ -24,8 +24,8 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
-# Designs evaluated together: enough that arrays are long, few enough that the workers end together.
-CHUNK, SMALL_CHUNK = 384, 16
+# Numbers of rows that a search keeps.
+MOST_KEPT = 10_000_000
 MOST_REASONS = 10
 Compute = Callable[[Iterable[Batch]], Iterator[Evaluated]]
 
@@ -62,17 +62,19 @@ def optimize(
     """
     goals = _goals(study)
     assert study.optimize is not None
-    judge = Judge(study, goals, jobs, progress, journal)
+    budget = _budget(study, len(goals))
+    most_rows = MOST_KEPT // budget if study.optimize.method == "search" else 0
+    judge = Judge(study, goals, jobs, progress, journal, most_rows=most_rows)
     try:
         with judge.open() as compute:
-            doubt = _ask(study, judge, compute, study.seed if seed is None else seed)
+            doubt = _ask(study, judge, compute, budget, study.seed if seed is None else seed)
             designs = judge.designs()
             if not designs.feasible.any():
                 raise AssemblyError(_none_feasible(designs))
             compared = Comparison.of(study, designs, _weights(study, len(goals)), _meanings(study, goals))
             near = neighbours(study, compared)
             progress.start(len(near), "neighbours of the optimum")
-            found = judge.evaluate(compute, _chunks(near.designs, SMALL_CHUNK))
+            found = judge.evaluate(compute, _chunks(near.designs, judge.chunk))
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
@@ -117,7 +119,21 @@ def _weights(study: Study, goals: int) -> Floats:
     return np.array(rows if rows else [[1.0] * goals], dtype=float).reshape(-1, goals)
 
 
-def _ask(study: Study, judge: Judge, compute: Compute, seed: int) -> tuple[str, ...]:
+def _budget(study: Study, goals: int) -> int:
+    """How many designs may be evaluated where they are searched."""
+    section = study.optimize
+    assert section is not None
+    if section.evaluations is not None:
+        return section.evaluations
+    if section.method == "pareto":
+        from mechdesign.analyses.optimize import pareto
+
+        return pareto.allowance(goals)
+    rows = _weights(study, goals).tolist()
+    return searching.allowance(len(section.variables), searching.objectives(goals, rows))
+
+
+def _ask(study: Study, judge: Judge, compute: Compute, budget: int, seed: int) -> tuple[str, ...]:
     """Evaluate the designs of the study's method; returns what is to be warned of."""
     assert study.optimize is not None
     section, goals = study.optimize, judge.goals
@@ -128,26 +144,25 @@ def _ask(study: Study, judge: Judge, compute: Compute, seed: int) -> tuple[str, 
         return ()
     dimensions, smallest = len(section.variables), [each.smallest for each in goals]
 
-    def evaluate(u: Floats) -> tuple[Floats, Floats]:
+    def evaluate(u: Floats) -> Outcome:
         designs, given = from_cube(study, u)
-        rows = np.full((len(u), len(judge.wanted) + 1), np.nan)
+        found = np.full((len(u), judge.width), np.nan)
         if given.any():
-            rows[given] = judge.evaluate(compute, _chunks({k: v[given] for k, v in designs.items()}, SMALL_CHUNK))
-        rows[rows[:, -1] > 0] = np.nan
+            found[given] = judge.evaluate(compute, _chunks({k: v[given] for k, v in designs.items()}, judge.chunk))
+        found[found[:, len(judge.wanted)] > 0] = np.nan
         column = {each: k for k, each in enumerate(judge.wanted)}
-        margins = [(bound - rows[:, column[each]]) * (1 if upper else -1) for each, bound, upper in judge.conditions]
-        return rows[:, : len(goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0))
+        margins = [(bound - found[:, column[each]]) * (1 if upper else -1) for each, bound, upper in judge.conditions]
+        stacked = np.stack(margins, axis=1) if margins else np.empty((len(u), 0))
+        return Outcome(found[:, : len(goals)], stacked, found[:, 2 * len(judge.wanted) + 1 :])
 
     if section.method == "search":
         rows = _weights(study, len(goals)).tolist()
-        budget = section.evaluations or searching.allowance(dimensions, searching.objectives(len(goals), rows))
         judge.progress.start(budget, "designs")
-        if searching.search(Explorer(evaluate, dimensions, budget), smallest, rows, seed):
+        if searching.search(Explorer(evaluate, dimensions, budget, judge.parts()), smallest, rows, seed):
             return ()
         return (f"the search ended with its {budget} evaluations; allow more, e.g. optimize.evaluations: {4 * budget}",)
     from mechdesign.analyses.optimize import pareto
 
-    budget = section.evaluations or pareto.allowance(len(goals))
     judge.progress.start(budget, "designs")
     first = searching.sample(dimensions, np.random.default_rng(seed), pareto.population(budget), budget)
     pareto.evolve(Explorer(evaluate, dimensions, budget), np.where(smallest, 1.0, -1.0), first, seed)

@@ -2,20 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.rays import Floats
 
-# From the values of the goals, shape (points, goals), to what is made small, shape (points,).
-Objective = Callable[[Floats], Floats]
-
 
 class Spent(Exception):
     """The evaluations that were allowed are used up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """What is made small: a weighted sum of the goals.
+
+    Parameters
+    ----------
+    factors : ndarray, shape (goals,)
+        Negative where a goal is made large.
+    """
+
+    factors: Floats
+
+    def __call__(self, values: Floats) -> Floats:
+        """From the values of the goals, shape (points, goals), to shape (points,)."""
+        return np.asarray(values @ self.factors)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Rows that a goal or a condition is the worst of.
+
+    Parameters
+    ----------
+    column : int
+        Of the goals, and after them of the conditions.
+    sign : float
+        1 where the largest row is the worst, -1 where the smallest is.
+    absolute : bool
+        Whether absolute values are judged.
+    place : slice
+        Columns of `Known.rows`.
+    bound : float
+        Of a condition.
+    """
+
+    column: int
+    sign: float
+    absolute: bool
+    place: slice
+    bound: float = 0.0
+
+    def pieces(self, rows: Floats) -> Floats:
+        """What ``sign * (goal - bound)`` is the largest of, and by how much a condition is not met; smooth."""
+        found = self.sign * rows[:, self.place]
+        if self.absolute and self.sign > 0:
+            found = np.concatenate([found, -found], axis=1)
+        elif self.absolute:
+            # Smooth but at zero, where nothing is that should be far from it.
+            found = -np.abs(found)
+        return np.asarray(found - self.sign * self.bound)
+
+
+class Outcome(NamedTuple):
+    """What an evaluation of points gives; see `Known`."""
+
+    values: Floats
+    margins: Floats
+    rows: Floats
 
 
 @dataclass(frozen=True)
@@ -30,11 +88,14 @@ class Known:
         Values of the goals; nan where there is none.
     margins : ndarray, shape (points, conditions)
         By how much each condition is met, negative where it is not.
+    rows : ndarray, shape (points, rows)
+        What goals and conditions are the worst of, as far as that is known; see `Part`.
     """
 
     u: Floats
     values: Floats
     margins: Floats
+    rows: Floats
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -69,17 +130,27 @@ class Explorer:
     Parameters
     ----------
     evaluate
-        From points, shape (m, dimensions), to values and margins as in `Known`.
+        From points, shape (m, dimensions), to what is known of them.
     budget : int
         How many points may be evaluated.
+    parts : sequence of Part
+        Which rows there are.
     """
 
-    def __init__(self, evaluate: Callable[[Floats], tuple[Floats, Floats]], dimensions: int, budget: int) -> None:
+    def __init__(
+        self, evaluate: Callable[[Floats], Outcome], dimensions: int, budget: int, parts: Sequence[Part] = ()
+    ) -> None:
         self._evaluate = evaluate
         self.dimensions = dimensions
         self.left = budget
+        self.parts = tuple(parts)
         self._rows: dict[bytes, int] = {}
-        self.known = Known(np.empty((0, dimensions)), np.empty((0, 0)), np.empty((0, 0)))
+        self.known = Known(np.empty((0, dimensions)), *[np.empty((0, 0))] * 3)
+
+    def edged(self, objective: Objective) -> bool:
+        """Whether rows are known of a worst row that is made better."""
+        factors = objective.factors
+        return any(part.column < len(factors) and factors[part.column] * part.sign > 0 for part in self.parts)
 
     def __call__(self, u: Floats) -> NDArray[np.intp]:
         """Rows of `known` that hold these points, shape (m, dimensions).
@@ -97,13 +168,10 @@ class Explorer:
             if len(order) > self.left:
                 raise Spent
             self.left -= len(order)
-            values, margins = self._evaluate(u[order])
-            begun = len(self.known.u)
-            before = self.known if begun else Known(self.known.u, values[:0], margins[:0])
-            self.known = Known(
-                np.concatenate([before.u, u[order]]),
-                np.concatenate([before.values, values]),
-                np.concatenate([before.margins, margins]),
-            )
+            found, begun = (u[order], *self._evaluate(u[order])), len(self.known.u)
+            before = (self.known.u, self.known.values, self.known.margins, self.known.rows)
+            self.known = Known(*(
+                np.concatenate([old, new]) if begun else new for old, new in zip(before, found, strict=True)
+            ))  # fmt: skip
             self._rows |= {keys[k]: begun + row for row, k in enumerate(order)}
         return np.array([self._rows[key] for key in keys], dtype=np.intp)

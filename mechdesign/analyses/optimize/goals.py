@@ -36,9 +36,16 @@ FAILED = (
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """Values of goals for a batch of designs; nan where there is none, and why."""
+    """Values of goals for a batch of designs; nan where there is none, and why.
+
+    Parameters
+    ----------
+    rows : dict of Goal to ndarray, shape (designs, rows)
+        What the goals in `Evaluator.rows` are the worst of.
+    """
 
     values: dict[Goal, Floats]
+    rows: dict[Goal, Floats]
     errors: dict[str, Floats]
     reasons: list[str]
 
@@ -49,16 +56,23 @@ class Evaluator:
     Three ways lead to the same numbers: the workspaces of all designs, and the tables of all designs, are computed
     together; what is left is asked of each design by a variant of the study.
 
+    Parameters
+    ----------
+    most_rows : int
+        How many rows a design may have for them to be given, too, of goals that are the worst of several; `rows` has
+        their numbers.
+
     Raises
     ------
     StudyError
         If a goal names what no result has, or the study lacks what it needs.
     """
 
-    def __init__(self, study: Study, goals: Sequence[Goal]) -> None:
+    def __init__(self, study: Study, goals: Sequence[Goal], *, most_rows: int = 0) -> None:
         assert study.optimize is not None
         self.study = study
         self.goals = list(dict.fromkeys(goals))
+        self.rows: dict[Goal, int] = {}
         self.question: Question | None = None
         self._columns = tuple(dict.fromkeys(("area", *(g.column for g in self.goals if g.regional))))
         names = study.optimize.variables
@@ -77,6 +91,13 @@ class Evaluator:
         problems = [problem for command in self._commands() for problem in self._look(command)]
         if problems:
             raise StudyError(problems)
+        if sum(self.rows.values()) > most_rows:
+            self.rows.clear()
+
+    @property
+    def together(self) -> bool:
+        """Whether all goals are tables that are found for all designs at once."""
+        return not self._alone and not any(each.regional for each in self.goals)
 
     def _commands(self) -> list[str]:
         return list(dict.fromkeys(each.command for each in self.goals if not each.regional))
@@ -97,6 +118,7 @@ class Evaluator:
                 except UnknownColumnError:
                     continue
                 goals.remove(each)
+                self._count(each, result)
                 table = chosen.table.name
                 if table == "extremes":
                     self._outputs.update(chosen.table["output"][chosen.counts].tolist())
@@ -114,9 +136,15 @@ class Evaluator:
             return
         for each in goals:
             try:
-                each.worst(result)
+                self._count(each, result)
             except UnknownColumnError as error:
                 yield self.study.problem(str(error), *self._key(each))
+
+    def _count(self, each: Goal, result: Result) -> None:
+        """Note how many rows a goal is the worst of, by the study's own design."""
+        rows = each.judged(result)[1]
+        if rows is not None and rows.size > 1:
+            self.rows[each] = rows.size
 
     def _key(self, wanted: Goal) -> tuple[str | int, ...]:
         """Where the study names a goal."""
@@ -134,7 +162,7 @@ class Evaluator:
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
         count = len(next(iter(designs.values())))
-        batch = _Batch(self.study, designs, count, self.goals)
+        batch = _Batch(self.study, designs, count, self.goals, self.rows)
         if self.question is not None:
             self._workspaces(batch, np.flatnonzero(batch.feasible))
         for command, tables in self._together.items():
@@ -145,7 +173,7 @@ class Evaluator:
         for k in np.flatnonzero(batch.feasible).tolist():
             if alone or k in batch.left:
                 batch.reasons[k] = self._one(batch, k)
-        return Evaluated(batch.values, batch.errors, [str(reason) for reason in batch.reasons])
+        return Evaluated(batch.values, batch.rows, batch.errors, [str(reason) for reason in batch.reasons])
 
     def _workspaces(self, batch: _Batch, rows: NDArray[np.intp]) -> None:
         if not len(rows):
@@ -183,8 +211,7 @@ class Evaluator:
         for table, goals in tables.items():
             left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
             for each in goals:
-                values = each.worst(stack.result, len(rows))
-                batch.values[each][rows] = values
+                values = batch.judge(each, stack.result, rows)
                 lost = np.isnan(values) & ~left
                 batch.note(rows, lost, np.where(failed == "", f"{each.name} has no value", failed))
             for k in rows[left].tolist():
@@ -206,8 +233,7 @@ class Evaluator:
                 if result.failed:
                     return _pose_reason(other, command)
                 for each in (*self._alone.get(command, ()), *left.get(command, ())):
-                    batch.values[each][k] = each.worst(result)[0]
-                    if np.isnan(batch.values[each][k]):
+                    if np.isnan(batch.judge(each, result, row)).any():
                         return _pose_reason(other, command) or f"{each.name} has no value"
         except UnknownColumnError as error:
             return str(error)
@@ -221,12 +247,15 @@ class Evaluator:
 class _Batch:
     """Designs of one call, and what is found of them."""
 
-    def __init__(self, study: Study, designs: Mapping[str, Floats], count: int, goals: Sequence[Goal]) -> None:
+    def __init__(
+        self, study: Study, designs: Mapping[str, Floats], count: int, goals: Sequence[Goal], sizes: Mapping[Goal, int]
+    ) -> None:
         self.designs = {name: np.broadcast_to(np.asarray(v, dtype=float), count) for name, v in designs.items()}
         values = study.parameters.values(self.designs)
         self.parameters = {name: value for name, value in values.items() if np.ndim(value)}
         self.places = study.parameters.places(self.designs)
         self.values: dict[Goal, Floats] = {each: np.full(count, np.nan) for each in goals}
+        self.rows = {each: np.full((count, size), np.nan) for each, size in sizes.items()}
         self.errors: dict[str, Floats] = {}
         # What is still to be asked of single designs, by their row and by command.
         self.left: dict[int, dict[str, list[Goal]]] = {}
@@ -243,6 +272,14 @@ class _Batch:
             name: np.broadcast_to(np.asarray(value, dtype=float), len(self.reasons))[rows]
             for name, value in values.items()
         }
+
+    def judge(self, each: Goal, result: Result, rows: NDArray[np.intp]) -> Floats:
+        """Note the values of a goal by a result of some designs; returns them."""
+        values, listed = each.judged(result, len(rows))
+        self.values[each][rows] = values
+        if each in self.rows and listed is not None and listed.shape[1] == self.rows[each].shape[1]:
+            self.rows[each][rows] = listed
+        return values
 
     def note(self, rows: NDArray[np.intp], wrong: NDArray[np.bool_], reasons: NDArray[np.object_]) -> None:
         """Say what is wrong with some of the rows, where nothing has been said yet."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.optimize.explorer import Part
 from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, bounds_of
 from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.journal import Journal, digest
@@ -16,6 +18,8 @@ from mechdesign.parallel import workers
 from mechdesign.progress import Progress
 from mechdesign.study import Study
 
+# Designs evaluated together: enough that arrays are long, few enough that the workers end together.
+CHUNK, SMALL_CHUNK = 384, 16
 Batch = Mapping[str, Floats]
 
 
@@ -76,14 +80,15 @@ class Judge:
     """Evaluates designs in chunks and keeps what is found; what a journal holds is not computed again."""
 
     def __init__(
-        self, study: Study, goals: tuple[Goal, ...], jobs: int | None, progress: Progress, journal: Journal | None
-    ) -> None:
+        self, study: Study, goals: tuple[Goal, ...], jobs: int | None, progress: Progress, journal: Journal | None,
+        *, most_rows: int = 0,
+    ) -> None:  # fmt: skip
         assert study.optimize is not None
         self.goals = goals
         self.conditions = tuple(bound for each in study.optimize.subject_to for bound in bounds_of(each))
         self.wanted: list[Goal] = list(dict.fromkeys((*goals, *(judged for judged, _, _ in self.conditions))))
         self.progress = progress
-        self._evaluator = Evaluator(study, self.wanted)
+        self._evaluator = Evaluator(study, self.wanted, most_rows=most_rows)
         self._names = tuple(study.optimize.variables)
         self._jobs = jobs
         self._journal = journal
@@ -91,6 +96,28 @@ class Judge:
         self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
         self._asked: list[Floats] = []
         self._rows: list[Floats] = []
+
+    @property
+    def chunk(self) -> int:
+        """Designs of a batch where few are asked at once: of tables, many cost little more than one."""
+        return CHUNK if self._evaluator.together else SMALL_CHUNK
+
+    @property
+    def width(self) -> int:
+        """Columns of what `evaluate` gives."""
+        return 2 * len(self.wanted) + 1 + sum(self._evaluator.rows.values())
+
+    def parts(self) -> list[Part]:
+        """Which of the rows, after the other columns, belong to which goal or condition."""
+        sizes = self._evaluator.rows
+        ends = pairwise(np.cumsum([0, *sizes.values()]).tolist())
+        places = {each: slice(*pair) for each, pair in zip(sizes, ends, strict=True)}
+        judged = [*((each, 0.0) for each in self.goals), *((each, bound) for each, bound, _ in self.conditions)]
+        return [
+            Part(column, 1.0 if each.smallest else -1.0, each.absolute, places[each], bound)
+            for column, (each, bound) in enumerate(judged)
+            if each in places
+        ]
 
     def open(self) -> AbstractContextManager[Callable[[Iterable[Batch]], Iterator[Evaluated]]]:
         """The workers, for as long as designs are asked for."""
@@ -101,8 +128,9 @@ class Judge:
 
         Returns
         -------
-        ndarray, shape (designs, wanted + 1)
-            Values of `wanted`, and a code that is 0 where the design can be built; chunks are then kept.
+        ndarray, shape (designs, columns)
+            Values of `wanted`, a code that is 0 where the design can be built, estimated errors of `wanted`, and the
+            rows that `parts` tells of.
         """
         begun = len(self._rows)
         source = iter(chunks)
@@ -114,8 +142,7 @@ class Judge:
                 break
             self._keep(chunk, key, known)
         found = self._rows[begun:]
-        width = len(self.wanted) + 1
-        return np.concatenate([block[:, :width] for block in found]) if found else np.empty((0, width))
+        return np.concatenate(found) if found else np.empty((0, self.width))
 
     def _compute(self, compute: Callable[[Iterable[Batch]], Iterator[Evaluated]], chunks: Iterator[Batch]) -> None:
         waiting: list[Batch] = []
@@ -138,7 +165,7 @@ class Judge:
                 reasons[k] = reasons[k] or f"{each.name} has no value"
         codes = [self._words.setdefault(reason, len(self._words)) for reason in reasons]
         errors = [found.errors.get(each.name, none) for each in self.wanted]
-        return np.column_stack([*values, np.array(codes, dtype=float), *errors])
+        return np.column_stack([*values, np.array(codes, dtype=float), *errors, *found.rows.values()])
 
     def _keep(self, chunk: Batch, key: bytes, rows: Floats) -> None:
         self._asked.append(np.column_stack([chunk[name] for name in self._names]))
@@ -150,7 +177,7 @@ class Judge:
     def designs(self) -> Designs:
         """Everything evaluated so far."""
         width = len(self.wanted)
-        rows = np.concatenate(self._rows) if self._rows else np.empty((0, 2 * width + 1))
+        rows = np.concatenate(self._rows) if self._rows else np.empty((0, self.width))
         asked = np.concatenate(self._asked) if self._asked else np.empty((0, len(self._names)))
         values = {each: rows[:, k] for k, each in enumerate(self.wanted)}
         errors = {each.name: rows[:, width + 1 + k] for k, each in enumerate(self.wanted)}

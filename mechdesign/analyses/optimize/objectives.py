@@ -64,9 +64,23 @@ class Goal:
         UnknownColumnError
             If the result has no such column.
         """
-        chosen = choose(result, self.column, dict(self.where), absolute=self.absolute)
+        return self.judged(result, designs)[0]
+
+    def judged(self, result: Result, designs: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """As `worst`, and the rows themselves, signed, that it is the worst of.
+
+        Returns
+        -------
+        worst : ndarray, shape (designs,)
+        rows : ndarray, shape (designs, rows), or None
+            The rows that count; None where these are not as many in each design.
+        """
+        chosen = choose(result, self.column, dict(self.where))
         shape = designs, len(chosen.values) // designs
-        return worst(chosen.values.reshape(shape), chosen.counts.reshape(shape), largest=self.smallest)
+        values, counts = chosen.values.reshape(shape), chosen.counts.reshape(shape)
+        found = worst(np.abs(values) if self.absolute else values, counts, largest=self.smallest)
+        alike = designs > 0 and np.ptp(counts.sum(axis=1)) == 0
+        return found, values[counts].reshape(designs, -1) if alike else None
 
 
 def goal(name: str, *, smallest: bool = False) -> Goal:

@@ -28,9 +28,13 @@ APART, PROMISING = 0.2, 0.1
 ROUGH, NEAR, NEAREST = 5e-3, 0.05, 1e-3
 
 
+# Starts of descents in search of the best worst row, whose valleys end anywhere.
+EDGED = 8
+
+
 def allowance(dimensions: int, objectives: int) -> int:
     """Evaluations of a search where the study says none: several times what smooth results need."""
-    return 200 * (dimensions + 1) + 150 * (dimensions + 1) * objectives
+    return 200 * (dimensions + 1) + 300 * (dimensions + 1) * objectives
 
 
 def objectives(goals: int, rows: Sequence[Sequence[float]]) -> int:
@@ -56,12 +60,16 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
     rng = np.random.default_rng(seed)
     try:
         explorer(sample(explorer.dimensions, rng, SAMPLE * (explorer.dimensions + 1), explorer.left // 2))
-        ends = [_single(goal, sign) for goal in range(len(smallest)) for sign in (1.0, -1.0)]
+        ends = [_single(goal, sign, len(smallest)) for goal in range(len(smallest)) for sign in (1.0, -1.0)]
         for goal, down in enumerate(smallest):
             evolve(explorer, ends[2 * goal + (not down)], rng)
         # To normalise by, extremes need not be known to the last digit.
         # What is worst has not been looked for all over; it begins twice.
-        starts = [start for down in smallest for start in ((1, 2) if down else (2, 1))]
+        starts = [
+            start
+            for goal, down in enumerate(smallest)
+            for start in [EDGED if explorer.edged(ends[2 * goal + (not down)]) else 1, 2][:: 1 if down else -1]
+        ]
         descend(explorer, ends, starts=starts, narrowest=ROUGH)
         if explorer.known.feasible.any():
             for row in rows:
@@ -86,8 +94,8 @@ def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> 
     return np.concatenate([vertices, u])
 
 
-def _single(goal: int, sign: float) -> Objective:
-    return lambda values: sign * values[:, goal]
+def _single(goal: int, sign: float, goals: int) -> Objective:
+    return Objective(sign * (np.arange(goals) == goal))
 
 
 def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> Objective:
@@ -95,8 +103,7 @@ def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> O
     values = known.values[known.feasible]
     low, high = values.min(axis=0), values.max(axis=0)
     span = np.where(high > low, high - low, np.inf)
-    factor = np.asarray(row) * np.where(smallest, 1.0, -1.0) / span
-    return lambda values: np.asarray((values - low) @ factor)
+    return Objective(np.asarray(row) * np.where(smallest, 1.0, -1.0) / span)
 
 
 def descend(

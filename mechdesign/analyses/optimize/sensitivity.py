@@ -100,7 +100,7 @@ def sensitivity_table(study: Study, compared: Comparison, near: Neighbours, foun
     """
     designs, step = compared.designs, steps(study, compared)
     wanted = list(designs.values)
-    feasible = found[:, -1] == 0
+    feasible = found[:, len(wanted)] == 0
     for judged, bound, upper in designs.conditions:
         feasible &= met(found[:, wanted.index(judged)], bound, upper)
     optimum, variables, values, widths, changes = [], [], [], [], []
