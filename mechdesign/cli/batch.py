@@ -85,8 +85,7 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Answer]
 def _ask(study: Study, command: str, directory: Path, options: Options) -> Answer:
     label = study_label(study)
     try:
-        kept = _finished(study, command, directory, options) if options.resume else None
-        given = kept or answer(study, command, directory, options)
+        given = answer(study, command, directory, options)
     except Exception as error:
         return _failure(label, command, directory, error)
     tell(given, options)
@@ -97,40 +96,6 @@ def _failure(label: str, command: str, directory: Path, error: Exception) -> Ans
     code, message = explain(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     return Answer(label, command, directory, code, 0, failed=message)
-
-
-def _finished(study: Study, command: str, directory: Path, options: Options) -> Answer | None:
-    """The answer that an earlier run left whole in the directory, if this run would give the same."""
-    from mechdesign.report import manifest
-    from mechdesign.report.requirements import Verdict, command_of
-
-    asked = manifest.Asked(options.plots, options.animate and command == "kinematics")
-    content = manifest.is_current(directory, study, command, asked)
-    if content is None:
-        return None
-    verdicts = [
-        Verdict(
-            entry["requirement"],
-            entry["met"],
-            float("nan") if entry["worst"] is None else entry["worst"],
-            entry["place"],
-        )
-        for entry in content["requirements"]
-    ]
-    if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
-        return None
-    failed = content["failed"]
-    return Answer(
-        study=study_label(study),
-        command=command,
-        directory=directory,
-        exit_code=3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1,
-        rows=next(iter(content["tables"].values()))["rows"],
-        warnings=content["warnings"],
-        failed=failed,
-        verdicts=verdicts,
-        kept=True,
-    )
 
 
 def _summary(answers: Sequence[Answer]) -> Table:

@@ -1,4 +1,4 @@
-"""`check`: what a study says, without computing anything."""
+"""`check`: what a study says, without computing more than what its requirements' columns are called."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Owners, load_study, study_label
+from mechdesign.cli.execution import COMMANDS, Owners, load_study, study_label
 from mechdesign.cli.failure import explain
 from mechdesign.cli.options import Options
 
 
 def check_studies(paths: Sequence[Path | None], options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
+    from mechdesign.report.requirements import foresee
+
     worst = 0
     owners = Owners()
     for path in paths:
@@ -21,6 +23,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
             label = study_label(study)
             if not options.quiet:
                 terminal.emit(f"{label}: {study.name}\n{study.mechanism.describe()}\n")
+            foresee(study, COMMANDS)
             if options.plots:
                 from mechdesign.report.writer import write_sketch
 

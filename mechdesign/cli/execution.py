@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mechdesign.journal import Journal
     from mechdesign.report.manifest import Asked
     from mechdesign.report.requirements import Verdict
-    from mechdesign.results import Result
+    from mechdesign.results import Result, Table
     from mechdesign.study import Study
 
 # Each command's question and what its answer consists of.
@@ -102,7 +102,7 @@ class Owners:
 
 
 def answer(study: Study, command: str, directory: Path, options: Options) -> Answer:
-    """Compute one command's result, judge it by the study's requirements and write it.
+    """Compute one command's result, judge it by the study's requirements and write it, unless it is there.
 
     Raises
     ------
@@ -110,16 +110,21 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         Whatever the analysis, the requirements or the files run into.
     """
     import mechdesign
+    from mechdesign.analyses.look import LONG
     from mechdesign.errors import Interrupted
-    from mechdesign.report import manifest, writer
+    from mechdesign.report import manifest, requirements, writer
 
     begun = time.perf_counter()
     writer.check_writable(directory)
+    asked = manifest.Asked(options.plots, options.animate and command == "kinematics", options.all_modes)
+    if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
+        return kept
+    if command in LONG:
+        requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
     journal = _journal(study, directory, options) if command == "optimize" else None
     if journal is not None:
         more["journal"] = journal
-    asked = manifest.Asked(options.plots, options.animate and command == "kinematics", options.all_modes)
     try:
         with terminal.Bar(quiet=options.quiet) as bar:
             result: Result = getattr(mechdesign, command)(
@@ -155,21 +160,58 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
     )
 
 
+def _finished(study: Study, command: str, directory: Path, asked: Asked) -> Answer | None:
+    """The answer that an earlier run left whole in the directory, if this run would give the same."""
+    from mechdesign.report import manifest
+    from mechdesign.report.requirements import Verdict, command_of
+
+    content = manifest.is_current(directory, study, command, asked)
+    if content is None:
+        return None
+    verdicts = [
+        Verdict(
+            entry["requirement"],
+            entry["met"],
+            float("nan") if entry["worst"] is None else entry["worst"],
+            entry["place"],
+        )
+        for entry in content["requirements"]
+    ]
+    if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
+        return None
+    failed = content["failed"]
+    return Answer(
+        study=study_label(study),
+        command=command,
+        directory=directory,
+        exit_code=3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1,
+        rows=next(iter(content["tables"].values()))["rows"],
+        warnings=content["warnings"],
+        failed=failed,
+        verdicts=verdicts,
+        kept=True,
+    )
+
+
+def _main_table(directory: Path) -> Table:
+    """The main table of the results that are in a folder."""
+    from mechdesign.report import manifest
+    from mechdesign.report.tables import from_csv
+
+    content = manifest.read(directory)
+    assert content is not None
+    file, about = next(iter(content["tables"].items()))
+    text = (directory / file).read_text(encoding="utf-8")
+    return from_csv(text, Path(file).stem, about["columns"], about["meaning"])
+
+
 def _judged_and_written(
     directory: Path, study: Study, result: Result, asked: Asked
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts and the names of the files."""
-    from mechdesign.errors import StudyError
     from mechdesign.report import requirements, writer
 
-    try:
-        verdicts = requirements.judge(
-            result, study.requirements, file=str(study.path or ""), freedom=study.mechanism.mobility
-        )
-    except StudyError:
-        # A misspelt requirement should not cost the computation.
-        writer.write(directory, study, result, (), asked)
-        raise
+    verdicts = requirements.judge(result, study.requirements, problem=study.problem, freedom=study.mechanism.mobility)
     return verdicts, writer.write(directory, study, result, verdicts, asked)
 
 
@@ -193,7 +235,8 @@ def tell(given: Answer, options: Options) -> None:
         terminal.say(f"requirement: {verdict}", quiet=options.quiet and verdict.met)
     if given.failed:
         terminal.say(f"{given.study}: {given.command}: {given.failed}")
-    terminal.say(f"{given.study}: {given.command}: {given.rows} rows in {given.directory}", quiet=options.quiet)
+    kept = "; they are whole, and not computed again" if given.kept else ""
+    terminal.say(f"{given.study}: {given.command}: {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 
 
 def ask(path: Path | None, command: str, options: Options) -> int:
@@ -201,7 +244,7 @@ def ask(path: Path | None, command: str, options: Options) -> int:
     study = load_study(path, options)
     directory = options.out or Path("results") / study_label(study) / command
     given = answer(study, command, directory, options)
-    assert given.result is not None
-    terminal.show(given.result.main, as_json=options.json, rest=str(directory / f"{given.result.main.name}.csv"))
+    table = given.result.main if given.result is not None else _main_table(directory)
+    terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))
     tell(given, options)
     return given.exit_code

@@ -33,20 +33,21 @@ class Asked:
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
-    from mechdesign.study.rewriting import inputs
-
-    files = {file.name: hashlib.sha256(text.encode()).hexdigest() for _, file, text in inputs(study)}
     found = origin(study, command, Asked())
-    return {key: value for key, value in found.items() if key not in asdict(Asked())} | {"inputs": files}
+    return {key: value for key, value in found.items() if key not in asdict(Asked())}
 
 
 def origin(study: Study, command: str, asked: Asked) -> dict[str, Any]:
-    """Everything that decides the bytes of the results: versions, study, overrides, seed, what was asked."""
+    """Everything that decides the bytes of the results: what `computed_from` says, and what was asked."""
+    from mechdesign.study.rewriting import inputs
+
+    files = {file.name: hashlib.sha256(text.encode()).hexdigest() for _, file, text in inputs(study)}
     return {
         "tool": {"name": "mechdesign", "version": version("mechdesign")},
         "libraries": {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES},
         "command": command,
         "study": {"name": study.name, "sha256": study.text_sha256, "resolved": plain(study.resolved)},
+        **({"inputs": files} if files else {}),
         "overrides": list(study.overrides),
         "seed": study.seed,
         **asdict(asked),

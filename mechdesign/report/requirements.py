@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.results import Result, Table
 from mechdesign.rows import UnknownColumnError, choose
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
 
 
 class Requirement(Protocol):
@@ -68,8 +71,42 @@ def command_of(requirement: Requirement) -> str:
     return requirement.result.partition(".")[0]
 
 
+def _unplaced(message: str, section: str, index: int) -> Problem:
+    return Problem(message, f"{section}.{index}")
+
+
+def foresee(study: Study, commands: Iterable[str]) -> None:
+    """Find, at a look, the requirements of commands that name what their results have not.
+
+    Raises
+    ------
+    StudyError
+        Every such mistake in one go, with its place.
+    """
+    from mechdesign.analyses.look import look
+
+    problems: list[Problem] = []
+    judged = {command_of(requirement) for requirement in study.requirements}
+    for command in commands:
+        if command not in judged:
+            continue
+        try:
+            judge(look(study, command), study.requirements, problem=study.problem)
+        except AssemblyError:
+            # The answer itself will tell.
+            continue
+        except StudyError as error:
+            problems += error.problems
+    if problems:
+        raise StudyError(problems)
+
+
 def judge(
-    result: Result, requirements: Iterable[Requirement], *, file: str = "", freedom: int = 1
+    result: Result,
+    requirements: Iterable[Requirement],
+    *,
+    problem: Callable[[str, str, int], Problem] = _unplaced,
+    freedom: int = 1,
 ) -> tuple[Verdict, ...]:
     """Verdicts on the requirements that concern this result, in the order of the study.
 
@@ -78,8 +115,8 @@ def judge(
 
     Parameters
     ----------
-    file : str
-        The study's file, for messages.
+    problem : callable
+        From a message, ``requirements`` and a number to a mistake with its place, as `mechdesign.study.Study.problem`.
     freedom : int
         How many numbers make a pose: the mobility.
 
@@ -96,7 +133,7 @@ def judge(
         try:
             verdicts.append(_judge(result, requirement, freedom))
         except UnknownColumnError as error:
-            problems.append(Problem(str(error), f"requirements.{index}", file))
+            problems.append(problem(str(error), "requirements", index))
     if problems:
         raise StudyError(problems)
     return tuple(verdicts)

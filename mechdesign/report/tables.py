@@ -6,13 +6,13 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.results import Table
+from mechdesign.results import Column, Table
 
 _DIGITS = 12
 _BLOCK = 20_000
@@ -50,6 +50,30 @@ def csv_blocks(table: Table) -> Iterator[str]:
         rows = slice(start, start + _BLOCK)
         writer.writerows(zip(*(_texts(column.values[rows], _DIGITS) for column in table.columns), strict=True))
         yield stream.getvalue()
+
+
+def from_csv(text: str, name: str, columns: Sequence[Mapping[str, str]], meaning: str = "") -> Table:
+    """The table that `to_csv` wrote, to its digits.
+
+    Parameters
+    ----------
+    columns : sequence of mapping
+        ``name``, ``unit`` and ``meaning`` of each, as the manifest has them.
+    """
+    _, *rows = csv.reader(io.StringIO(text))
+    texts = zip(*rows, strict=True) if rows else [()] * len(columns)
+    return Table(
+        name, tuple(Column(**each, values=_values(told)) for each, told in zip(columns, texts, strict=True)), meaning
+    )
+
+
+def _values(texts: Sequence[str]) -> NDArray[Any]:
+    for kind in (int, float):
+        try:
+            return np.array([kind(text) for text in texts])
+        except ValueError:
+            continue
+    return np.array(texts)
 
 
 def plain(value: Any) -> Any:

@@ -135,6 +135,47 @@ def test_without_resume_it_begins_anew_and_clears_up(study, invoke, interrupt):
     assert not (Path("out") / NAME).exists()
 
 
+@pytest.mark.parametrize(("bound", "code"), [(0, 0), (1e6, 1)])
+def test_what_is_finished_is_not_computed_again(study, invoke, interrupt, bound, code):
+    path = study()
+    path.write_text(path.read_text() + f"requirements: [{{result: optimize.score, at_least: {bound}}}]\n")
+    arguments = ("optimize", path, "--no-plots", "--jobs", 1, "--out", "out")
+    first = invoke(*arguments)
+    assert first.exit_code == code, first.output
+    before = contents(Path("out"))
+    calls = interrupt(10**9)
+    again = invoke(*arguments, "--resume")
+    assert (again.exit_code, again.stdout) == (code, first.stdout)
+    assert "whole, and not computed again" in again.stderr
+    assert ("NOT MET" in again.stderr) == bool(code)
+    assert not calls
+    assert contents(Path("out")) == before
+    (Path("out") / "best.csv").write_text("spoilt")
+    assert invoke(*arguments, "--resume").exit_code == code
+    assert sum(calls) >= 1600
+    assert contents(Path("out")) == before
+
+
+@pytest.mark.parametrize(
+    "other",
+    [("--seed", 3), ("--set", "mechanism.parameters.r1=4"), ("--set", "optimize.weights=[[1, 2]]"), "text", "data"],
+)
+def test_what_is_finished_of_another_study_is_computed(study, invoke, interrupt, other):
+    path = study()
+    path.with_name("line.csv").write_text("P.x,P.y\n6,4\n5,5\n")
+    path.write_text(path.read_text().replace("sketch:", "targets: {P: {file: line.csv}}\n  sketch:"))
+    arguments = ("optimize", path, "--no-plots", "--jobs", 1, "--out", "out", "--resume")
+    assert invoke(*arguments).exit_code == 0
+    if other == "text":
+        path.write_text(path.read_text() + "# more\n")
+    elif other == "data":
+        path.with_name("line.csv").write_text("P.x,P.y\n6,4\n5,6\n")
+    calls = interrupt(10**9)
+    done = invoke(*arguments, *(other if isinstance(other, tuple) else ()))
+    assert done.exit_code == 0
+    assert sum(calls) >= 1600
+
+
 def test_nothing_finished_leaves_nothing(study, invoke, interrupt):
     interrupt(0)
     done = invoke("optimize", study(), "--no-plots", "--jobs", 1, "--out", "out")

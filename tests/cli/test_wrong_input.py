@@ -101,6 +101,35 @@ def test_a_listed_pose_outside_the_limits_is_exit_code_three(folder, invoke) -> 
     assert (folder / "results/study/kinematics/motion.csv").read_text().splitlines()[-1].endswith(",0")
 
 
+@pytest.mark.parametrize(
+    ("study", "command", "result", "told"),
+    [
+        (FOUR_BAR, "kinematics", "kinematics.rocker.angel", "did you mean 'rocker.angle'"),
+        (FOUR_BAR, "kinematics", "kinematics.extremes.rocker.angel.range", "no column 'extremes.rocker.angel.range'"),
+        (ARM, "reliability", "reliability.moments.sgma", "no column 'moments.sgma'"),
+        (ARM, "reliability", "reliability.reliabilty", "did you mean 'reliability'"),
+        (ARM, "optimize", "optimize.scroe", "did you mean 'score'"),
+    ],
+)
+def test_a_requirement_that_names_no_column_is_told_before_anything_is_computed(
+    folder, invoke, study, command, result, told
+) -> None:
+    if command == "optimize":
+        study = study[: study.index("reliability:")] + "kinematics: {poses: [{t1: 30, t2: 60}], outputs: [P]}\n"
+        study += "optimize: {variables: {upper.length: {from: 5, to: 9, step: 1e-6}}, maximize: kinematics.P.x}\n"
+    elif command == "reliability":
+        study += "  samples: 100000000\n"
+    (folder / "study.yaml").write_text(f"{study}requirements:\n  - {{result: {result}, at_least: 1}}\n")
+    place = f"study.yaml:{study.count(chr(10)) + 2}:5: requirements.0: "
+    for arguments in ([command], ["run"], ["check"]):
+        done = invoke(*arguments, "study.yaml", "--no-plots")
+        assert done.exit_code == 2, done.output
+        assert place in done.stderr
+        assert told in done.stderr
+    # What the study asks besides is not its mistake.
+    assert not (folder / "results/study" / command).exists()
+
+
 def test_an_output_directory_that_cannot_be_written(folder, invoke) -> None:
     (folder / "study.yaml").write_text(FOUR_BAR)
     (folder / "file").write_text("in the way")

@@ -84,8 +84,8 @@ def test_other_commands_are_left_alone():
 def test_unknown_columns_are_mistakes_of_the_study_all_in_one_go():
     asked = [Asked("kinematics.muu", at_least=1), Asked("kinematics.output", at_least=1)]
     with pytest.raises(StudyError) as caught:
-        judge(result(mu=[1.0, 2.0, 3.0]), asked, file="study.yaml")
+        judge(result(mu=[1.0, 2.0, 3.0]), asked)
     lines = str(caught.value).splitlines()
-    assert "study.yaml: requirements.0: " in lines[0]
+    assert "requirements.0: " in lines[0]
     assert "did you mean 'mu'" in lines[0]
     assert "words" in lines[1]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal
 from mechdesign.analyses.poses import solve_poses
@@ -130,7 +129,7 @@ class Evaluator:
             return
         self._alone.setdefault(command, []).extend(goals)
         try:
-            result = _ask(_quick(self.study), command)
+            result = look(self.study, command)
         except AssemblyError:
             # The study's own design has no such result; others tell.
             return
@@ -229,7 +228,7 @@ class Evaluator:
                     return str(batch.reasons[k])
             left = batch.left.get(k, {})
             for command in dict.fromkeys((*self._alone, *left)):
-                result = _ask(other, command)
+                result = ask(other, command)
                 if result.failed:
                     return _pose_reason(other, command)
                 for each in (*self._alone.get(command, ()), *left.get(command, ())):
@@ -302,18 +301,6 @@ def _pose_reason(study: Study, command: str) -> str:
         return EMPTY
     found = [solved.configuration.reason for solved in solve_poses(study, study.poses(command))]
     return FAILED[int(_first(np.concatenate(found)[None])[0])]
-
-
-def _ask(study: Study, command: str) -> Result:
-    result: Result = getattr(import_module(f"mechdesign.analyses.{command}.analysis"), command)(study)
-    return result
-
-
-def _quick(study: Study) -> Study:
-    """The study with as few samples as there may be, where only the names of columns are asked."""
-    section = study.reliability
-    few = None if section is None else section.model_copy(update={"samples": 2})
-    return dataclasses.replace(study, reliability=few)
 
 
 def _plainly(error: MechdesignError) -> str:

@@ -1,0 +1,41 @@
+"""A glance at a command's answer: what its tables and columns are called, before anything long is computed."""
+
+from __future__ import annotations
+
+import dataclasses
+from importlib import import_module
+
+from mechdesign.results import Result
+from mechdesign.study import Study
+
+# Enough designs that one of them may well be feasible.
+DESIGNS, SAMPLES = 10, 2
+# Commands whose answer costs much more than a look at it.
+LONG = ("optimize", "reliability")
+
+
+def ask(study: Study, command: str) -> Result:
+    """A command's answer."""
+    result: Result = getattr(import_module(f"mechdesign.analyses.{command}.analysis"), command)(study)
+    return result
+
+
+def look(study: Study, command: str) -> Result:
+    """A command's answer with as few samples and designs as there may be.
+
+    Raises
+    ------
+    MechdesignError
+        What the command itself would raise, but where no design of so few is feasible.
+    """
+    return ask(_quick(study), command)
+
+
+def _quick(study: Study) -> Study:
+    reliability, optimize = study.reliability, study.optimize
+    if reliability is not None:
+        reliability = reliability.model_copy(update={"samples": SAMPLES})
+    if optimize is not None:
+        method = "search" if optimize.method == "grid" else optimize.method
+        optimize = optimize.model_copy(update={"method": method, "evaluations": DESIGNS, "subject_to": ()})
+    return dataclasses.replace(study, reliability=reliability, optimize=optimize)
