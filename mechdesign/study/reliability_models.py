@@ -228,11 +228,6 @@ class Precision(Model):
             raise failure("give either 'relative', a fraction of the failure probability, or 'half_width'")
         return self
 
-    def reached(self, value: float, low: float, high: float) -> bool:
-        """Whether an interval of a failure probability is narrow enough."""
-        half = 0.5 * (high - low)
-        return half <= self.half_width if self.half_width is not None else half <= (self.relative or 0.0) * value
-
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         return or_short(schema, handler, NUMBER_FORM)

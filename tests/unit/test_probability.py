@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, owens_t
 
+from mechdesign.analyses.reliability.engine.intervals import binomial, simulation_error
 from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
 from mechdesign.analyses.reliability.probability import (
-    binomial_interval,
     disc_failure,
     failure_probability,
     rectangle_failure,
-    simulation_error,
 )
 
 
@@ -86,15 +85,15 @@ def test_an_error_that_does_not_vary_keeps_its_limit() -> None:
 
 def test_clopper_pearson_against_its_tables() -> None:
     # Clopper and Pearson (1934): 3 of 100 and none of 10 at 95 %.
-    assert binomial_interval(3, 100, 0.95) == pytest.approx((0.0062300, 0.0851761), abs=5e-8)
-    assert binomial_interval(0, 10, 0.95) == pytest.approx((0.0, 1 - 0.025**0.1), rel=1e-12)
-    assert binomial_interval(10, 10, 0.95) == pytest.approx((0.025**0.1, 1.0), rel=1e-12)
+    assert binomial(3, 100, 0.95) == pytest.approx((0.0062300, 0.0851761), abs=5e-8)
+    assert binomial(0, 10, 0.95) == pytest.approx((0.0, 1 - 0.025**0.1), rel=1e-12)
+    assert binomial(10, 10, 0.95) == pytest.approx((0.025**0.1, 1.0), rel=1e-12)
 
 
 def test_clopper_pearson_covers_at_its_rate() -> None:
     samples, chance = 400, 0.02
     seen = np.random.default_rng(3).binomial(samples, chance, 4000)
-    intervals = {k: binomial_interval(int(k), samples) for k in np.unique(seen)}
+    intervals = {k: binomial(int(k), samples) for k in np.unique(seen)}
     covered = np.mean([intervals[k][0] <= chance <= intervals[k][1] for k in seen])
     assert covered >= 0.997 - 4 * np.sqrt(0.997 * 0.003 / 4000)
 

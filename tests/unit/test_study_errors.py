@@ -148,7 +148,7 @@ QUESTIONS = [
     ("reliability: {dimensions: {load.fx: 3 mm}}", "where a force is expected"),
     ("reliability: {limits: {P.x: {min: 0.1, max: -0.1}}}", "the maximum -0.1 is below the minimum 0.1"),
     ("reliability: {dimensions: {theta: 1 mm}}", "where an angle is expected"),
-    ("reliability: {dimensions: {r: {tolerance: 1, distribution: gauss}}}", "expected one of normal, truncated_normal, uniform"),
+    ("reliability: {dimensions: {r: {tolerance: 1, distribution: gauss}}}", "expected one of normal, truncated_normal"),
     ("reliability: {clearances: {P: {radial: 1}}}", "only link 'rod' has point 'P'"),
     ("reliability: {clearances: {A: {radial: -1}}}", "must be at least 0"),
     ("reliability: {clearances: {A: {tolerance: 1}}}", "either 'radial' or 'diametral'"),

@@ -13,11 +13,13 @@ from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, judge_failures, radians, solve_poses
 from mechdesign.analyses.reliability import tables
 from mechdesign.analyses.reliability.assembly import forward_plan
+from mechdesign.analyses.reliability.comparison import disagreements
 from mechdesign.analyses.reliability.error_limits import Band, Disc
 from mechdesign.analyses.reliability.first_order import Channel, FirstOrder, Rates, linear_errors, nominal_values
-from mechdesign.analyses.reliability.simulation import Setting, Sums, simulate
+from mechdesign.analyses.reliability.methods import METHODS, MOST, Found, Partial, Task, analytic
+from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources, find_sources
-from mechdesign.errors import MechanismError, StudyError
+from mechdesign.errors import Interrupted, MechanismError, StudyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.memory import keep_freed_memory
@@ -95,27 +97,47 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     poses = study.poses("reliability")
     nominal = NominalPoses.solve(study, poses, question)
     failures, failed = judge_failures(study, poses, nominal.reason)
-    linear = first_order(study, nominal, question, sources) if "analytic" in section.methods else None
-    sums: list[Sums | None] = [None] * poses.count
-    if "monte_carlo" in section.methods:
-        settings = _settings(study, nominal, question, linear, poses.listed)
-        progress.start(len(settings) * section.samples, "samples")
-        chosen = study.seed if seed is None else seed
-        simulated = simulate(settings, sources, chosen, section.samples, jobs, progress)
-        for setting, found in zip(settings, simulated, strict=True):
-            sums[setting.pose] = found
-    centres = _in_order(study, poses, question, nominal)
-    answer = tables.Answer(study, poses, question, section.methods, nominal.reason, centres, linear, sums)
+    linear = first_order(study, nominal, question, sources)
+    settings = _settings(study, nominal, question, linear, poses.listed)
+    task = Task(
+        settings, sources, linear, len(question.channels), poses.count, study.seed if seed is None else seed,
+        section.samples, section.samples if "samples" in section.model_fields_set else MOST, section.precision,
+        jobs, progress,
+    )  # fmt: skip
+    first = analytic(task)
+    found: list[Found] = []
+    interrupted = ""
+    try:
+        for method in section.methods:
+            found.append(first if method == first.method else METHODS[method](task))
+    except Partial as partial:
+        found.append(partial.found)
+        interrupted = "interrupted: "
+    except KeyboardInterrupt:
+        if not found:
+            raise
+        interrupted = "interrupted: "
+    answer = tables.Answer(
+        study, poses, question, nominal.reason, _in_order(study, poses, question, nominal), linear, found, first
+    )
     counts = {"poses": poses.count}
-    if "monte_carlo" in section.methods:
-        done = [found for found in sums if found is not None]
-        counts["samples"] = sum(found.samples for found in done)
-        counts["invalid"] = sum(found.samples - found.valid for found in done)
+    done = [sums for each in found for sums in each.sums.values()]
+    if done:
+        counts["samples"] = sum(sums.samples for sums in done)
+        counts["invalid"] = sum(sums.samples - sums.valid for sums in done)
         if counts["invalid"]:
             failures.append(
                 f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
             )
-    return Result("reliability", tables.build(answer), [*warnings, *failures], counts, failed)
+    failures = disagreements(study, poses, found) + failures
+    if interrupted:
+        interrupted += f"{counts.get('samples', 0)} samples, {', '.join(each.method for each in found)}"
+    result = Result(
+        "reliability", tables.build(answer), [*warnings, *failures], counts, failed, interrupted=interrupted
+    )
+    if interrupted:
+        raise Interrupted(result)
+    return result
 
 
 def first_order_tables(
@@ -134,9 +156,10 @@ def first_order_tables(
     question = ask(study, section)
     nominal = NominalPoses.solve(study, poses, question)
     linear = first_order(study, nominal, question, sources)
-    centres = _in_order(study, poses, question, nominal)
-    none: list[Sums | None] = [None] * poses.count
-    answer = tables.Answer(study, poses, question, ("analytic",), nominal.reason, centres, linear, none)
+    settings = _settings(study, nominal, question, linear, listed=False)
+    task = Task(settings, sources, linear, len(question.channels), poses.count, 0, 0, 0, None, 1, NULL)
+    centres, first = _in_order(study, poses, question, nominal), analytic(task)
+    answer = tables.Answer(study, poses, question, nominal.reason, centres, linear, [first], first)
     made = {"moments": tables.moments, "contributions": tables.contributions}
     if question.limited:
         made["reliability"] = tables.success
@@ -260,10 +283,10 @@ def first_order(study: Study, nominal: NominalPoses, question: Question, sources
 
 
 def _settings(
-    study: Study, nominal: NominalPoses, question: Question, linear: FirstOrder | None, listed: bool
+    study: Study, nominal: NominalPoses, question: Question, linear: FirstOrder, listed: bool
 ) -> list[Setting]:
     mechanism = study.mechanism
-    sigma = None if linear is None else linear.deviation()
+    sigma = linear.deviation()
     assembled = np.flatnonzero(nominal.assembled)
     settings = []
     for rows, configuration, drives, given in nominal.groups:
@@ -272,7 +295,7 @@ def _settings(
                 continue
             pose = configuration.take(k)
             scale = None
-            if question.pair is not None and sigma is not None and listed and row in assembled[:_DENSITIES]:
+            if question.pair is not None and listed and row in assembled[:_DENSITIES]:
                 one, two = (float(sigma[channel, row]) for channel in question.pair)
                 scale = (one, two) if one > 0 and two > 0 else None
             settings.append(

@@ -132,6 +132,38 @@ def nominal_values(
     return values
 
 
+def derivatives(
+    mechanism: Mechanism, configuration: Configuration, channels: Sequence[Channel], names: Sequence[str], rates: Rates
+) -> Floats:
+    """Derivative of each channel by places and drives, shape (channels, names, n), at a flat batch of configurations.
+
+    Raises
+    ------
+    MechanismError
+        For the acceleration of a measure that is an expression.
+    """
+    found = np.zeros((len(channels), len(names), *configuration.shape))
+    if not names:
+        return found
+    linear = mechanism.linearize(configuration)
+    position = linear.sensitivity(list(names))
+    motion: Motion | None = None
+    if any(channel.order for channel in channels):
+        velocity = linear.velocity(rates.velocity)
+        acceleration = linear.acceleration(velocity, rates.acceleration)
+        velocity_z, acceleration_z = linear.rate_sensitivity(list(names), position, velocity, acceleration)
+        assert acceleration_z is not None
+        motion = Motion(velocity, acceleration, position, velocity_z, acceleration_z)
+    for row, channel in zip(found, channels, strict=True):
+        if motion is None or channel.order == 0:
+            row[...] = first(configuration, channel.coordinate, position)
+        elif channel.order == 1:
+            row[...] = velocity_sensitivity(configuration, channel.coordinate, motion)
+        else:
+            row[...] = acceleration_sensitivity(configuration, channel.coordinate, motion)
+    return found
+
+
 def linear_errors(
     mechanism: Mechanism,
     configuration: Configuration,
@@ -149,31 +181,13 @@ def linear_errors(
     linear_sources = sources.first_order
     directions = [(k, direction) for k, source in enumerate(linear_sources) for direction in source.directions]
     names = list(dict.fromkeys(name for _, direction in directions for name in direction))
-    by_place = np.zeros((len(channels), len(names), *configuration.shape))
-    if names:
-        linear = mechanism.linearize(configuration)
-        position = linear.sensitivity(names)
-        motion: Motion | None = None
-        if any(channel.order for channel in channels):
-            velocity = linear.velocity(rates.velocity)
-            acceleration = linear.acceleration(velocity, rates.acceleration)
-            velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
-            assert acceleration_z is not None
-            motion = Motion(velocity, acceleration, position, velocity_z, acceleration_z)
-        for row, channel in zip(by_place, channels, strict=True):
-            if motion is None or channel.order == 0:
-                row[...] = first(configuration, channel.coordinate, position)
-            elif channel.order == 1:
-                row[...] = velocity_sensitivity(configuration, channel.coordinate, motion)
-            else:
-                row[...] = acceleration_sensitivity(configuration, channel.coordinate, motion)
     slopes = np.zeros((len(directions), len(names)))
     for row, (_, direction) in enumerate(directions):
         for name, slope in direction.items():
             slopes[row, names.index(name)] = slope
     return FirstOrder(
         linear_sources,
-        np.einsum("zn,cnp->czp", slopes, by_place),
+        np.einsum("zn,cnp->czp", slopes, derivatives(mechanism, configuration, channels, names, rates)),
         np.array([k for k, _ in directions], dtype=np.intp),
         np.array([linear_sources[k].mean for k, _ in directions]),
         np.array([linear_sources[k].variance for k, _ in directions]),

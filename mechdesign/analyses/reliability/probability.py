@@ -1,4 +1,4 @@
-"""Probabilities of normal errors within limits, and intervals of a simulated one.
+"""Probabilities of normal errors within limits.
 
 All are failure probabilities, summed from positive terms only, so that none loses digits however small it is; the
 reliability is one minus it.
@@ -10,14 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv, ndtr, ndtri
+from scipy.special import ndtr, ndtri
 
 from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
 
 Floats = NDArray[np.float64]
-
-# 99.7 %: three standard deviations of a normal estimate [S2, eq. 15].
-CONFIDENCE = 0.997
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 # Beyond this many standard deviations the normal density is zero in double precision.
@@ -200,18 +197,3 @@ def _pivot_free_cholesky(matrix: Floats) -> Floats:
         rest = matrix[k, k] - root[k, :k] @ root[k, :k]
         root[k, k] = np.sqrt(rest) if rest > 1e-12 * matrix[k, k] else 0.0
     return root
-
-
-def binomial_interval(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Clopper-Pearson interval of the probability of an event that was seen `events` times in `samples`."""
-    if samples == 0:
-        return float("nan"), float("nan")
-    tail = 0.5 * (1.0 - confidence)
-    low = betaincinv(events, samples - events + 1, tail) if events else 0.0
-    high = betaincinv(events + 1, samples - events, 1.0 - tail) if events < samples else 1.0
-    return float(low), float(high)
-
-
-def simulation_error(failure: float, samples: int) -> float:
-    """Error of a simulated reliability at 99.7 %, three standard errors [S2, eq. 16]."""
-    return 3.0 * float(np.sqrt(failure * (1.0 - failure) / samples)) if samples else float("nan")

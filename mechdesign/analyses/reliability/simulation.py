@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.reliability.error_limits import Band, Disc
+from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
 from mechdesign.analyses.reliability.first_order import Channel, Rates, nominal_values
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
 from mechdesign.analyses.reliability.sources import Made, Sources
@@ -65,6 +65,11 @@ class Setting:
     scale: tuple[float, float] | None
     trend: bool
 
+    @property
+    def limited(self) -> bool:
+        """Whether a reliability is asked."""
+        return bool(self.bands or self.discs)
+
 
 @dataclass(frozen=True, eq=False)
 class Sums:
@@ -92,6 +97,28 @@ class Sums:
     counted: int
     trend: Floats
 
+    @property
+    def mean(self) -> Floats:
+        """Mean error of each channel."""
+        return self.errors / self.valid
+
+    @property
+    def deviation(self) -> Floats:
+        """Standard deviation of each channel's error; nan of a single sample."""
+        if self.valid < 2:
+            return np.full(len(self.errors), np.nan)
+        centred = self.squares - self.errors**2 / self.valid
+        return np.asarray(np.sqrt(np.maximum(centred, 0.0) / (self.valid - 1)))
+
+    def correlation(self, pair: tuple[int, int]) -> float:
+        """Correlation of the errors of the pair."""
+        if self.valid < 2:
+            return float("nan")
+        one, two = pair
+        spread = self.deviation**2 * (self.valid - 1)
+        mixed = self.product - self.errors[one] * self.errors[two] / self.valid
+        return correlation(np.array([[spread[one], mixed], [mixed, spread[two]]]))
+
     def __add__(self, other: Sums) -> Sums:
         offset = np.concatenate([[self.valid], self.errors])
         return Sums(
@@ -108,34 +135,43 @@ class Sums:
 
 
 def simulate(
-    settings: Sequence[Setting], sources: Sources, seed: int, samples: int, jobs: int | None, progress: Progress
-) -> Iterator[Sums]:
-    """Sums of each setting in order; they do not depend on `jobs`."""
-    chunks = -(-samples // CHUNK)
+    settings: Sequence[Setting],
+    sources: Sources,
+    seed: int,
+    samples: int,
+    jobs: int | None,
+    progress: Progress,
+    sums: list[Sums | None],
+) -> None:
+    """Fill `sums`, one of each setting; they do not depend on `jobs`.
 
-    def tasks() -> Iterable[tuple[Setting, int, int]]:
-        for setting in settings:
-            for chunk in range(chunks):
-                yield setting, chunk, min(CHUNK, samples - chunk * CHUNK)
+    All settings come forward together, so that an interrupt leaves something of each.
+    """
 
-    def work(task: tuple[Setting, int, int]) -> Sums:
-        setting, chunk, count = task
-        return simulate_chunk(setting, sources, seed, chunk, count)
+    def tasks() -> Iterable[tuple[int, int, int]]:
+        for chunk in range(-(-samples // CHUNK)):
+            for k in range(len(settings)):
+                yield k, chunk, min(CHUNK, samples - chunk * CHUNK)
 
-    total: Sums | None = None
-    done = 0
-    for sums in map_chunks(work, tasks(), jobs):
-        total = sums if total is None else total + sums
-        progress.update(sums.samples)
-        done += 1
-        if done == chunks:
-            yield total
-            total, done = None, 0
+    def work(task: tuple[int, int, int]) -> tuple[int, Sums]:
+        k, chunk, count = task
+        return k, simulate_chunk(settings[k], sources, seed, chunk, count)
+
+    for k, found in map_chunks(work, tasks(), jobs):
+        before = sums[k]
+        sums[k] = found if before is None else before + found
+        progress.update(found.samples)
 
 
 def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, count: int) -> Sums:
     """Draw `count` made mechanisms at one pose and sum their errors."""
-    errors, valid = sample_errors(setting, sources, seed, chunk, count)
+    made = sources.made(sources.draw(generator(seed, setting.pose, chunk), count))
+    return sums_of(setting, made, count, chunk)
+
+
+def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
+    """Sums over made mechanisms; of the first chunks also the density and the trend."""
+    errors, valid = errors_of(setting, made, count)
     failures = count - _successes(setting, errors, count)
     kept = int(np.count_nonzero(valid))
     if kept < count:
@@ -161,21 +197,18 @@ def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, co
     return Sums(count, kept, failures, sums, squares, product, density, kept if len(density) else 0, trend)
 
 
-def sample_errors(
-    setting: Setting, sources: Sources, seed: int, chunk: int, count: int
-) -> tuple[list[Floats], NDArray[np.bool_]]:
-    """Errors (value minus nominal) of each channel for the samples of a chunk, and which samples are assembled."""
-    return errors_of(setting, sources.made(sources.draw(generator(seed, setting.pose, chunk), count)), count)
+def solve(setting: Setting, made: Made) -> Configuration:
+    """Made mechanisms with the drives at the pose, and their errors."""
+    given: list[Value] = [
+        value + made.drives[name] if name in made.drives else value
+        for name, value in zip(setting.plan.mechanism.drives, setting.drives, strict=True)
+    ]
+    return setting.plan.solve(given, made.places, start=setting.nominal, limits=False)
 
 
 def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], NDArray[np.bool_]]:
     """Errors (value minus nominal) of each channel for made mechanisms, and which of them are assembled."""
-    mechanism = setting.plan.mechanism
-    given: list[Value] = [
-        value + made.drives[name] if name in made.drives else value
-        for name, value in zip(mechanism.drives, setting.drives, strict=True)
-    ]
-    solved = setting.plan.solve(given, made.places, start=setting.nominal, limits=False)
+    mechanism, solved = setting.plan.mechanism, solve(setting, made)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         values = nominal_values(mechanism, solved, setting.channels, setting.rates)
     errors = []

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_columns
+from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.error_limits import correlation
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
+from mechdesign.analyses.reliability.methods import Found
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -38,20 +40,25 @@ class Answer:
     reason : int8 array, shape (poses,)
     nominal : ndarray, shape (channels, poses)
         In study units.
-    linear : FirstOrder or None
-        Where ``analytic`` is among the methods.
-    sums : sequence of Sums or None
-        Per pose; None where it was not simulated.
+    found : sequence of Found
+        What each method says.
+    first_order : Found
+        What the analytic method says, whose moments stand in where no method gives any.
     """
 
     study: Study
     poses: Poses
     question: Question
-    methods: Sequence[str]
     reason: NDArray[np.int8]
     nominal: Floats
-    linear: FirstOrder | None
-    sums: Sequence[Sums | None]
+    linear: FirstOrder
+    found: Sequence[Found]
+    first_order: Found
+
+    @property
+    def sums(self) -> dict[int, Sums]:
+        """By pose, of the first method that samples the errors."""
+        return next((each.sums for each in self.found if each.sums), {})
 
     @property
     def scale(self) -> Floats:
@@ -75,8 +82,7 @@ def build(answer: Answer) -> dict[str, Table]:
     found = [moments(answer)]
     if answer.question.limited:
         found.append(success(answer))
-    if answer.linear is not None:
-        found.append(contributions(answer))
+    found.append(contributions(answer))
     found += [table for make in (density, convergence) if (table := make(answer)) is not None]
     return {table.name: table for table in found}
 
@@ -87,26 +93,26 @@ def _poses(answer: Answer, rows: NDArray[np.intp]) -> list[Column]:
 
 def moments(answer: Answer) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
-    count, channels, methods = answer.poses.count, len(answer.question.channels), len(answer.methods)
+    known = [each for each in answer.found if each.mean is not None] or [answer.first_order]
+    count, channels, methods = answer.poses.count, len(answer.question.channels), len(known)
     shape = (count, methods, channels)
     mean, sigma, worst = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
     nominal = np.broadcast_to(answer.nominal.T[:, None, :], shape)
-    if answer.linear is not None:
-        worst[:] = (answer.linear.worst_case(answer.linear.sensitivity()).T * answer.scale)[:, None]
-    for m, method in enumerate(answer.methods):
-        if method == "analytic" and answer.linear is not None:
-            mean[:, m] = answer.nominal.T + answer.linear.shift().T * answer.scale
-            sigma[:, m] = answer.linear.deviation().T * answer.scale
-        elif method == "monte_carlo":
-            for row, sums in enumerate(answer.sums):
-                if sums is not None and sums.valid:
-                    mean[row, m] = answer.nominal[:, row] + sums.errors / sums.valid * answer.scale
-                    sigma[row, m] = _deviation(sums) * answer.scale
+    worst[:] = (answer.linear.worst_case(answer.linear.sensitivity()).T * answer.scale)[:, None]
+    for m, each in enumerate(known):
+        assert each.mean is not None
+        assert each.sigma is not None
+        mean[:, m] = answer.nominal.T + each.mean.T * answer.scale
+        sigma[:, m] = each.sigma.T * answer.scale
     output, order, unit = answer.labels
     rows = np.repeat(np.arange(count), methods * channels)
     columns = [
         *_poses(answer, rows),
-        Column("method", np.tile(np.repeat(list(answer.methods), channels), count), meaning="how it was computed"),
+        Column(
+            "method",
+            np.tile(np.repeat([each.method for each in known], channels), count),
+            meaning="how it was computed",
+        ),
         Column("output", np.tile(output, count * methods), meaning="coordinate"),
         Column("order", np.tile(order, count * methods), meaning="position, velocity or acceleration"),
         Column("nominal", nominal.ravel(), meaning="value of the nominal mechanism, in `unit`"),
@@ -119,51 +125,31 @@ def moments(answer: Answer) -> Table:
     return Table("moments", tuple(columns), "mean and standard deviation of outputs per pose and method")
 
 
-def _deviation(sums: Sums) -> Floats:
-    if sums.valid < 2:
-        return np.full(len(sums.errors), np.nan)
-    centred = sums.squares - sums.errors**2 / sums.valid
-    return np.asarray(np.sqrt(np.maximum(centred, 0.0) / (sums.valid - 1)))
-
-
 def success(answer: Answer) -> Table:
     """Reliability of every pose by every method."""
-    # SciPy takes a quarter of a second to import, and only a study with limits needs it.
-    from mechdesign.analyses.reliability.probability import binomial_interval, failure_probability, simulation_error
-
-    question, count, methods = answer.question, answer.poses.count, len(answer.methods)
+    question, count, methods = answer.question, answer.poses.count, len(answer.found)
     names = ("failure", "failure_low", "failure_high", "error", "rho")
     values = {name: np.full((count, methods), np.nan) for name in names}
-    samples, invalid = np.zeros((count, methods), dtype=np.int64), np.zeros((count, methods), dtype=np.int64)
-    for m, method in enumerate(answer.methods):
-        if method == "analytic" and answer.linear is not None:
-            covariance, shift = answer.linear.covariance(), answer.linear.shift()
-            for row in range(count):
-                failure = failure_probability(covariance[row], question.bands, question.discs, shift[:, row])
-                for name in ("failure", "failure_low", "failure_high"):
-                    values[name][row, m] = failure
-                values["error"][row, m] = 0.0 if np.isfinite(failure) else np.nan
-                if question.pair is not None:
-                    values["rho"][row, m] = correlation(covariance[row][np.ix_(question.pair, question.pair)])
-        elif method == "monte_carlo":
-            for row, sums in enumerate(answer.sums):
-                if sums is None:
-                    continue
-                failure = sums.failures / sums.samples
-                low, high = binomial_interval(sums.failures, sums.samples)
-                values["failure"][row, m], values["failure_low"][row, m], values["failure_high"][row, m] = (
-                    failure, low, high,
-                )  # fmt: skip
-                values["error"][row, m] = simulation_error(failure, sums.samples)
-                samples[row, m], invalid[row, m] = sums.samples, sums.samples - sums.valid
-                if question.pair is not None:
-                    values["rho"][row, m] = _sample_correlation(sums, question.pair)
+    numbers = {name: np.zeros((count, methods), dtype=np.int64) for name in ("samples", "invalid", "evaluations")}
+    used = np.full((count, methods), "", dtype=object)
+    for m, each in enumerate(answer.found):
+        if each.rho is not None:
+            values["rho"][:, m] = each.rho
+        used[:, m] = each.method
+        for row, estimate in each.estimates.items():
+            values["failure"][row, m], values["failure_low"][row, m], values["failure_high"][row, m] = (
+                estimate.failure, estimate.low, estimate.high,
+            )  # fmt: skip
+            values["error"][row, m] = _error(estimate)
+            for name, column in numbers.items():
+                column[row, m] = getattr(estimate, name)
+            used[row, m] = each.used.get(row, each.method)
     rows = np.repeat(np.arange(count), methods)
-    kind = "Clopper-Pearson at 99.7 %"
+    kind = "99.7 %; of counted failures Clopper-Pearson"
     columns = [
         Column("scope", np.full(count * methods, "pose"), meaning="each pose by itself"),
         *_poses(answer, rows),
-        Column("method", np.tile(list(answer.methods), count), meaning="how it was computed"),
+        Column("method", np.tile([each.method for each in answer.found], count), meaning="how it was computed"),
         Column("reliability", 1.0 - values["failure"].ravel(), meaning="probability that every limit is kept"),
         Column("low", 1.0 - values["failure_high"].ravel(), meaning=f"lower end of its interval, {kind}"),
         Column("high", 1.0 - values["failure_low"].ravel(), meaning=f"upper end of its interval, {kind}"),
@@ -171,8 +157,10 @@ def success(answer: Answer) -> Table:
         Column("failure_low", values["failure_low"].ravel(), meaning=f"lower end of its interval, {kind}"),
         Column("failure_high", values["failure_high"].ravel(), meaning=f"upper end of its interval, {kind}"),
         Column("error", values["error"].ravel(), meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]"),
-        Column("samples", samples.ravel(), meaning="samples drawn; 0: none are needed"),
-        Column("invalid", invalid.ravel(), meaning="samples that cannot be assembled; they are failures"),
+        Column("samples", numbers["samples"].ravel(), meaning="samples that the value is taken from; 0: none"),
+        Column("invalid", numbers["invalid"].ravel(), meaning="samples that cannot be assembled; they are failures"),
+        Column("evaluations", numbers["evaluations"].ravel(), meaning="mechanisms that were solved for it"),
+        Column("used", used.ravel().astype(str), meaning="where the value comes from: of auto, the method it used"),
     ]
     if question.pair is not None:
         columns.append(Column("rho", values["rho"].ravel(), meaning="correlation of the two outputs"))
@@ -180,18 +168,18 @@ def success(answer: Answer) -> Table:
     return Table("reliability", tuple(columns), "probability that the errors keep their limits")
 
 
-def _sample_correlation(sums: Sums, pair: tuple[int, int]) -> float:
-    if sums.valid < 2:
-        return float("nan")
-    one, two = pair
-    spread = _deviation(sums) ** 2 * (sums.valid - 1)
-    mixed = sums.product - sums.errors[one] * sums.errors[two] / sums.valid
-    return correlation(np.array([[spread[one], mixed], [mixed, spread[two]]]))
+def _error(estimate: Estimate) -> float:
+    """Three standard errors of counted failures [S2, eq. 16]; of another method half its interval."""
+    if estimate.samples and estimate.failure == estimate.failures / estimate.samples:
+        # SciPy takes a quarter of a second to import, and only a study with limits needs it.
+        from mechdesign.analyses.reliability.engine.intervals import simulation_error
+
+        return simulation_error(estimate.failure, estimate.samples)
+    return 0.5 * (estimate.high - estimate.low)
 
 
 def contributions(answer: Answer) -> Table:
     """Sensitivity to each source and its share of the variance, to the first order."""
-    assert answer.linear is not None
     linear, count, channels = answer.linear, answer.poses.count, len(answer.question.channels)
     names = [source.name for source in linear.sources]
     sensitivity = linear.sensitivity()
@@ -216,14 +204,14 @@ def contributions(answer: Answer) -> Table:
 def density(answer: Answer) -> Table | None:
     """Density of the two outputs over +-3 standard deviations: bivariate normal beside the simulated one [S2]."""
     pair, linear = answer.question.pair, answer.linear
-    if pair is None or linear is None:
+    if pair is None:
         return None
     centres = (np.arange(CELLS) + 0.5) * (2 * REACH / CELLS) - REACH
     x, y = (grid.ravel() for grid in np.meshgrid(centres, centres, indexing="ij"))
     rows, normal, simulated, scales = [], [], [], []
     covariance = linear.covariance()
-    for row, sums in enumerate(answer.sums):
-        if sums is None or not len(sums.density):
+    for row, sums in sorted(answer.sums.items()):
+        if not len(sums.density):
             continue
         block = covariance[row][np.ix_(pair, pair)]
         rho, rest = correlation(block), 1.0 - correlation(block) ** 2
@@ -253,7 +241,7 @@ def density(answer: Answer) -> Table | None:
 
 def convergence(answer: Answer) -> Table | None:
     """Mean of each output after so many samples, at the first pose [S3, Fig. 4]."""
-    followed = [(row, sums) for row, sums in enumerate(answer.sums) if sums is not None and len(sums.trend)]
+    followed = [(row, sums) for row, sums in sorted(answer.sums.items()) if len(sums.trend)]
     if not followed:
         return None
     row, sums = followed[0]

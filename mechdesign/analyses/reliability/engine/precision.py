@@ -1,0 +1,36 @@
+"""How precise a probability is wanted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# Half the width of a 99.7 % interval in standard errors.
+WIDTH = 2.97
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Half the width of the 99.7 % interval.
+
+    Parameters
+    ----------
+    relative : float or None
+        As a fraction of the probability of failure.
+    half_width : float or None
+        Itself.
+    """
+
+    relative: float | None
+    half_width: float | None
+
+    def _half(self, value: float) -> float:
+        return self.half_width if self.half_width is not None else (self.relative or 0.0) * value
+
+    def reached(self, value: float, low: float, high: float) -> bool:
+        """Whether an interval is narrow enough."""
+        return 0.5 * (high - low) <= self._half(value)
+
+    def needed(self, value: float, variance: float) -> float:
+        """Samples that reach it, from the value and the variance of one sample."""
+        half = self._half(value)
+        return WIDTH**2 * variance / half**2 if half > 0 else float("inf")

@@ -1,0 +1,89 @@
+"""The limits of a mechanism's errors at one pose, over the space of independent standard normal variables."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.reliability.engine.problem import Problem
+from mechdesign.analyses.reliability.first_order import derivatives
+from mechdesign.analyses.reliability.simulation import Setting, errors_of, solve
+from mechdesign.analyses.reliability.sources import Made, Sources
+from mechdesign.errors import MechanismError
+
+Floats = NDArray[np.float64]
+
+# Step of the difference quotients of the made mechanisms, which are known to rounding, in standard deviations.
+_STEP = 1e-5
+
+
+def problem_of(setting: Setting, sources: Sources) -> Problem:
+    """Where the mechanism breaks a limit: margins are nan where it cannot be assembled.
+
+    Raises
+    ------
+    MechanismError
+        Never: what has no closed derivative is differenced.
+    """
+
+    def margins(u: Floats) -> Floats:
+        errors, valid = errors_of(setting, sources.made(sources.at(u)), u.shape[1])
+        found = np.stack([margin for margin, _ in _margins(setting, errors)])
+        found[:, ~valid] = np.nan
+        return found
+
+    def gradients(u: Floats) -> tuple[Floats, Floats]:
+        count = u.shape[1]
+        made = sources.made(sources.at(u))
+        configuration = solve(setting, made)
+        errors, valid = errors_of(setting, made, count)
+        names, slopes = _slopes(sources, u)
+        by_name = derivatives(setting.plan.mechanism, configuration, setting.channels, names, setting.rates)
+        by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes)
+        found, steep = [], []
+        for margin, weights in _margins(setting, errors):
+            found.append(margin)
+            steep.append(sum((weight * by_variable[channel] for channel, weight in weights), np.zeros(u.shape)))
+        values, rates = np.stack(found), np.stack(steep)
+        values[:, ~valid] = np.nan
+        return values, rates
+
+    try:
+        gradients(np.zeros((len(sources.owners), 1)))
+    except MechanismError:
+        return Problem(len(sources.owners), margins)
+    return Problem(len(sources.owners), margins, gradients)
+
+
+def _margins(setting: Setting, errors: list[Floats]) -> list[tuple[Floats, list[tuple[int, Floats | float]]]]:
+    """Margin of each limit, and its derivative by the channels that it depends on."""
+    found: list[tuple[Floats, list[tuple[int, Floats | float]]]] = []
+    for band in setting.bands:
+        if np.isfinite(band.high):
+            found.append((band.high - errors[band.output], [(band.output, -1.0)]))
+        if np.isfinite(band.low):
+            found.append((errors[band.output] - band.low, [(band.output, 1.0)]))
+    for disc in setting.discs:
+        x, y = errors[disc.x], errors[disc.y]
+        size = np.hypot(x, y)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found.append((disc.radius - size, [(disc.x, -x / size), (disc.y, -y / size)]))
+    return found
+
+
+def _slopes(sources: Sources, u: Floats) -> tuple[list[str], Floats]:
+    """Places and drives that vary, and their derivatives by the variables, shape (names, dimension, n)."""
+    d, n = u.shape
+    steps = _STEP * np.eye(d)[:, :, None]
+    either = np.concatenate([(u + way * steps).swapaxes(0, 1).reshape(d, d * n) for way in (1, -1)], axis=1)
+    made = sources.made(sources.at(either))
+    values = _all(made)
+    slopes = np.empty((len(values), d, n))
+    for row, value in zip(slopes, values.values(), strict=True):
+        ahead, back = np.broadcast_to(value, (2 * d * n,)).reshape(2, d, n)
+        row[...] = (ahead - back) / (2 * _STEP)
+    return list(values), slopes
+
+
+def _all(made: Made) -> dict[str, Floats]:
+    return {**made.places, **made.drives}

@@ -1,0 +1,293 @@
+"""What each method says of every pose: estimates of failure, and moments of the errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.first_order import FirstOrder
+from mechdesign.analyses.reliability.sampling import generator
+from mechdesign.analyses.reliability.simulation import Setting, Sums, simulate, simulate_chunk, sums_of
+from mechdesign.analyses.reliability.sources import Sources
+from mechdesign.parallel import map_chunks
+from mechdesign.progress import NULL, Progress
+from mechdesign.study.reliability_models import Precision
+
+Floats = NDArray[np.float64]
+
+# Samples that `auto` draws at most where the study says nothing, and its precision.
+MOST, RELATIVE = 2_000_000, 0.05
+# Streams of their own, beside those of the chunks.
+_SEARCH, _QUASI = 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What all methods are asked.
+
+    Parameters
+    ----------
+    settings : sequence of Setting
+        Poses that can be assembled.
+    linear : FirstOrder
+        Of all poses.
+    channels, poses : int
+        How many there are.
+    samples : int
+        As the study asks.
+    most : int
+        Samples of `auto`.
+    """
+
+    settings: Sequence[Setting]
+    sources: Sources
+    linear: FirstOrder
+    channels: int
+    poses: int
+    seed: int
+    samples: int
+    most: int
+    precision: Precision | None
+    jobs: int | None
+    progress: Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a method says.
+
+    Parameters
+    ----------
+    estimates : dict of int to Estimate
+        By pose, where there are limits.
+    mean, sigma : ndarray, shape (channels, poses), or None
+        Of the errors (radians, lengths); None where the method gives no moments.
+    rho : ndarray, shape (poses,)
+        Correlation of the two outputs.
+    sums : dict of int to Sums
+        By pose, of methods that sample the errors.
+    used : dict of int to str
+        By pose, the method that the value comes from, where it is not this one.
+    rungs : dict of int to dict of str to Estimate
+        By pose, what the methods tried before say.
+    """
+
+    method: str
+    estimates: dict[int, Estimate] = field(default_factory=dict)
+    mean: Floats | None = None
+    sigma: Floats | None = None
+    rho: Floats | None = None
+    sums: dict[int, Sums] = field(default_factory=dict)
+    used: dict[int, str] = field(default_factory=dict)
+    rungs: dict[int, dict[str, Estimate]] = field(default_factory=dict)
+
+
+def analytic(task: Task) -> Found:
+    """First-order errors, normal [S2, S3]; no interval is claimed."""
+    return normal("analytic", task, task.linear.shift(), task.linear.covariance())
+
+
+def normal(method: str, task: Task, mean: Floats, covariance: Floats) -> Found:
+    """Normal errors of these means, shape (channels, poses), and covariances, shape (poses, channels, channels)."""
+    from mechdesign.analyses.reliability.error_limits import correlation
+
+    estimates = {}
+    rho = np.full(task.poses, np.nan)
+    for setting in task.settings:
+        pose, block = setting.pose, covariance[setting.pose]
+        if setting.bands or setting.discs:
+            from mechdesign.analyses.reliability.probability import failure_probability
+
+            value = failure_probability(block, setting.bands, setting.discs, mean[:, pose])
+            estimates[pose] = Estimate(value, value, value, 0)
+        if setting.pair is not None:
+            rho[pose] = correlation(block[np.ix_(setting.pair, setting.pair)])
+    with np.errstate(invalid="ignore"):
+        sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2).T)
+    return Found(method, estimates, mean, sigma, rho)
+
+
+def monte_carlo(task: Task) -> Found:
+    """Plain simulation; an interrupt leaves what was drawn so far in `Found.sums`."""
+    sums: list[Sums | None] = [None] * len(task.settings)
+    task.progress.start(len(task.settings) * task.samples, "samples")
+    try:
+        simulate(task.settings, task.sources, task.seed, task.samples, task.jobs, task.progress, sums)
+    except KeyboardInterrupt:
+        raise Partial(_summed("monte_carlo", task, sums)) from None
+    return _summed("monte_carlo", task, sums)
+
+
+class Partial(KeyboardInterrupt):
+    """An interrupted method, and what it had found."""
+
+    def __init__(self, found: Found) -> None:
+        super().__init__()
+        self.found = found
+
+
+def _summed(method: str, task: Task, sums: Sequence[Sums | None]) -> Found:
+    known = {s.pose: found for s, found in zip(task.settings, sums, strict=True) if found is not None}
+    found = Found(method, sums=known)
+    if task.settings and task.settings[0].limited:
+        found.estimates.update({pose: counted(each) for pose, each in known.items()})
+    return _with_moments(found, task)
+
+
+def counted(sums: Sums) -> Estimate:
+    """Estimate from counted failures, with the interval of Clopper and Pearson."""
+    from mechdesign.analyses.reliability.engine.intervals import binomial
+
+    low, high = binomial(sums.failures, sums.samples)
+    invalid = sums.samples - sums.valid
+    return Estimate(sums.failures / sums.samples, low, high, sums.samples, sums.samples, sums.failures, invalid)
+
+
+def _with_moments(found: Found, task: Task) -> Found:
+    mean, sigma = (np.full((task.channels, task.poses), np.nan) for _ in range(2))
+    rho = np.full(task.poses, np.nan)
+    for setting in task.settings:
+        sums = found.sums.get(setting.pose)
+        if sums is not None and sums.valid:
+            mean[:, setting.pose], sigma[:, setting.pose] = sums.mean, sums.deviation
+            if setting.pair is not None:
+                rho[setting.pose] = sums.correlation(setting.pair)
+    return replace(found, mean=mean, sigma=sigma, rho=rho)
+
+
+def quasi_monte_carlo(task: Task) -> Found:
+    """Scrambled Sobol points, in replicates that give the interval."""
+    from mechdesign.analyses.reliability.engine import quasi
+
+    counts = quasi.replicates(task.samples)
+    task.progress.start(len(task.settings) * sum(counts), "samples")
+
+    def work(setting: Setting) -> tuple[Sums, Estimate]:
+        plain = replace(setting, trend=False, scale=None)
+        seeds = generator(task.seed, setting.pose, _QUASI, 0).integers(2**62, size=len(counts))
+        total: Sums | None = None
+        broken = []
+        for count, seed in zip(counts, seeds.tolist(), strict=True):
+            broken.append(0)
+            for u in quasi.points(len(task.sources.owners), count, seed):
+                part = sums_of(plain, task.sources.made(task.sources.at(u)), u.shape[1], 0)
+                total = part if total is None else total + part
+                broken[-1] += part.failures
+        assert total is not None
+        return total, quasi.estimate(broken, counts[0], total.samples - total.valid)
+
+    found = Found("quasi_monte_carlo")
+    for setting, (sums, estimate) in zip(task.settings, map_chunks(work, task.settings, task.jobs), strict=True):
+        found.sums[setting.pose] = sums
+        if setting.limited:
+            found.estimates[setting.pose] = estimate
+        task.progress.update(sums.samples)
+    return _with_moments(found, task)
+
+
+def form(task: Task) -> Found:
+    """Tangents at the design points; no interval is claimed."""
+    from mechdesign.analyses.reliability.engine.design_points import find
+    from mechdesign.analyses.reliability.engine.form import form as tangents
+    from mechdesign.analyses.reliability.limit_states import problem_of
+
+    def work(setting: Setting) -> Estimate:
+        problem = problem_of(setting, task.sources)
+        return tangents(problem, find(problem, generator(task.seed, setting.pose, _SEARCH, 0)))
+
+    return _each("form", task, work)
+
+
+def importance_sampling(task: Task) -> Found:
+    """A mixture of normal densities about the design points, that learns where failures lie."""
+    from mechdesign.analyses.reliability.engine.design_points import find
+    from mechdesign.analyses.reliability.engine.importance import importance_sampling as sampled
+    from mechdesign.analyses.reliability.limit_states import problem_of
+
+    def work(setting: Setting) -> Estimate:
+        problem = problem_of(setting, task.sources)
+        rng = generator(task.seed, setting.pose, _SEARCH, 1)
+        found = sampled(problem, find(problem, rng), rng, task.samples)
+        # No failure was seen: plain samples bound what was missed.
+        return found if found.failures else _bounded(setting, task, problem.evaluations)
+
+    return _each("importance_sampling", task, work)
+
+
+def _bounded(setting: Setting, task: Task, evaluations: int) -> Estimate:
+    sums: list[Sums | None] = [None]
+    simulate([setting], task.sources, task.seed, task.samples, 1, NULL, sums)
+    assert sums[0] is not None
+    found = counted(sums[0])
+    value = found.failure if found.failures else found.high
+    return replace(found, failure=value, evaluations=found.evaluations + evaluations)
+
+
+def auto(task: Task) -> Found:
+    """The cheapest method that reaches the precision asked for; moments from its plain samples."""
+    from mechdesign.analyses.reliability.engine import ladder
+    from mechdesign.analyses.reliability.engine.precision import Precision as Wanted
+    from mechdesign.analyses.reliability.limit_states import problem_of
+
+    asked = task.precision
+    precision = Wanted(RELATIVE, None) if asked is None else Wanted(asked.relative, asked.half_width)
+    found = Found("auto")
+
+    def work(setting: Setting) -> tuple[Sums, Estimate | None, str, dict[str, Estimate]]:
+        drawn: list[Sums] = []
+
+        def plain(count: int) -> Estimate:
+            while (have := sum(part.samples for part in drawn)) < count:
+                # The first chunk is the pilot, the following ones are whole.
+                size = min(ladder.PILOT if not drawn else ladder.FEW, count - have)
+                drawn.append(simulate_chunk(setting, task.sources, task.seed, len(drawn), size))
+            return counted(_total(drawn))
+
+        if not setting.limited:
+            plain(min(ladder.FEW, task.most))
+            return _total(drawn), None, "", {}
+        rng = generator(task.seed, setting.pose, _SEARCH, 2)
+        estimate, used, rungs = ladder.climb(problem_of(setting, task.sources), precision, plain, rng, task.most)
+        return _total(drawn), estimate, used, rungs
+
+    task.progress.start(len(task.settings), "poses")
+    for setting, (sums, estimate, used, rungs) in zip(
+        task.settings, map_chunks(work, task.settings, task.jobs), strict=True
+    ):
+        found.sums[setting.pose] = sums
+        if estimate is not None:
+            found.estimates[setting.pose], found.used[setting.pose] = estimate, used
+            found.rungs[setting.pose] = rungs
+        task.progress.update(1)
+    return _with_moments(found, task)
+
+
+def _total(parts: Sequence[Sums]) -> Sums:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total
+
+
+def _each(method: str, task: Task, work: Callable[[Setting], Estimate]) -> Found:
+    found = Found(method)
+    settings = [setting for setting in task.settings if setting.limited]
+    task.progress.start(len(settings), "poses")
+    for setting, estimate in zip(settings, map_chunks(work, settings, task.jobs), strict=True):
+        found.estimates[setting.pose] = estimate
+        task.progress.update(1)
+    return found
+
+
+METHODS: dict[str, Callable[[Task], Found]] = {
+    "analytic": analytic,
+    "monte_carlo": monte_carlo,
+    "quasi_monte_carlo": quasi_monte_carlo,
+    "form": form,
+    "importance_sampling": importance_sampling,
+    "auto": auto,
+}
