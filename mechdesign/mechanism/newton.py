@@ -41,14 +41,15 @@ def solve_newton(
     size : float
         A length of the mechanism, by which corrections of slides are measured.
     steps : int
-        Most corrections. A pose that has converged is left alone: its result does not depend on its batch.
+        Most corrections; with none the guess is taken as it is, and counts as not converged. A pose that has converged
+        is left alone: its result does not depend on its batch.
     enough : float
         Correction after which a pose has converged.
     """
     group = state.structure.groups[index]
     theta: list[Value] = [np.asarray(a, dtype=float) for a in angles]
     s: list[Value] = [np.asarray(a, dtype=float) for a in slides]
-    active: NDArray[np.bool_] | None = None
+    active: NDArray[np.bool_] | None = None if steps else np.ones((), dtype=bool)
     determinant: Value = 0.0
     for _ in range(steps):
         set_unknowns(state, group, theta, s)

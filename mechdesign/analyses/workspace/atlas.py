@@ -5,59 +5,83 @@ From the sketch every pose would be a long way off, and what cannot be reached w
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mechdesign.analyses.workspace.approach import Approach, Complex, Flags, Floats, unknowns
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import unknowns_of
-from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.state import Guess
+from mechdesign.mechanism.state import State
 
 # Distance of neighbouring poses, as a share of the mechanism's size.
-SPACING = 0.08
-# Poses beyond this many spacings from every solved one are not reached.
+SPACING = 0.03
+# Beyond this many spacings from the nearest solved pose nothing is inside; where the groups are not solved at once, the
+# place so far from it is told.
 BEYOND = 1.6
 MOST = 20_000
-# Corrections of Newton's method: towards a fold, where two assemblies meet, each only halves the error.
-STEPS = 30
-Floats = NDArray[np.float64]
+# Step of differences, and of a change of dimensions, as parts of the mechanism's size and of the change.
+STEP, STAGES = 1e-6, 8
+# Beyond a fold, how often the way is cut back, and how much shorter than to where the grip is expected to vanish.
+BACK, ASIDE = 3, 1e-3
+# Every so many-th pose of the nominal mechanism is brought to other dimensions, where the poses of those grow from.
+COARSE = 3
+# Poses of all designs that are kept for the next question.
+KEPT = 500_000
+Ints = NDArray[np.intp]
 SIDES = np.array([1, 1j, -1, -1j])
 
 
 @dataclass(frozen=True, eq=False)
-class Atlas:
-    """Solved poses of the nominal mechanism on a lattice, each found from a neighbour.
+class _Poses:
+    """Solved poses of one design on a lattice.
 
     Parameters
     ----------
-    held : tuple of float
-        Values of the plan's coordinates after the point's x and y.
-    signs : sequence of float
-        Sign of the determinant of each group without a closed form: others are other assemblies.
     tree : cKDTree
-        Places of the poses.
-    poses : Configuration, shape (poses,)
-    reach : float
-        What lies farther from all of them is not reached.
+        Places of the point.
+    table : ndarray, shape (unknowns, poses)
+        Unknowns of the groups without a closed form.
+    slopes : ndarray, shape (2, unknowns, poses)
+        Their derivatives by the point's x and y.
+    lattice : ndarray of complex, shape (poses,)
+        Places in spacings from the sketch's.
+    grip : ndarray, shape (poses,)
+        See `Atlas.solve`.
+    """
+
+    tree: cKDTree
+    table: Floats
+    slopes: Floats
+    lattice: Complex
+    grip: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """Poses of a mechanism all over its region, for the nominal dimensions and for others as they are asked for.
+
+    Parameters
+    ----------
+    approach : Approach
+    origin : complex
+        The point's place in the sketch.
     """
 
     plan: Plan
-    held: tuple[float, ...]
-    signs: Sequence[float]
-    tree: cKDTree
-    poses: Configuration
-    reach: float
+    approach: Approach
+    origin: complex
+    known: dict[bytes, _Poses] = field(default_factory=dict)
 
     @staticmethod
     def of(plan: Plan, held: tuple[float, ...]) -> Atlas:
-        """Grow from the sketch's place until nothing more is reached.
+        """Poses of the nominal mechanism, grown from the sketch's place until nothing more is reached.
 
         Raises
         ------
@@ -66,39 +90,31 @@ class Atlas:
         """
         sketch = plan.mechanism.sketch_configuration
         origin = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
-        spacing = SPACING * plan.mechanism.size
-        lattice = np.zeros(1, dtype=complex)
-        seen = {0j}
-        first = plan.solve([np.array([origin.real]), np.array([origin.imag]), *held], limits=False)
+        given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, held)]
+        first = plan.solve(given, limits=False)
         if not first.valid[0]:
             raise AssemblyError(
                 "the workspace grows from the sketch, where the inverse problem has no closed form, and with the held "
                 "values the mechanism does not reach the point's place in the sketch; draw it nearer to them"
             )
-        given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, held)]
-        state = plan.run(given, first.vectors, _guess(plan, first, given))
+        guess = unknowns_of(plan.structure, plan.all_rotations(first, given), first.slides, first.nodes)
+        state = plan.run(given, first.vectors, guess)
         signs = [float(np.sign(np.ravel(d)[0])) for d in state.determinants]
-        layers = [first]
-        while layers[-1].valid.any() and len(seen) < MOST:
-            good = np.flatnonzero(layers[-1].valid)
-            fresh: dict[complex, int] = {}
-            for k, step in zip(np.repeat(good, len(SIDES)), (lattice[good][:, None] + SIDES).ravel(), strict=True):
-                if complex(step) not in seen:
-                    fresh.setdefault(complex(step), int(k))
-            if not fresh:
-                break
-            seen.update(fresh)
-            lattice = np.array(list(fresh))
-            start = layers[-1].take(np.array(list(fresh.values()), dtype=np.intp))
-            layers.append(_from(plan, start, np.asarray(origin + spacing * lattice), held, {}, signs)[0])
-        poses = _join([layer.take(np.flatnonzero(layer.valid)) for layer in layers])
-        places = np.stack([np.asarray(poses.value(c)) for c in plan.structure.given[:2]], axis=-1)
-        return Atlas(plan, held, signs, cKDTree(places), poses, BEYOND * spacing)
+        atlas = Atlas(plan, Approach(plan, held, signs), origin)
+        (atlas.known[b""],) = atlas._grown({}, np.zeros(1, dtype=np.intp), np.zeros(1, complex), unknowns(state, (1,)))
+        return atlas
 
-    def solve(self, z: NDArray[np.complex128], places: Mapping[str, Value]) -> tuple[Configuration, Floats]:
-        """The mechanism with its point at `z`, and how far it is from where assemblies meet; nan where not reached.
+    @property
+    def spacing(self) -> float:
+        """Distance of neighbouring poses."""
+        return SPACING * self.plan.mechanism.size
 
-        The second is the product of the squared determinants: zero at a fold, and linear in the distance to it.
+    def solve(self, z: Complex, places: Mapping[str, Value]) -> tuple[Configuration, Floats]:
+        """The mechanism with its point at `z`, and how far it is from where assemblies meet: its grip.
+
+        The grip is the product of the squared determinants: zero at a fold, linear in the distance to it, and negative
+        beyond, where a pose near the fold is told; nan where nothing is known. What does not depend on a leg that
+        cannot reach stays finite, as where all groups have a closed form.
 
         Parameters
         ----------
@@ -107,67 +123,185 @@ class Atlas:
         """
         shape = np.broadcast_shapes(z.shape, *(np.shape(value) for value in places.values()))
         flat = np.broadcast_to(z, shape).ravel()
-        at = np.stack([flat.real, flat.imag], axis=-1)
-        known: NDArray[np.bool_] = np.asarray(np.isfinite(at).all(axis=1))
-        distance, index = map(np.asarray, self.tree.query(np.where(known[:, None], at, 0.0)))
-        # What is too far is not tried.
-        rows = np.flatnonzero(known & (distance <= self.reach))
-        # One more, which no place is given: the pose that is not known.
-        last = np.append(rows, 0)
-        sizes = {name: np.broadcast_to(np.asarray(value), shape).ravel()[last] for name, value in places.items()}
-        start = self.poses.take(np.asarray(np.append(index[rows], 0), dtype=np.intp))
-        goal = np.append(flat[rows], complex(*self.tree.data[0]))
-        found, grip = _from(self.plan, start, goal, self.held, sizes, self.signs)
-        lost = np.append(~found.valid[:-1], True)
-        flat_place = np.full(flat.size, len(rows))
-        flat_place[rows] = np.arange(len(rows))
-        place = flat_place.reshape(shape)
-        return _hidden(found, lost).take(place), np.where(lost, np.nan, grip)[place]
+        sizes = {name: np.broadcast_to(np.asarray(v, dtype=float), shape).ravel() for name, v in places.items()}
+        near, table, slopes, firm = self._nearest(flat, sizes)
+        lost = ~np.isfinite(near) | ~np.isfinite(flat)
+        way = np.where(lost, 0.0, flat - near)
+        reach = BEYOND * self.spacing
+        far = np.abs(way) > reach
+        goal = np.where(lost, self.origin, flat)
+        with np.errstate(all="ignore"):
+            found, grip = self.approach.corrected(goal, sizes, table, self.approach.expected(table, slopes, way), ~far)
+
+            def again(rows: Ints, step: Complex) -> Floats:
+                own = {name: value[rows] for name, value in sizes.items()}
+                goal[rows], start = near[rows] + step, table[:, rows]
+                ahead = self.approach.expected(start, slopes[:, :, rows], step)
+                every = np.ones(rows.shape, dtype=bool)
+                found[:, rows], new = self.approach.corrected(goal[rows], own, start, ahead, every)
+                return new
+
+            rows = np.flatnonzero(far & np.isnan(grip))
+            if len(rows):
+                way[rows] *= reach / np.abs(way[rows])
+                grip[rows] = again(rows, way[rows])
+            # Beyond a fold the pose where the way from the known one meets it is told: the grip is linear along it.
+            rows = np.flatnonzero(grip < 0)
+            share, now = np.ones(len(rows)), grip[rows]
+            for _ in range(BACK):
+                if not len(rows):
+                    break
+                share = share * (1 - ASIDE) / (1 - now / firm[rows])
+                now = again(rows, np.asarray(share * way[rows]))
+                rows, share, now = rows[now < 0], share[now < 0], now[now < 0]
+            state = self.approach.state(goal, sizes, found)
+        vectors = self.plan.mechanism.geometry.vectors(places)
+        graph = self.plan.mechanism.graph
+        grip[lost] = np.nan
+        reason = np.where(~(grip > 0), np.int8(Reason.NOT_CLOSED), np.int8(Reason.OK)).astype(np.int8)
+        told = Configuration(
+            graph, vectors, flat.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
+            reason, places,
+        )  # fmt: skip
+        # What is told of another place is not inside.
+        open_ = self._open(state, flat.shape)
+        grip[far & ~open_] = np.nan
+        return _shaped(told, shape), grip.reshape(shape)
+
+    def _nearest(self, z: Complex, sizes: Mapping[str, Floats]) -> tuple[Complex, Floats, Floats, Floats]:
+        """Places of the nearest solved poses (nan where there is none), their unknowns, slopes and grip."""
+        if not sizes:
+            return _pick(self.known[b""], z)
+        rows = np.stack(list(sizes.values()), axis=-1)
+        rows, which = np.unique(rows, axis=0, return_inverse=True)
+        which = which.ravel()
+        keys = [",".join(sizes).encode() + row.tobytes() for row in rows]
+        new = [k for k, key in enumerate(keys) if key not in self.known]
+        if new:
+            fresh = self._designs({name: rows[new, k] for k, name in enumerate(sizes)}, len(new))
+            self.known.update({keys[k]: poses for k, poses in zip(new, fresh, strict=True)})
+        count = len(self.known[b""].table)
+        near = np.empty(z.shape, dtype=complex)
+        table, slopes, grip = np.empty((count, len(z))), np.empty((2, count, len(z))), np.empty(z.shape)
+        order = np.argsort(which, kind="stable")
+        ends = np.searchsorted(which[order], np.arange(len(keys) + 1))
+        for key, begin, end in zip(keys, ends[:-1], ends[1:], strict=True):
+            lanes = order[begin:end]
+            near[lanes], table[:, lanes], slopes[:, :, lanes], grip[lanes] = _pick(self.known[key], z[lanes])
+        # Those found longest ago go first, never the nominal ones.
+        total = sum(poses.tree.n for poses in self.known.values())
+        for key in [key for key in self.known if key]:
+            if total <= KEPT:
+                break
+            total -= self.known.pop(key).tree.n
+        return near, table, slopes, grip
+
+    def _designs(self, sizes: Mapping[str, Floats], count: int) -> list[_Poses]:
+        """Poses of several designs: some of the nominal ones are brought to their dimensions and grow from there."""
+        nominal = self.known[b""]
+        coarse = np.flatnonzero((nominal.lattice.real % COARSE == 0) & (nominal.lattice.imag % COARSE == 0))
+        design, seed = np.repeat(np.arange(count), len(coarse)), np.tile(coarse, count)
+        table, lattice = nominal.table[:, seed], nominal.lattice[seed]
+        for stage in range(1, STAGES + 1):
+            between = {}
+            for name, value in sizes.items():
+                begin = self.plan.mechanism.nominal.get(name, 0.0)
+                between[name] = begin + (stage / STAGES) * (value[design] - begin)
+            z = self.origin + self.spacing * lattice
+            table, grip = self.approach.corrected(z, between, table, 0.0, np.ones(z.shape, dtype=bool))
+            reached = grip > 0
+            design, lattice, table = design[reached], lattice[reached], table[:, reached]
+        return self._grown(sizes, design, lattice, table)
+
+    def _grown(self, sizes: Mapping[str, Floats], design: Ints, lattice: Complex, table: Floats) -> list[_Poses]:
+        """Poses of all designs, from solved ones to their neighbours on the lattice until nothing more closes."""
+        count = max((len(value) for value in sizes.values()), default=1)
+        seen = set(zip(design.tolist(), lattice.tolist(), strict=True))
+        layers = []
+        while len(design):
+            z = self.origin + self.spacing * lattice
+            own = {name: value[design] for name, value in sizes.items()}
+            table, grip = self.approach.corrected(z, own, table, 0.0, np.ones(z.shape, dtype=bool))
+            reached = grip > 0
+            state = self.approach.state(z, own, table)
+            # Poses just outside, where a leg does not reach, tell how far outside it is; but nothing grows from them.
+            closed = np.flatnonzero(reached & ~self._open(state, z.shape))
+            layers.append((design[reached], lattice[reached], table[:, reached], grip[reached]))
+            fresh: dict[tuple[int, complex], int] = {}
+            steps = (lattice[closed, None] + SIDES).ravel().tolist()
+            parents = np.repeat(closed, len(SIDES)).tolist()
+            for k, owner, step in zip(parents, design[parents].tolist(), steps, strict=True):
+                if (owner, step) not in seen:
+                    fresh.setdefault((owner, step), k)
+            if len(seen) + len(fresh) > MOST * count:
+                break
+            seen.update(fresh)
+            parent = np.array(list(fresh.values()), dtype=np.intp)
+            design = design[parent]
+            lattice = np.array([step for _, step in fresh], dtype=complex)
+            table = table[:, parent]
+        none = (np.zeros(0, np.intp), np.zeros(0, complex), np.zeros((len(table), 0)), np.zeros(0))
+        design, lattice, table, grip = (np.concatenate(parts, axis=-1) for parts in zip(none, *layers, strict=True))
+        slopes = self._slopes(lattice, {name: value[design] for name, value in sizes.items()}, table)
+        found = []
+        for k in range(count):
+            lanes = np.flatnonzero(design == k)
+            z = self.origin + self.spacing * lattice[lanes]
+            tree = cKDTree(np.stack([z.real, z.imag], axis=-1))
+            found.append(_Poses(tree, table[:, lanes], slopes[:, :, lanes], lattice[lanes], grip[lanes]))
+        return found
+
+    def _slopes(self, lattice: Complex, sizes: Mapping[str, Floats], table: Floats) -> Floats:
+        """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
+        h = STEP * self.plan.mechanism.size
+        z = self.origin + self.spacing * lattice
+        found = []
+        for step in (h, 1j * h):
+            with np.errstate(all="ignore"):
+                state = self.approach.step(z + step, sizes, table, 1)
+                slope = (unknowns(state, z.shape) - table) / h
+            found.append(np.where(np.isfinite(slope).all(axis=0), slope, 0.0))
+        return np.stack(found)
+
+    def _open(self, state: State, shape: tuple[int, ...]) -> Flags:
+        """Where a leg does not reach, or has no length."""
+        lengths = [state.slides[slide] for slide in self.plan.mechanism.graph.telescopic]
+        found = np.zeros(shape, dtype=bool)
+        for margin in (*state.closures, *lengths):
+            found |= ~(np.asarray(margin) > 0)
+        return found
 
 
-def _guess(plan: Plan, at: Configuration, given: Sequence[Value]) -> Guess:
-    return unknowns_of(plan.structure, plan.all_rotations(at, given), at.slides, at.nodes)
+def _pick(poses: _Poses, z: Complex) -> tuple[Complex, Floats, Floats, Floats]:
+    """Place, unknowns, slopes and grip of the pose nearest to each place; nan where there is none."""
+    if not poses.tree.n:
+        shape = (len(poses.table), len(z))
+        return np.full(z.shape, complex(np.nan, np.nan)), np.zeros(shape), np.zeros((2, *shape)), np.ones(z.shape)
+    at = np.stack([z.real, z.imag], axis=-1)
+    index = np.asarray(poses.tree.query(np.where(np.isfinite(at), at, 0.0))[1])
+    near = np.asarray(poses.tree.data)[index]
+    return near[:, 0] + 1j * near[:, 1], poses.table[:, index], poses.slopes[:, :, index], poses.grip[index]
 
 
-def _from(
-    plan: Plan, start: Configuration, z: NDArray[np.complex128], held: Sequence[float], places: Mapping[str, Value],
-    signs: Sequence[float],
-) -> tuple[Configuration, Floats]:  # fmt: skip
-    """Poses near solved ones, by Newton's method alone: a step is small, and what ends in another assembly is told."""
-    given: list[Value] = [z.real, z.imag, *held]
-    vectors = plan.mechanism.geometry.vectors(places)
-    state = plan.run(given, vectors, _guess(plan, start, given), steps=STEPS)
-    reached, grip = np.ones(z.shape, dtype=bool), np.ones(z.shape)
-    for converged, determinant, sign in zip(state.converged, state.determinants, signs, strict=True):
-        reached &= converged & (np.sign(determinant) == sign)
-        grip = grip * determinant**2
-    return plan.configuration(state, z.shape, places, vectors, reached, limits=False), grip
+def _shaped(found: Configuration, shape: tuple[int, ...]) -> Configuration:
+    """A flat batch in another shape."""
 
+    def shaped(value: Value) -> Value:
+        value = np.asarray(value)
+        return value if value.ndim == 0 else value.reshape(shape)
 
-def _join(parts: Sequence[Configuration]) -> Configuration:
-    """Batches of poses of the same mechanism as one."""
-
-    def stack(values: Sequence[Sequence[Value]]) -> list[Value]:
-        return [np.concatenate(column) for column in zip(*values, strict=True)]
-
-    reason = np.concatenate([part.reason for part in parts])
-    vectors = Vectors(
-        stack([part.vectors.w for part in parts]), stack([part.vectors.d for part in parts]),
-        {name: value if isinstance(value, float) else np.concatenate([part.vectors.offsets[name] for part in parts])
-         for name, value in parts[0].vectors.offsets.items()},
-    )  # fmt: skip
     return Configuration(
-        parts[0].graph, vectors, reason.shape, stack([part.nodes for part in parts]),
-        stack([part.rotations for part in parts]), stack([part.slides for part in parts]),
-        stack([part.closures for part in parts]), reason,
-        {name: np.concatenate([part.places[name] for part in parts]) for name in parts[0].places},
+        found.graph, found.vectors, shape, [shaped(node) for node in found.nodes],
+        [shaped(turn) for turn in found.rotations], [shaped(slide) for slide in found.slides],
+        [shaped(closure) for closure in found.closures], found.reason.reshape(shape), found.places,
     )  # fmt: skip
 
 
-def _hidden(found: Configuration, lost: NDArray[np.bool_]) -> Configuration:
+def hidden(found: Configuration, lost: Flags) -> Configuration:
+    """nan for poses that are not reached."""
     return replace(
-        found, reason=np.where(lost, np.int8(Reason.NOT_CLOSED), found.reason).astype(np.int8),
-        nodes=[hide(node, lost) for node in found.nodes], rotations=[hide(turn, lost) for turn in found.rotations],
+        found, nodes=[hide(node, lost) for node in found.nodes],
+        rotations=[hide(turn, lost) for turn in found.rotations],
         slides=[hide(slide, lost) for slide in found.slides],
         closures=[hide(closure, lost) for closure in found.closures],
     )  # fmt: skip

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.workspace.atlas import Atlas
+from mechdesign.analyses.workspace.atlas import Atlas, hidden
 from mechdesign.analyses.workspace.indices.local import Entries, Local
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
@@ -59,7 +59,8 @@ class Field:
         """
         given: list[Value] = [z.real, z.imag, *self.held]
         if self.plan.iterative:
-            return self._atlas.solve(z, places)[0]
+            found, grip = self._atlas.solve(z, places)
+            return found if (grip > 0).all() else hidden(found, ~(grip > 0))
         vectors = self.mechanism.geometry.vectors(places)
         state = self.plan.run(given, vectors, None)
         graph = self.mechanism.graph
@@ -92,7 +93,8 @@ class Field:
                 found += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
         if self.plan.iterative:
             # Where nothing is reached one margin says so, and the others have no end of their own there.
-            found = [margin if margin is grip else np.where(np.isnan(grip), 1.0, margin) for margin in found]
+            lost = np.isnan(grip)
+            found = [margin if margin is grip else np.where(lost & np.isnan(margin), 1.0, margin) for margin in found]
         stacked = np.empty((len(found), *z.shape))
         for row, margin in zip(stacked, found, strict=True):
             row[...] = margin
