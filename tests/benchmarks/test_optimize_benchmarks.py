@@ -1,7 +1,10 @@
-"""Speed of evaluating designs: path and function synthesis, stiffness, and what is asked of each design alone."""
+"""Speed of evaluating designs: path and function synthesis, stiffness, reliability; memory of a million of them."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -63,3 +66,28 @@ def test_first_order_reliability_designs_a_second(benchmark: Any, result: str, d
     places = ["lower_1.length", "upper_2.length"]
     result, methods = f"reliability.{result}", "reliability.methods=analytic"
     measure(benchmark, "five_bar.yaml", places, result, designs, 0.05, methods)
+
+
+@pytest.mark.skipif(not hasattr(os, "wait4"), reason="the peak memory of a process is told by POSIX")
+def test_memory_of_a_million_designs(benchmark: Any, tmp_path: Path) -> None:
+    """A grid from end to end, with its tables, pictures and journal."""
+    ranges = {"crank.length": (0.8, 1.2, 16), "coupler.length": (3.2, 4.2, 16), "coupler.C.x": (1, 3, 62),
+              "coupler.C.y": (0.5, 2, 63)}  # fmt: skip
+    variables = ", ".join(f"{name}: {{from: {a}, to: {b}, number: {n}}}" for name, (a, b, n) in ranges.items())
+    section = f"optimize={{variables: {{{variables}}}, minimize: [kinematics.C_error, kinematics.targets.rms]}}"
+    poses = "kinematics={poses: [{crank: 30}, {crank: 60}, {crank: 90}, {crank: 120}], outputs: [C]}"
+    changes = [part for change in (PATH, poses, section) for part in ("--set", change)]
+    command = [sys.executable, "-m", "mechdesign", "optimize", str(CONFIGS / "gallery" / "four_bar.yaml"), *changes]
+
+    def run() -> int:
+        with subprocess.Popen([*command, "--out", str(tmp_path)], stdout=subprocess.DEVNULL) as process:
+            _, status, used = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+        assert process.returncode == 0
+        return int(used.ru_maxrss * (1 if sys.platform == "darwin" else 1024))
+
+    peak = benchmark.pedantic(run, rounds=1)
+    benchmark.extra_info["peak_megabytes"] = peak / 1e6
+    with (tmp_path / "designs.csv").open() as lines:
+        assert sum(1 for _ in lines) == 16 * 16 * 62 * 63 + 1
+    assert peak < 500e6
