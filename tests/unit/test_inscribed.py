@@ -91,3 +91,14 @@ def test_shapes_lie_inside() -> None:
                              half.real + 1j * s * half.imag, -half.real + 1j * s * half.imag])  # fmt: skip
     assert least(middle + border * (1 - 1e-7)) > 0
     assert least(middle + border * (1 + 1e-6)) < 0
+
+
+def test_a_side_along_which_one_margin_ends_the_region() -> None:
+    """Half of what two rings share, above the line through their middles: its lower side is a line of singularities."""
+    limits = "mechanism.limits=[{drive: l1, min: 0.5, max: 2}, {drive: l2, min: 0.5, max: 2}]"
+    main = mechdesign.workspace(study_of(LEGS, limits, "workspace.assembly=same", "mechanism.sketch.C=[0, 1.2]")).main
+    # Between the small circles and below the large ones: 2 w sqrt(4 - (1 + w)^2) grows up to their edge at w = 0.5.
+    width, height = main["rectangle_width"][0], main["rectangle_height"][0]
+    assert (width, height) == pytest.approx((1, np.sqrt(4 - 1.5**2)), rel=1e-7)
+    assert main["rectangle_y"][0] == pytest.approx(height / 2, abs=1e-7)
+    assert main["circle_radius"][0] == pytest.approx(0.75, rel=1e-7)

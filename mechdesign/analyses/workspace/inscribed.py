@@ -21,13 +21,13 @@ from mechdesign.analyses.workspace.field import Field
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 # Cells of the raster along each side, and how many of its best places are tried.
-CELLS, TRIALS = 160, 4
+CELLS, TRIALS = 96, 4
 # Samples of a border; those of rectangles lie at its corners, too.
 SAMPLES = 128
 # Rounds of the exchange, and the depth (as a part of the region's size) to which a border may lie outside.
 ROUNDS, DEPTH, LATE = 24, 1e-9, 1e-7
 # How far a round may move (parts of the size).
-LEAP = 0.02
+LEAP = 0.06
 # Places all round that are always looked at.
 FIRM = 16
 # A curve shorter than this part of the longest is a point; places of a border nearer to each other are one.
@@ -102,23 +102,24 @@ def inscribed(
     def margins(z: Complex) -> Floats:
         return np.concatenate([field.margins(z, {}), sector(z)])
 
-    dx, dy = (high.real - low.real) / CELLS, (high.imag - low.imag) / CELLS
-    x = np.asarray(low.real + dx * (np.arange(CELLS) + 0.5), dtype=float)
-    y = np.asarray(low.imag + dy * (np.arange(CELLS) + 0.5), dtype=float)
+    # With a cell more all round, so that what ends the region along a side of its box is met, too.
+    dx, dy = (high.real - low.real) / (CELLS - 2), (high.imag - low.imag) / (CELLS - 2)
+    x = np.asarray(low.real + dx * (np.arange(CELLS) - 0.5), dtype=float)
+    y = np.asarray(low.imag + dy * (np.arange(CELLS) - 0.5), dtype=float)
     inside = margins((x[:, None] + 1j * y).ravel()) > 0
     free = inside.all(axis=0).reshape(CELLS, CELLS)
     # What is negative nowhere (the length of a leg) is no border.
     borders = np.array(~inside.all(axis=1), dtype=bool)
     borders[[*(margin for _, margin in ends), *range(len(field.labels), len(borders))]] = True
-    column = np.clip(((every.real - low.real) / dx).astype(int), 0, CELLS - 1)
-    row = np.clip(((every.imag - low.imag) / dy).astype(int), 0, CELLS - 1)
+    column = np.clip(((every.real - low.real) / dx).astype(int) + 1, 1, CELLS - 2)
+    row = np.clip(((every.imag - low.imag) / dy).astype(int) + 1, 1, CELLS - 2)
     free[column, row] = False
     grow = _Grow(lambda z: margins(z)[borders], size)
     circle, rectangle = NO_CIRCLE, NO_RECTANGLE
     for i, j, radius in _discs(free, dx, dy) or [_thin(patches, about, x, y)]:
         if radius < HOPEFUL * circle.radius:
             continue
-        p = grow.best(CIRCLE, np.array([x[i], y[j], 0.7 * radius]))
+        p = grow.best(CIRCLE, np.array([x[i], y[j], 0.9 * radius]))
         if p is not None and not p[2] <= circle.radius and not _holds(np.abs(every - complex(p[0], p[1])) - p[2], size):
             circle = Circle(complex(p[0], p[1]), float(p[2]))
     for i, j, m, n in _boxes(free):
@@ -315,6 +316,9 @@ class _Grow:
         """Places of the border where a margin is smallest, the margins, and the lowest of them all."""
         values = self._distances(self.size * shape.points(p, u))
         low = (values <= np.roll(values, 1, axis=1)) & (values < np.roll(values, -1, axis=1))
+        # A side along which a margin is the same has no lowest place of its own.
+        lowest = values.argmin(axis=1)
+        low[np.arange(len(values)), lowest] = True
         which, k = np.nonzero(low & (values < 0.5))
         if not len(k):
             return np.zeros(0), which, 0.0
