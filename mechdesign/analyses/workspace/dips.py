@@ -15,8 +15,8 @@ STEPS = 24
 GOLDEN = 0.5 * (3 - np.sqrt(5))
 # A step of the search this small (as a part of the bracket's place) has met the bottom.
 BOTTOM = 1e-9
-# Slopes may be this many times steeper than those met.
-ROOM = 4.0
+# A function may fall this many times as far as one that is convex.
+ROOM = 2.0
 
 
 def hidden_places(
@@ -53,7 +53,7 @@ def hidden_places(
         return function, lane, np.zeros(0), np.zeros(0)
     turn = sign[function, row, lane]
     a, b, c = x[row, lane], x[row + 1, lane], x[row + 2, lane]
-    fb = height[function, row, lane]
+    fa, fb, fc = (turn * values[function, row + k, lane] for k in range(3))
     found = np.zeros(len(function), dtype=bool)
     alive = np.arange(len(function))
     for _ in range(STEPS):
@@ -61,16 +61,20 @@ def hidden_places(
         upper = cl - bl > bl - al
         trial = np.where(upper, bl + GOLDEN * (cl - bl), bl - GOLDEN * (bl - al))
         value = turn[alive] * evaluate(function[alive], lane[alive], trial)
-        better = value < fb[alive]
-        a[alive] = np.where(better, np.where(upper, bl, al), np.where(upper, al, trial))
-        c[alive] = np.where(better, np.where(upper, cl, bl), np.where(upper, trial, cl))
-        b[alive] = np.where(better, trial, bl)
+        fal, fbl, fcl = fa[alive], fb[alive], fc[alive]
+        better = value < fbl
+        # The new bracket begins at the lowest place so far or at the trial, or still where it did; and ends likewise.
+        begins, ends = better == upper, better != upper
+        inner, f_inner = np.where(better, bl, trial), np.where(better, fbl, value)
+        b[alive], fb[alive] = np.where(better, trial, bl), np.where(better, value, fbl)
+        a[alive], fa[alive] = np.where(begins, inner, al), np.where(begins, f_inner, fal)
+        c[alive], fc[alive] = np.where(ends, inner, cl), np.where(ends, f_inner, fcl)
+        al, bl, cl, fal, fbl, fcl = a[alive], b[alive], c[alive], fa[alive], fb[alive], fc[alive]
         with np.errstate(invalid="ignore", divide="ignore"):
-            # The slope between the two lowest places no longer admits a zero within the bracket.
-            slope = np.abs(fb[alive] - value) / np.abs(trial - bl)
-            hopeless = np.minimum(fb[alive], value) > ROOM * slope * (c[alive] - a[alive])
-        fb[alive] = np.where(better, value, fb[alive])
-        found[alive] = fb[alive] < 0
+            # What is convex stays above the line from either end through the lowest place.
+            fall = np.maximum((fal - fbl) / (bl - al) * (cl - bl), (fcl - fbl) / (cl - bl) * (bl - al))
+            hopeless = fbl > ROOM * fall
+        found[alive] = fbl < 0
         alive = alive[~(found[alive] | hopeless | (cl - al <= BOTTOM * np.abs(cl)))]
         if not len(alive):
             break

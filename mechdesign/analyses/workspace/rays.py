@@ -28,7 +28,7 @@ SAME = 1e-9
 # Five samples that a parabola meets to this fraction of their size are of a quadratic function.
 QUADRATIC = 1e-13
 # First and last sample of an interval, as fractions of it.
-INSET = 1e-7
+INSET = 1e-10
 FIVE = np.linspace(0.0, 1.0, 5)
 
 
