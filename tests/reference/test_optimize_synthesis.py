@@ -52,6 +52,44 @@ def test_function_generator_with_the_best_three_exact_values() -> None:
     assert tables["optimum"][name][0] < structural_error(1.5 - spread, 1.5 + spread)
 
 
+def sine_errors(k1, k2, k3, crank_0, follower_0):
+    """Errors of the follower for y = sin(x), every 1.5 deg of x, in degrees, by Freudenstein's equation."""
+    x = np.radians(np.arange(0, 90.1, 1.5))
+    crank, follower = np.radians(crank_0) + x * 4 / 3, np.radians(follower_0) + np.radians(60) * np.sin(x)
+    a, b, c = np.cos(crank) - k1, np.sin(crank), k3 - k2 * np.cos(crank)
+    found = np.arctan2(b, a) - np.arccos(c / np.hypot(a, b))
+    return np.degrees(np.angle(np.exp(1j * (found - follower))))
+
+
+def test_sine_generator_against_three_exact_values() -> None:
+    """F. Freudenstein, Approximate synthesis of four-bar linkages (1955), with Chebyshev's spacing and without it.
+
+    The best approximation has its largest error in one row more than it has dimensions, and not all of one sign.
+    """
+    x = np.radians(45 - 45 * np.cos(np.radians([30, 90, 150])))
+    crank, follower = np.radians(105) + x * 4 / 3, np.radians(66) + np.radians(60) * np.sin(x)
+    exact = np.linalg.solve(np.column_stack([np.cos(follower), -np.cos(crank), np.ones(3)]), np.cos(crank - follower))
+    study = study_named("sine_generator")
+    nominal = study.parameters.nominal
+    a, c = 1 / exact[0], 1 / exact[1]
+    b = np.sqrt(a**2 + c**2 + 1 - 2 * a * c * exact[2])
+    assert (nominal["a"], nominal["b"], nominal["c"]) == pytest.approx((a, b, c), abs=5e-5)
+    spaced = sine_errors(*exact, 105, 66)
+    motion = result_of("sine_generator").main
+    assert motion["follower.angle_error"] == pytest.approx(spaced, abs=0.03)
+
+    (best,) = optimised("sine_generator")["optimum"].rows()
+    a, b, c = (best[name] for name in "abc")
+    ratios = 1 / a, 1 / c, (a**2 - b**2 + c**2 + 1) / (2 * a * c)
+    errors = sine_errors(*ratios, best["crank_0"], best["follower_0"])
+    worst = np.abs(errors).max()
+    assert best["kinematics.follower.angle_error"] == pytest.approx(worst, abs=1e-9)
+    assert worst < np.abs(spaced).max() / 20
+    signs = np.sign(errors[np.abs(errors) > worst - 1e-6])
+    assert len(signs) == 6
+    assert abs(signs.sum()) < 6
+
+
 def hoeken(l1, l3):
     """Path of P over a half turn of the crank: where two circles meet, and as far beyond."""
     pin = np.exp(1j * np.radians(np.arange(90, 271, 5)))
