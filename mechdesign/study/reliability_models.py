@@ -43,6 +43,8 @@ METHODS = (
     "importance_sampling",
     "auto",
 )
+# Those that solve made mechanisms at random.
+SAMPLING = frozenset(("monte_carlo", "quasi_monte_carlo", "importance_sampling", "auto"))
 DEFAULT_METHODS = ("analytic", "monte_carlo")
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
@@ -310,4 +312,5 @@ class ReliabilitySection(PoseSection):
     ] = DEFAULT_METHODS
     samples: Annotated[int, Whole(2, 10**15)] = 40_000
     precision: Precision | None = None
+    sobol: Annotated[int, Whole(0, 10**9)] | None = None
     allocate: Allocate | None = None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.kinematics.continuity import continuous
 from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, judge_failures, radians, solve_poses
-from mechdesign.analyses.reliability import tables
+from mechdesign.analyses.reliability import sobol, tables
 from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.comparison import disagreements
 from mechdesign.analyses.reliability.error_limits import Band, Disc
@@ -107,9 +107,11 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     first = analytic(task)
     found: list[Found] = []
     interrupted = ""
+    indices: dict[int, sobol.Indices] = {}
     try:
         for method in section.methods:
             found.append(first if method == first.method else METHODS[method](task))
+        indices = sobol.indices(task, section, poses.listed)
     except Partial as partial:
         found.append(partial.found)
         interrupted = "interrupted: "
@@ -117,9 +119,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         if not found:
             raise
         interrupted = "interrupted: "
-    answer = tables.Answer(
-        study, poses, question, nominal.reason, _in_order(study, poses, question, nominal), linear, found, first
-    )
+    centres = _in_order(study, poses, question, nominal)
+    answer = tables.Answer(study, poses, question, nominal.reason, centres, linear, found, first, indices)
     counts = {"poses": poses.count}
     done = [sums for each in found for sums in each.sums.values()]
     if done:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,8 @@ from mechdesign.analyses.reliability.error_limits import correlation
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
 from mechdesign.analyses.reliability.methods import Found
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
+from mechdesign.analyses.reliability.sobol import Indices
+from mechdesign.analyses.reliability.sobol import columns as index_columns
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -44,6 +46,8 @@ class Answer:
         What each method says.
     first_order : Found
         What the analytic method says, whose moments stand in where no method gives any.
+    indices : dict of int to Indices
+        Sobol' indices by pose, where they are asked.
     """
 
     study: Study
@@ -54,6 +58,7 @@ class Answer:
     linear: FirstOrder
     found: Sequence[Found]
     first_order: Found
+    indices: Mapping[int, Indices] = field(default_factory=dict)
 
     @property
     def sums(self) -> dict[int, Sums]:
@@ -198,6 +203,8 @@ def contributions(answer: Answer) -> Table:
         ),
         Column("share", np.moveaxis(share, 2, 0).ravel(), meaning="share of the output's variance, to the first order"),
     ]
+    if answer.indices:
+        columns += index_columns(answer.indices, (count, channels, len(names)))
     return Table("contributions", tuple(columns), "what the errors come from")
 
 
