@@ -26,6 +26,8 @@ SPACING = 0.03
 # place so far from it is told.
 BEYOND = 1.6
 MOST = 20_000
+# Poses outside the study's limits are passed through over this many spacings: there may be another piece beyond.
+GAP = 15
 # Step of differences, and of a change of dimensions, as parts of the mechanism's size and of the change.
 STEP, STAGES = 1e-6, 8
 # Beyond a fold, how often the way is cut back, and how much shorter than to where the grip is expected to vanish.
@@ -155,14 +157,10 @@ class Atlas:
                 now = again(rows, np.asarray(share * way[rows]))
                 rows, share, now = rows[now < 0], share[now < 0], now[now < 0]
             state = self.approach.state(goal, sizes, found)
-        vectors = self.plan.mechanism.geometry.vectors(places)
-        graph = self.plan.mechanism.graph
         grip[lost] = np.nan
-        reason = np.where(~(grip > 0), np.int8(Reason.NOT_CLOSED), np.int8(Reason.OK)).astype(np.int8)
-        told = Configuration(
-            graph, vectors, flat.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
-            reason, places,
-        )  # fmt: skip
+        told = self._told(state, places, flat.shape)
+        reason = np.where(grip > 0, np.int8(Reason.OK), np.int8(Reason.NOT_CLOSED)).astype(np.int8)
+        told = replace(told, reason=reason)
         # What is told of another place is not inside.
         open_ = self._open(state, flat.shape)
         grip[far & ~open_] = np.nan
@@ -218,6 +216,8 @@ class Atlas:
         count = max((len(value) for value in sizes.values()), default=1)
         seen = set(zip(design.tolist(), lattice.tolist(), strict=True))
         layers = []
+        # Spacings since a pose was within the limits.
+        outside = np.zeros(len(design), dtype=int)
         while len(design):
             z = self.origin + self.spacing * lattice
             own = {name: value[design] for name, value in sizes.items()}
@@ -225,7 +225,8 @@ class Atlas:
             reached = grip > 0
             state = self.approach.state(z, own, table)
             # Poses just outside, where a leg does not reach, tell how far outside it is; but nothing grows from them.
-            closed = np.flatnonzero(reached & ~self._open(state, z.shape))
+            outside = np.where(self._within(state, own, z.shape), 0, outside + 1)
+            closed = np.flatnonzero(reached & ~self._open(state, z.shape) & (outside < GAP))
             layers.append((design[reached], lattice[reached], table[:, reached], grip[reached]))
             fresh: dict[tuple[int, complex], int] = {}
             steps = (lattice[closed, None] + SIDES).ravel().tolist()
@@ -239,7 +240,7 @@ class Atlas:
             parent = np.array(list(fresh.values()), dtype=np.intp)
             design = design[parent]
             lattice = np.array([step for _, step in fresh], dtype=complex)
-            table = table[:, parent]
+            table, outside = table[:, parent], outside[parent]
         none = (np.zeros(0, np.intp), np.zeros(0, complex), np.zeros((len(table), 0)), np.zeros(0))
         design, lattice, table, grip = (np.concatenate(parts, axis=-1) for parts in zip(none, *layers, strict=True))
         slopes = self._slopes(lattice, {name: value[design] for name, value in sizes.items()}, table)
@@ -262,6 +263,21 @@ class Atlas:
                 slope = (unknowns(state, z.shape) - table) / h
             found.append(np.where(np.isfinite(slope).all(axis=0), slope, 0.0))
         return np.stack(found)
+
+    def _within(self, state: State, sizes: Mapping[str, Floats], shape: tuple[int, ...]) -> Flags:
+        """Which poses are within the study's limits."""
+        mechanism, found = self.plan.mechanism, np.ones(shape, dtype=bool)
+        for _, margin in mechanism.margins(self._told(state, sizes, shape)):
+            found &= np.asarray(margin) >= 0
+        return found
+
+    def _told(self, state: State, places: Mapping[str, Value], shape: tuple[int, ...]) -> Configuration:
+        """A state as a configuration, whether it was reached or not."""
+        graph, vectors = self.plan.mechanism.graph, self.plan.mechanism.geometry.vectors(places)
+        return Configuration(
+            graph, vectors, shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
+            np.zeros(shape, dtype=np.int8), places,
+        )  # fmt: skip
 
     def _open(self, state: State, shape: tuple[int, ...]) -> Flags:
         """Where a leg does not reach, or has no length."""
