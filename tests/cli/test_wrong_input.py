@@ -130,6 +130,24 @@ def test_a_requirement_that_names_no_column_is_told_before_anything_is_computed(
     assert not (folder / "results/study" / command).exists()
 
 
+@pytest.mark.parametrize(
+    ("variable", "message"),
+    [
+        ("{from: 9, to: 5, step: 1}", "no value lies between 'from' and 'to'"),
+        ("{from: 5, to: 9, step: 1e-12}", "the grid has 4000000000001 designs"),
+        ("{from: 5, to: 9, step: 0}", "must be positive"),
+    ],
+)
+def test_a_grid_that_cannot_be_is_told_where_it_is_asked(folder, invoke, variable, message) -> None:
+    study = ARM[: ARM.index("reliability:")] + "kinematics: {poses: [{t1: 30, t2: 60}], outputs: [P]}\n"
+    study += f"optimize:\n  maximize: kinematics.P.x\n  variables:\n    upper.length: {variable}\n"
+    (folder / "study.yaml").write_text(study)
+    done = invoke("optimize", "study.yaml")
+    assert done.exit_code == 2, done.output
+    assert "study.yaml:8:" in done.stderr
+    assert message in done.stderr
+
+
 def test_an_output_directory_that_cannot_be_written(folder, invoke) -> None:
     (folder / "study.yaml").write_text(FOUR_BAR)
     (folder / "file").write_text("in the way")

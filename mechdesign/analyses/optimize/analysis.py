@@ -18,7 +18,7 @@ from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_t
 from mechdesign.analyses.workspace.analysis import index_meanings
 from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.analyses.workspace.region import GRID_TOLERANCE, questions
-from mechdesign.errors import AssemblyError, Interrupted, Problem, StudyError
+from mechdesign.errors import AssemblyError, Interrupted, StudyError
 from mechdesign.journal import Journal
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
@@ -103,13 +103,12 @@ def optimize(
 
 def _goals(study: Study) -> tuple[Goal, ...]:
     section = study.optimize
-    file = str(study.path or "")
     if section is None or not section.variables:
-        raise StudyError((Problem("an optimisation needs variables", "optimize.variables", file),))
+        raise StudyError((study.problem("an optimisation needs variables", "optimize", "variables"),))
     goals = (*(goal(name) for name in section.maximize), *(goal(name, smallest=True) for name in section.minimize))
     if not goals:
         message = "what is to be best? e.g. maximize: [GII, GRI, SUI], or minimize"
-        raise StudyError((Problem(message, "optimize.maximize", file),))
+        raise StudyError((study.problem(message, "optimize", "maximize"),))
     return goals
 
 

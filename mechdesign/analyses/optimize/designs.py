@@ -57,7 +57,7 @@ def _size(study: Study, name: str, total: int) -> Problem:
         "no value lies between 'from' and 'to' for any design" if total == 0
         else f"the grid has {total} designs; {MOST_DESIGNS} is the limit: take larger steps"
     )  # fmt: skip
-    return Problem(message, f"optimize.variables.{name}", str(study.path or ""))
+    return study.problem(message, "optimize", "variables", name)
 
 
 def normalised(values: Floats, feasible: NDArray[np.bool_], *, smallest: bool) -> Floats:
