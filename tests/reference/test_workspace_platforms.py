@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers import turning
 from helpers.circles import common_area
 from helpers.studies import study_of
 
@@ -132,3 +133,35 @@ def test_the_arcs_against_counted_points() -> None:
             distance = np.abs(x + 1j * y - centre)
             inside &= (distance >= low) & (distance <= high)
         assert common_area(legs(0.3, 0.75, angle)) == pytest.approx(inside.sum() * 1e-6, abs=2e-4)
+
+
+@pytest.mark.parametrize(("every", "inside"), [(False, turning.reached), (True, turning.always)])
+@pytest.mark.parametrize(("study", "held", "bounds"), [
+    (RPR, "[0, 15, -30]", (0.3, 0.75)),
+    (RRR, "[0, 20, -30]", (CRANK - ROD, CRANK + ROD)),
+])  # fmt: skip
+def test_over_a_range_of_orientations(study: str, held: str, bounds, every: bool, inside) -> None:
+    """Reachable and total orientation workspace (Merlet, Gosselin and Mouly): by Green's theorem along their arcs."""
+    at = f"{{from: -10, to: 25, all: {str(every).lower()}}}"
+    found = mechdesign.workspace(study_of(study.replace(held, at))).main
+    reach = [(complex(base), complex(corner), *bounds) for base, corner in zip(BASES, CORNERS, strict=True)]
+    span = np.radians([-10, 25])
+    exact = turning.area(lambda z: inside(z, reach, *span), reach, *span)
+    assert abs(found["area"][0] - exact) <= found["area_error"][0] + 1e-8 * exact
+    assert found["area_error"][0] <= 1e-6 * exact
+
+
+def test_the_turning_legs_against_counted_orientations() -> None:
+    """What the last test compares with, by many orientations of random points."""
+    z = np.random.default_rng(1).uniform(0, 1, (4000, 2)) @ np.array([1, 1j])
+    reach = [(complex(base), complex(corner), 0.3, 0.75) for base, corner in zip(BASES, CORNERS, strict=True)]
+    span = np.radians([-10, 25])
+    held = np.array([
+        np.all([(low <= np.abs(z - b + c * np.exp(1j * phi))) & (np.abs(z - b + c * np.exp(1j * phi)) <= high)
+                for b, c, low, high in reach], axis=0) for phi in np.linspace(*span, 701)
+    ])  # fmt: skip
+    # Between the orientations that are counted there may be one more, or one that is missed.
+    assert (turning.reached(z, reach, *span) >= held.any(axis=0)).all()
+    assert (turning.always(z, reach, *span) <= held.all(axis=0)).all()
+    assert np.mean(turning.reached(z, reach, *span) != held.any(axis=0)) < 2e-3
+    assert np.mean(turning.always(z, reach, *span) != held.all(axis=0)) < 2e-3
