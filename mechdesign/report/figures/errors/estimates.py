@@ -1,0 +1,127 @@
+"""Probability of failure with its interval: pose by pose, over a sweep, and of the whole cycle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.report.figures.errors.looks import LOOKS, Look, methods, select
+from mechdesign.report.figures.errors.panels import Along, Floats, framed, legend_below, name_abscissa, title
+from mechdesign.results import Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+# Listed poses whose names fit below a picture.
+MOST_LISTED = 12
+# Values farther apart than this are drawn on a logarithmic scale.
+_WIDE = 8.0
+# Handles by their words; error bars are no artists.
+Legend = dict[str, Any]
+
+
+def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | None) -> Figure:
+    """Failure by every method, over what a sweep runs over or beside the words for each listed pose."""
+    known = methods(table)
+    lines = 1 if swept is not None else min(len(poses.names), 4)
+    bottom = 0.35 + 0.15 * lines + 0.2 * (2 if len(known) > 2 else 1)
+    figure = framed(bottom + 3.6, left=0.95, right=0.15, top=0.7, bottom=bottom + 0.2)
+    axes = figure.subplots()
+    floor = _scale(axes, table)
+    entries: Legend = {}
+    many = poses.count > MOST_LISTED
+    place = np.arange(poses.count, dtype=float) if swept is None else swept.values
+    apart = min(0.14, 0.8 / len(known)) if swept is None else 0.0
+    for k, method in enumerate(known):
+        rows = np.flatnonzero(select(table, method=method, scope="pose"))
+        if swept is None:
+            rows = rows[:MOST_LISTED]
+        at = place[: len(rows)] + (k - (len(known) - 1) / 2) * apart
+        look = LOOKS[method]
+        if look.simulated:
+            _dots(axes, table, rows, at, look, floor, entries)
+        else:
+            drawn = look.dashes if swept is not None else "None"
+            marker = look.marker if swept is None else ""
+            value = np.where(table["failure"][rows] > 0, table["failure"][rows], np.nan if floor else 0.0)
+            (line,) = axes.plot(at, value, linestyle=drawn, marker=marker, color=look.color)
+            entries[look.words] = line
+    for method in known:
+        _cycle(axes, table, method, entries)
+    axes.set_ylabel("failure probability")
+    heading = "Probability that an error leaves its limits"
+    if swept is None:
+        count = min(poses.count, MOST_LISTED)
+        words = [pose_in_words(study, poses, row).replace(", ", "\n") for row in range(count)]
+        axes.set_xticks(place[:count], words, fontsize=8 if count <= 8 else 6.5)
+        axes.set_xlim(-0.6, count - 0.4)
+        heading += f" (first {count} of {poses.count} poses)" if many else ""
+    else:
+        name_abscissa(axes, swept.label)
+        axes.margins(x=0.02)
+    title(figure, heading, "bars: 99.7 % intervals; arrows: no failure was seen, upper end of the interval"
+          if _unseen(table).any() else "bars: 99.7 % intervals", left=0.95)  # fmt: skip
+    legend_below(figure, list(entries.values()), list(entries))
+    return figure
+
+
+def _scale(axes: Axes, table: Table) -> float:
+    """Set the axis, logarithmic where values lie far apart; returns its floor, 0 where it is linear."""
+    value = np.concatenate([table["failure"], table["failure_high"][_unseen(table)]])
+    positive = value[np.isfinite(value) & (value > 0)]
+    if len(positive) and positive.max() > _WIDE * positive.min():
+        axes.set_yscale("log")
+        floor = 10.0 ** np.floor(np.log10(max(0.5 * positive.min(), 1e-300)))
+        axes.set_ylim(floor, min(1.0, 3.0 * float(np.nanmax(table["failure_high"]))))
+        return float(floor)
+    return 0.0
+
+
+def _unseen(table: Table) -> NDArray[np.bool_]:
+    """Rows of samples without a failure: only an upper end is known."""
+    return np.asarray((table["failure_low"] == 0) & (table["failure_high"] > 0) & (table["samples"] > 0))
+
+
+def _dots(
+    axes: Axes, table: Table, rows: NDArray[np.intp], at: Floats, look: Look, floor: float, entries: Legend
+) -> None:  # fmt: skip
+    """Values with intervals, one marker for each method that they come from."""
+    used = table["used"][rows]
+    unseen = _unseen(table)[rows]
+    value, low, high = (table[name][rows] for name in ("failure", "failure_low", "failure_high"))
+    for method in dict.fromkeys(used.tolist()):
+        own = used == method
+        shown, words = look, look.words
+        if method != table["method"][rows[0]] and method in LOOKS:
+            shown = replace(look, marker=LOOKS[method].marker)
+            solved = int(table["evaluations"][rows[own]].sum())
+            words = f"{look.words} by {LOOKS[method].words}, {solved:,} solved"
+        seen = own & ~unseen
+        bars = np.abs(np.stack([value - np.maximum(low, floor), high - value]))
+        entries[words] = axes.errorbar(
+            at[seen], value[seen], bars[:, seen], fmt=shown.marker, markersize=5, capsize=3 if len(at) < 25 else 0,
+            color=look.color, elinewidth=1.2,
+        )  # fmt: skip
+        none = own & unseen
+        if none.any():
+            axes.plot(at[none], high[none], linestyle="None", marker="v", markersize=6, color=look.color,
+                      markerfacecolor="white")  # fmt: skip
+
+
+def _cycle(axes: Axes, table: Table, method: str, entries: Legend) -> None:
+    """The whole cycle across the picture: its value, and the bounds or the interval about it."""
+    for row in np.flatnonzero(select(table, method=method, scope="cycle")):
+        look = LOOKS[method]
+        low, high, value = (float(table[name][row]) for name in ("failure_low", "failure_high", "failure"))
+        between = axes.axhspan(max(low, axes.get_ylim()[0]), high, color=look.color, alpha=0.15, linewidth=0)
+        if look.simulated:
+            entries[f"whole cycle, {look.words}"] = axes.axhline(
+                value, color=look.color, linestyle=(0, (7, 2)), linewidth=1.6
+            )
+        else:
+            entries[f"whole cycle, {look.words} (bounds)"] = between

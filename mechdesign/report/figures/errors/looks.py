@@ -1,0 +1,60 @@
+"""How each method is drawn, the same in every picture, and what its rows of a table are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.report.figures import style
+from mechdesign.results import Table
+
+
+@dataclass(frozen=True)
+class Look:
+    """A method's name in words, colour, marker, and dashes; what is simulated is drawn as dots, without a line."""
+
+    words: str
+    color: str
+    marker: str
+    dashes: Literal["-", "--", ":", ""]
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the method samples made mechanisms."""
+        return self.dashes == ""
+
+
+LOOKS = {
+    "analytic": Look("first order", style.BLUE, "D", "-"),
+    "second_order": Look("second order", style.SKY, "s", "--"),
+    "form": Look("FORM", style.GREEN, "P", ":"),
+    "monte_carlo": Look("Monte Carlo", style.VERMILION, "o", ""),
+    "quasi_monte_carlo": Look("quasi Monte Carlo", style.ORANGE, "^", ""),
+    "importance_sampling": Look("importance sampling", style.PURPLE, "X", ""),
+    "auto": Look("auto", style.INK, "*", ""),
+}
+# What is nearest to the truth, the best first.
+_TRUST = ("auto", "importance_sampling", "quasi_monte_carlo", "monte_carlo", "second_order", "form", "analytic")
+
+
+def methods(table: Table) -> list[str]:
+    """Methods of a table, in the order in which they are drawn."""
+    present = set(table["method"].tolist())
+    return [method for method in LOOKS if method in present]
+
+
+def most_trusted(known: Sequence[str]) -> str:
+    """The method whose value stands where there is room for one only."""
+    return next(method for method in _TRUST if method in known)
+
+
+def select(table: Table, **chosen: str) -> NDArray[np.bool_]:
+    """Rows in which columns have these values."""
+    rows = np.ones(len(table), dtype=bool)
+    for name, value in chosen.items():
+        rows &= table[name] == value
+    return rows
