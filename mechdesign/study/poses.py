@@ -60,6 +60,8 @@ class Poses:
         Each has as many poses.
     places, parameters : mapping of str to ndarray, shape (count,)
         Where designs differ from the study's own: dimensions (lengths, radians), and parameters in the study's units.
+    motion : bool
+        Whether one design passes them one after the other: a sweep along one coordinate, or a path.
     """
 
     groups: tuple[PoseGroup, ...]
@@ -69,6 +71,7 @@ class Poses:
     designs: int = 1
     places: Mapping[str, Floats] = field(default_factory=dict)
     parameters: Mapping[str, Floats] = field(default_factory=dict)
+    motion: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -162,7 +165,8 @@ def _grid(axes: Mapping[str, Floats]) -> Poses:
 
 
 def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> Poses:
-    return Poses((PoseGroup(tuple(values), values, np.arange(count)),), count, False, grid)
+    group = PoseGroup(tuple(values), values, np.arange(count))
+    return Poses((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
 
 
 def _path(path: Mapping[str, str | tuple[object, ...]], folder: Path) -> Poses:

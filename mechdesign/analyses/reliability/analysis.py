@@ -14,11 +14,13 @@ from mechdesign.analyses.poses import expand_outputs, judge_failures, radians, s
 from mechdesign.analyses.reliability import sobol, tables
 from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.comparison import disagreements
+from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.error_limits import Band, Disc
 from mechdesign.analyses.reliability.first_order import Channel, FirstOrder, Rates, linear_errors, nominal_values
 from mechdesign.analyses.reliability.methods import METHODS, MOST, Found, Partial, Task, analytic
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources, find_sources
+from mechdesign.analyses.reliability.unseen import unseen
 from mechdesign.errors import Interrupted, MechanismError, StudyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
@@ -102,7 +104,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     task = Task(
         settings, sources, linear, len(question.channels), poses.count, study.seed if seed is None else seed,
         section.samples, section.samples if "samples" in section.model_fields_set else MOST, section.precision,
-        jobs, progress,
+        jobs, progress, poses.motion,
     )  # fmt: skip
     first = analytic(task)
     found: list[Found] = []
@@ -110,7 +112,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     indices: dict[int, sobol.Indices] = {}
     try:
         for method in section.methods:
-            found.append(first if method == first.method else METHODS[method](task))
+            said = first if method == first.method else METHODS[method](task)
+            found.append(with_cycle(said, task, found))
         indices = sobol.indices(task, section, poses.listed)
     except Partial as partial:
         found.append(partial.found)
@@ -130,7 +133,15 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
             failures.append(
                 f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
             )
-    failures = disagreements(study, poses, found) + failures
+    cycles = [each.cycle for each in found if each.cycle is not None and each.cycle.samples]
+    if cycles:
+        counts["cycles"] = cycles[0].samples
+        if cycles[0].invalid:
+            failures.append(
+                f"{cycles[0].invalid} of {cycles[0].samples} made mechanisms cannot be assembled at some pose of the "
+                "cycle; they count as failures"
+            )
+    failures = disagreements(study, poses, found) + unseen(study, poses, found) + failures
     if interrupted:
         interrupted += f"{counts.get('samples', 0)} samples, {', '.join(each.method for each in found)}"
     result = Result(
@@ -312,6 +323,7 @@ def _settings(
                     question.discs,
                     question.pair,
                     scale,
+                    bool(row == assembled[0]),
                     bool(row == assembled[0]),
                 )
             )

@@ -41,6 +41,8 @@ class Task:
         As the study asks.
     most : int
         Samples of `auto`.
+    cycle : bool
+        Whether the poses are one motion, whose probability as a whole is asked.
     """
 
     settings: Sequence[Setting]
@@ -54,6 +56,7 @@ class Task:
     precision: Precision | None
     jobs: int | None
     progress: Progress
+    cycle: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +77,8 @@ class Found:
         By pose, the method that the value comes from, where it is not this one.
     rungs : dict of int to dict of str to Estimate
         By pose, what the methods tried before say.
+    cycle : Estimate or None
+        Of the whole motion.
     """
 
     method: str
@@ -84,6 +89,7 @@ class Found:
     sums: dict[int, Sums] = field(default_factory=dict)
     used: dict[int, str] = field(default_factory=dict)
     rungs: dict[int, dict[str, Estimate]] = field(default_factory=dict)
+    cycle: Estimate | None = None
 
 
 def analytic(task: Task) -> Found:
@@ -170,12 +176,13 @@ def quasi_monte_carlo(task: Task) -> Found:
         plain = replace(setting, trend=False, scale=None)
         seeds = generator(task.seed, setting.pose, _QUASI, 0).integers(2**62, size=len(counts))
         total: Sums | None = None
-        broken = []
+        broken, blocks = [], 0
         for count, seed in zip(counts, seeds.tolist(), strict=True):
             broken.append(0)
             for u in quasi.points(len(task.sources.owners), count, seed):
-                part = sums_of(plain, task.sources.made(task.sources.at(u)), u.shape[1], 0)
+                part = sums_of(plain, task.sources.made(task.sources.at(u)), u.shape[1], blocks)
                 total = part if total is None else total + part
+                blocks += 1
                 broken[-1] += part.failures
         assert total is not None
         return total, quasi.estimate(broken, counts[0], total.samples - total.valid)

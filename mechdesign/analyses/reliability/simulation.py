@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 CELLS = 25
 REACH = 3.0
 _DENSITY_CHUNKS = 50
-# The trend of the means is followed in steps of this many samples through the first chunks, then at
-# powers of two.
+# The trend of the means is followed in steps of this many samples through the first chunks, whose errors are kept for a
+# histogram too, then at powers of two.
 _TREND_STEP = 1000
 _TREND_CHUNKS = 16
 
@@ -49,7 +49,9 @@ class Setting:
     scale : (float, float) or None
         Standard deviations for the density of the pair; None where no density is wanted.
     trend : bool
-        Whether to follow the means.
+        Whether to follow the means and the failures.
+    keep : bool
+        Whether to keep the errors of the first chunks.
     """
 
     pose: int
@@ -64,6 +66,7 @@ class Setting:
     pair: tuple[int, int] | None
     scale: tuple[float, float] | None
     trend: bool
+    keep: bool
 
     @property
     def limited(self) -> bool:
@@ -83,8 +86,10 @@ class Sums:
         Of the errors of the pair.
     density : ndarray of int, shape (CELLS * CELLS,) or (0,)
         Samples in each cell, over `counted` samples.
-    trend : ndarray, shape (steps, 1 + channels)
-        Valid samples and sums of errors after each step, from the begin of the chunk.
+    trend : ndarray, shape (steps, 3 + channels)
+        Samples, valid ones, failures and sums of errors after each step, from the begin of the chunk.
+    kept : ndarray, shape (channels, n)
+        Errors of valid samples of the first chunks.
     """
 
     samples: int
@@ -96,6 +101,7 @@ class Sums:
     density: NDArray[np.int64]
     counted: int
     trend: Floats
+    kept: Floats
 
     @property
     def mean(self) -> Floats:
@@ -120,7 +126,7 @@ class Sums:
         return correlation(np.array([[spread[one], mixed], [mixed, spread[two]]]))
 
     def __add__(self, other: Sums) -> Sums:
-        offset = np.concatenate([[self.valid], self.errors])
+        offset = np.concatenate([[self.samples, self.valid, self.failures], self.errors])
         return Sums(
             self.samples + other.samples,
             self.valid + other.valid,
@@ -131,6 +137,7 @@ class Sums:
             self.density + other.density if len(other.density) else self.density,
             self.counted + other.counted,
             np.concatenate([self.trend, other.trend + offset]) if len(other.trend) else self.trend,
+            np.concatenate([self.kept, other.kept], axis=1) if other.kept.size else self.kept,
         )
 
 
@@ -170,11 +177,15 @@ def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, co
 
 
 def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
-    """Sums over made mechanisms; of the first chunks also the density and the trend."""
+    """Sums over made mechanisms; of the first chunks also the density, the trend and the errors."""
     errors, valid = errors_of(setting, made, count)
-    failures = count - _successes(setting, errors, count)
-    kept = int(np.count_nonzero(valid))
-    if kept < count:
+    within = keeps(setting, errors)
+    failures = 0 if within is None else count - int(np.count_nonzero(within))
+    assembled = int(np.count_nonzero(valid))
+    trend = np.zeros((0, 3 + len(errors)))
+    if setting.trend and chunk < _TREND_CHUNKS:
+        trend = _trend(errors, valid, within)
+    if assembled < count:
         errors = [error[valid] for error in errors]
     sums = np.array([error.sum() for error in errors])
     squares = np.array([(error * error).sum() for error in errors])
@@ -185,16 +196,24 @@ def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
         product = float((x * y).sum())
         if setting.scale is not None and chunk < _DENSITY_CHUNKS:
             density = _count_cells(x, y, setting.scale)
-    trend = np.zeros((0, 1 + len(errors)))
-    if setting.trend and kept:
-        if chunk < _TREND_CHUNKS:
-            begins = np.arange(0, kept, _TREND_STEP)
-            steps = [np.minimum(begins + _TREND_STEP, kept).astype(float)]
-            steps += [np.cumsum(np.add.reduceat(error, begins)) for error in errors]
-            trend = np.stack(steps, axis=1)
-        elif chunk.bit_count() == 1:
-            trend = np.concatenate([[kept], sums])[None]
-    return Sums(count, kept, failures, sums, squares, product, density, kept if len(density) else 0, trend)
+    if setting.trend and chunk >= _TREND_CHUNKS and chunk.bit_count() == 1:
+        trend = np.concatenate([[count, assembled, failures], sums])[None]
+    kept = np.stack(errors) if setting.keep and chunk < _TREND_CHUNKS else np.zeros((len(errors), 0))
+    return Sums(
+        count, assembled, failures, sums, squares, product, density, assembled if len(density) else 0, trend, kept
+    )
+
+
+def _trend(errors: Sequence[Floats], valid: NDArray[np.bool_], within: NDArray[np.bool_] | None) -> Floats:
+    count = len(valid)
+    begins = np.arange(0, count, _TREND_STEP)
+    broken = np.zeros(count, dtype=bool) if within is None else ~within
+    steps = [np.minimum(begins + _TREND_STEP, count).astype(float)]
+    for flag in (valid, broken):
+        steps.append(np.cumsum(np.add.reduceat(flag.astype(float), begins)))
+    for error in errors:
+        steps.append(np.cumsum(np.add.reduceat(np.where(valid, error, 0.0), begins)))
+    return np.stack(steps, axis=1)
 
 
 def solve(setting: Setting, made: Made) -> Configuration:
@@ -220,10 +239,8 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], N
     return errors, np.broadcast_to(solved.valid, (count,))
 
 
-def _successes(setting: Setting, errors: Sequence[Floats], count: int) -> int:
-    """Samples that keep every limit; one that is not assembled is nan and keeps none."""
-    if not setting.bands and not setting.discs:
-        return 0
+def keeps(setting: Setting, errors: Sequence[Floats]) -> NDArray[np.bool_] | None:
+    """Which samples keep every limit; one that is not assembled is nan and keeps none. None where there are none."""
     kept: NDArray[np.bool_] | None = None
     with np.errstate(invalid="ignore"):
         for band in setting.bands:
@@ -236,8 +253,7 @@ def _successes(setting: Setting, errors: Sequence[Floats], count: int) -> int:
             x, y = errors[disc.x], errors[disc.y]
             inside = x * x + y * y <= disc.radius * disc.radius
             kept = inside if kept is None else kept & inside
-    assert kept is not None
-    return int(np.count_nonzero(kept))
+    return kept
 
 
 def _count_cells(x: Floats, y: Floats, scale: tuple[float, float]) -> NDArray[np.int64]:

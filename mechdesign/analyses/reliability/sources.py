@@ -93,6 +93,14 @@ class Drawn:
     radii: list[Floats | float]
     pins: list[tuple[Floats, Floats]]
 
+    def take(self, chosen: NDArray[np.bool_]) -> Drawn:
+        """Some of them."""
+        return Drawn(
+            [values[chosen] for values in self.scalars],
+            [radius if isinstance(radius, float) else radius[chosen] for radius in self.radii],
+            [(x[chosen], y[chosen]) for x, y in self.pins],
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Made:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_columns
+from mechdesign.analyses.reliability import drawn_tables
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.error_limits import correlation
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
 from mechdesign.analyses.reliability.methods import Found
-from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
+from mechdesign.analyses.reliability.simulation import Sums
 from mechdesign.analyses.reliability.sobol import Indices
 from mechdesign.analyses.reliability.sobol import columns as index_columns
 from mechdesign.results import Column, Table
@@ -31,6 +31,9 @@ _KINDS = {
     "angle": ("angle", "angular_velocity", "angular_acceleration"),
     "none": ("none", "none", "none"),
 }
+
+# Where nothing was computed.
+_UNKNOWN = Estimate(float("nan"), float("nan"), float("nan"), 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +84,10 @@ class Answer:
             [self.study.units.label(_KINDS[c.coordinate.quantity][c.order]) for c in channels],
         )
 
+    def at(self, rows: NDArray[np.intp]) -> list[Column]:
+        """Columns of the poses of these rows."""
+        return [Column(c.name, c.values[rows], c.unit, c.meaning) for c in pose_columns(self.study, self.poses)]
+
 
 def build(answer: Answer) -> dict[str, Table]:
     """All tables, the main one first."""
@@ -88,12 +95,8 @@ def build(answer: Answer) -> dict[str, Table]:
     if answer.question.limited:
         found.append(success(answer))
     found.append(contributions(answer))
-    found += [table for make in (density, convergence) if (table := make(answer)) is not None]
+    found += drawn_tables.build(answer)
     return {table.name: table for table in found}
-
-
-def _poses(answer: Answer, rows: NDArray[np.intp]) -> list[Column]:
-    return [Column(c.name, c.values[rows], c.unit, c.meaning) for c in pose_columns(answer.study, answer.poses)]
 
 
 def moments(answer: Answer) -> Table:
@@ -112,7 +115,7 @@ def moments(answer: Answer) -> Table:
     output, order, unit = answer.labels
     rows = np.repeat(np.arange(count), methods * channels)
     columns = [
-        *_poses(answer, rows),
+        *answer.at(rows),
         Column(
             "method",
             np.tile(np.repeat([each.method for each in known], channels), count),
@@ -131,45 +134,51 @@ def moments(answer: Answer) -> Table:
 
 
 def success(answer: Answer) -> Table:
-    """Reliability of every pose by every method."""
-    question, count, methods = answer.question, answer.poses.count, len(answer.found)
-    names = ("failure", "failure_low", "failure_high", "error", "rho")
-    values = {name: np.full((count, methods), np.nan) for name in names}
-    numbers = {name: np.zeros((count, methods), dtype=np.int64) for name in ("samples", "invalid", "evaluations")}
-    used = np.full((count, methods), "", dtype=object)
-    for m, each in enumerate(answer.found):
-        if each.rho is not None:
-            values["rho"][:, m] = each.rho
-        used[:, m] = each.method
-        for row, estimate in each.estimates.items():
-            values["failure"][row, m], values["failure_low"][row, m], values["failure_high"][row, m] = (
-                estimate.failure, estimate.low, estimate.high,
-            )  # fmt: skip
-            values["error"][row, m] = _error(estimate)
-            for name, column in numbers.items():
-                column[row, m] = getattr(estimate, name)
-            used[row, m] = each.used.get(row, each.method)
-    rows = np.repeat(np.arange(count), methods)
+    """Reliability of every pose by every method, and of the whole cycle."""
+    count, names = answer.poses.count, [each.method for each in answer.found]
+    cycles = [k for k, each in enumerate(answer.found) if each.cycle is not None]
+    rows = np.concatenate([np.repeat(np.arange(count), len(names)), np.zeros(len(cycles), dtype=np.intp)])
+    method = np.concatenate([np.tile(np.arange(len(names)), count), np.array(cycles, dtype=np.intp)])
+    whole = np.arange(len(rows)) >= count * len(names)
+    estimates: list[Estimate] = []
+    used = []
+    for row, k, cycle in zip(rows.tolist(), method.tolist(), whole.tolist(), strict=True):
+        each = answer.found[k]
+        estimate = each.cycle if cycle else each.estimates.get(row)
+        estimates.append(_UNKNOWN if estimate is None else estimate)
+        source = each.used.get(row, each.method)
+        used.append(source if not cycle else "monte_carlo" if estimates[-1].samples else "bounds")
+    error = np.array([_error(e) for e in estimates])
+    failure, low, high = (np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high"))
+    samples, invalid, evaluations = (
+        np.array([getattr(e, name) for e in estimates], dtype=np.int64)
+        for name in ("samples", "invalid", "evaluations")
+    )
+    rho = np.array([
+        np.nan if cycle or answer.found[k].rho is None else answer.found[k].rho[row]
+        for row, k, cycle in zip(rows, method, whole, strict=True)
+    ])  # fmt: skip
+    valid = np.where(whole, (answer.reason == 0).all(), answer.reason[rows] == 0)
     kind = "99.7 %; of counted failures Clopper-Pearson"
     columns = [
-        Column("scope", np.full(count * methods, "pose"), meaning="each pose by itself"),
-        *_poses(answer, rows),
-        Column("method", np.tile([each.method for each in answer.found], count), meaning="how it was computed"),
-        Column("reliability", 1.0 - values["failure"].ravel(), meaning="probability that every limit is kept"),
-        Column("low", 1.0 - values["failure_high"].ravel(), meaning=f"lower end of its interval, {kind}"),
-        Column("high", 1.0 - values["failure_low"].ravel(), meaning=f"upper end of its interval, {kind}"),
-        Column("failure", values["failure"].ravel(), meaning="1 - reliability, without loss of digits"),
-        Column("failure_low", values["failure_low"].ravel(), meaning=f"lower end of its interval, {kind}"),
-        Column("failure_high", values["failure_high"].ravel(), meaning=f"upper end of its interval, {kind}"),
-        Column("error", values["error"].ravel(), meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]"),
-        Column("samples", numbers["samples"].ravel(), meaning="samples that the value is taken from; 0: none"),
-        Column("invalid", numbers["invalid"].ravel(), meaning="samples that cannot be assembled; they are failures"),
-        Column("evaluations", numbers["evaluations"].ravel(), meaning="mechanisms that were solved for it"),
-        Column("used", used.ravel().astype(str), meaning="where the value comes from: of auto, the method it used"),
+        Column("scope", np.where(whole, "cycle", "pose"), meaning="a pose by itself, or one mechanism at all poses"),
+        *(replace(c, values=np.where(whole, np.nan, c.values)) for c in answer.at(rows)),
+        Column("method", np.array(names)[method], meaning="how it was computed"),
+        Column("reliability", 1.0 - failure, meaning="probability that every limit is kept"),
+        Column("low", 1.0 - high, meaning=f"lower end of its interval, {kind}"),
+        Column("high", 1.0 - low, meaning=f"upper end of its interval, {kind}"),
+        Column("failure", failure, meaning="1 - reliability, without loss of digits"),
+        Column("failure_low", low, meaning=f"lower end of its interval, {kind}; of a cycle's bounds the worst pose's"),
+        Column("failure_high", high, meaning=f"upper end of its interval, {kind}; of a cycle's bounds the poses' sum"),
+        Column("error", error, meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),
+        Column("samples", samples, meaning="samples that the value is taken from; 0: none"),
+        Column("invalid", invalid, meaning="samples that cannot be assembled; they are failures"),
+        Column("evaluations", evaluations, meaning="mechanisms that were solved for it"),
+        Column("used", np.array(used), meaning="where the value comes from: of auto, the method it used"),
     ]
-    if question.pair is not None:
-        columns.append(Column("rho", values["rho"].ravel(), meaning="correlation of the two outputs"))
-    columns.append(Column("valid", answer.reason[rows] == 0, meaning="1 where the nominal pose is valid"))
+    if answer.question.pair is not None:
+        columns.append(Column("rho", rho, meaning="correlation of the two outputs"))
+    columns.append(Column("valid", valid, meaning="1 where the nominal pose (all, of a cycle) is valid"))
     return Table("reliability", tuple(columns), "probability that the errors keep their limits")
 
 
@@ -192,7 +201,7 @@ def contributions(answer: Answer) -> Table:
     output, order, _ = answer.labels
     rows = np.repeat(np.arange(count), channels * len(names))
     columns = [
-        *_poses(answer, rows),
+        *answer.at(rows),
         Column("source", np.tile(names, count * channels), meaning="parameter, dimension, drive, or joint's clearance"),
         Column("output", np.tile(np.repeat(output, len(names)), count), meaning="coordinate"),
         Column("order", np.tile(np.repeat(order, len(names)), count), meaning="position, velocity or acceleration"),
@@ -206,62 +215,3 @@ def contributions(answer: Answer) -> Table:
     if answer.indices:
         columns += index_columns(answer.indices, (count, channels, len(names)))
     return Table("contributions", tuple(columns), "what the errors come from")
-
-
-def density(answer: Answer) -> Table | None:
-    """Density of the two outputs over +-3 standard deviations: bivariate normal beside the simulated one [S2]."""
-    pair, linear = answer.question.pair, answer.linear
-    if pair is None:
-        return None
-    centres = (np.arange(CELLS) + 0.5) * (2 * REACH / CELLS) - REACH
-    x, y = (grid.ravel() for grid in np.meshgrid(centres, centres, indexing="ij"))
-    rows, normal, simulated, scales = [], [], [], []
-    covariance = linear.covariance()
-    for row, sums in sorted(answer.sums.items()):
-        if not len(sums.density):
-            continue
-        block = covariance[row][np.ix_(pair, pair)]
-        rho, rest = correlation(block), 1.0 - correlation(block) ** 2
-        if not rest > 0:
-            continue
-        exponent = -(x * x - 2 * rho * x * y + y * y) / (2 * rest)
-        rows.append(row)
-        normal.append(np.exp(exponent) / (2 * np.pi * np.sqrt(rest)))
-        simulated.append(sums.density / (sums.counted * (2 * REACH / CELLS) ** 2))
-        scales.append(np.sqrt(np.diagonal(block)) * answer.scale[list(pair)])
-    if not rows:
-        return None
-    cells, sigma = CELLS * CELLS, np.array(scales)
-    output, _, unit = answer.labels
-    names = [output[k] for k in pair]
-    columns = [
-        *_poses(answer, np.repeat(np.array(rows, dtype=np.intp), cells)),
-        Column(f"{names[0]}_error", np.outer(sigma[:, 0], x).ravel(), unit[pair[0]], "centre of the cell"),
-        Column(f"{names[1]}_error", np.outer(sigma[:, 1], y).ravel(), unit[pair[1]], "centre of the cell"),
-        Column("x", np.tile(x, len(rows)), meaning=f"error of {names[0]} in standard deviations of the first order"),
-        Column("y", np.tile(y, len(rows)), meaning=f"error of {names[1]} in standard deviations of the first order"),
-        Column("normal", np.concatenate(normal), meaning="bivariate normal density, standardised"),
-        Column("simulated", np.concatenate(simulated), meaning="density of the samples, standardised"),
-    ]
-    return Table("density", tuple(columns), "density of two errors: bivariate normal and simulation [S2, Figs. 4, 5]")
-
-
-def convergence(answer: Answer) -> Table | None:
-    """Mean of each output after so many samples, at the first pose [S3, Fig. 4]."""
-    followed = [(row, sums) for row, sums in sorted(answer.sums.items()) if len(sums.trend)]
-    if not followed:
-        return None
-    row, sums = followed[0]
-    samples, means = sums.trend[:, :1], sums.trend[:, 1:] / sums.trend[:, :1]
-    means = answer.nominal[:, row] + means * answer.scale
-    output, order, unit = answer.labels
-    steps, channels = means.shape
-    columns = [
-        *_poses(answer, np.full(steps * channels, row)),
-        Column("samples", np.repeat(samples[:, 0].astype(np.int64), channels), meaning="valid samples so far"),
-        Column("output", np.tile(output, steps), meaning="coordinate"),
-        Column("order", np.tile(order, steps), meaning="position, velocity or acceleration"),
-        Column("mean", means.ravel(), meaning="their mean, in `unit`"),
-        Column("unit", np.tile(unit, steps), meaning="unit of the mean"),
-    ]
-    return Table("convergence", tuple(columns), "trend of the means with the number of samples [S3, Fig. 4]")

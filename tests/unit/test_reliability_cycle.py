@@ -1,0 +1,193 @@
+"""The probability that one made mechanism keeps its limits over a whole motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+from scipy.special import ndtr
+
+import mechdesign
+from mechdesign.analyses.reliability import cycle
+from mechdesign.errors import Interrupted
+from mechdesign.results import Result
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+LEVER = """
+mechanism:
+  links: {ground: {O: [0, 0]}, lever: [O, P, 100]}
+  drives: {theta: {angle: lever}}
+  sketch: {P: [100, 0]}
+reliability:
+  sweep: {theta: {from: 0, to: 90, step: 15}}
+  limits: {P: {radius: 0.2}}
+  samples: 100000
+"""
+FOUR_BAR = """
+mechanism:
+  parameters: {a: 1, b: 3.5, c: 3, d: 4}
+  links: {ground: {A: [0, 0], D: [d, 0]}, crank: [A, B, a], coupler: [B, C, b], rocker: [D, C, c]}
+  drives: {theta: {angle: crank}}
+  sketch: {B: [0, 1], C: [2.5, 2.6]}
+reliability:
+  dimensions:
+    a: {tolerance: 0.8, distribution: uniform}
+    b: {tolerance: 0.8, distribution: uniform}
+    c: {tolerance: 0.8, distribution: uniform}
+  sweep: {theta: {from: 0, to: 360, step: 20}}
+  outputs: [rocker.angle]
+  limits: {rocker.angle: 1000}
+  methods: [monte_carlo]
+  samples: 200000
+"""
+
+
+def ask(text: str, *changes: str, jobs: int = 1) -> Result:
+    return mechdesign.reliability(study_of(text, *changes), jobs=jobs)
+
+
+def row(result: Result, method: str) -> dict[str, Any]:
+    table = result.tables["reliability"]
+    rows = np.flatnonzero((table["scope"] == "cycle") & (table["method"] == method))
+    assert len(rows) == 1
+    return {column.name: column.values[rows[0]] for column in table.columns}
+
+
+def test_share_of_four_bars_that_cannot_turn_fully() -> None:
+    """0.02975 of 1, 3.5, 3, 4 with +-0.8 on crank, coupler and rocker; both extremes, 0 and 180 deg, are poses."""
+    result = ask(FOUR_BAR, jobs=2)
+    found = row(result, "monte_carlo")
+    assert found["invalid"] == round(found["failure"] * 200_000)
+    assert found["failure"] == pytest.approx(0.02975, abs=4 * np.sqrt(0.02975 / 200_000))
+    assert found["failure_low"] < 0.02975 < found["failure_high"]
+    assert f"{found['invalid']} of 200000 made mechanisms cannot be assembled at some pose" in " ".join(result.warnings)
+    assert result.counts["cycles"] == 200_000
+
+
+def test_a_sweep_that_steps_over_the_extremes_sees_fewer() -> None:
+    """The step is the resolution: far from 0 and 180 deg cranks that cannot turn fully seem to."""
+    missed = ask(FOUR_BAR, "reliability.sweep.theta.from=60", "reliability.sweep.theta.to=120", jobs=2)
+    assert 0 < row(missed, "monte_carlo")["failure"] < 0.5 * 0.02975
+
+
+def test_dimensions_are_held_over_the_cycle() -> None:
+    """A length error is along the lever at every pose, so the cycle fails just where one pose does."""
+    result = ask(LEVER, "reliability.dimensions={lever.length: 0.3}")
+    exact = 2 * ndtr(-2.0)
+    found, by_poses = row(result, "monte_carlo"), row(result, "analytic")
+    assert found["failure_low"] < exact < found["failure_high"]
+    # Of seven poses that fail together the lower bound is the truth, and the upper one is seven times it.
+    assert by_poses["failure_low"] == pytest.approx(exact, rel=1e-12)
+    assert by_poses["failure_high"] == pytest.approx(7 * exact, rel=1e-12)
+    assert by_poses["failure"] == by_poses["failure_high"]
+    assert by_poses["reliability"] == by_poses["low"] < by_poses["high"]
+    assert by_poses["samples"] == 0
+    assert np.isnan(found["theta"])
+
+
+def test_pins_are_drawn_anew_at_every_pose() -> None:
+    """A clearance alone: seven independent Rayleigh errors."""
+    result = ask(LEVER, "reliability.clearances={O: {radial: 0.3, link: lever}}")
+    exact = 1 - (1 - np.exp(-2.0)) ** 7
+    found = row(result, "monte_carlo")
+    assert found["failure_low"] < exact < found["failure_high"]
+    assert found["failure_high"] - found["failure_low"] < 0.02
+    bounds = row(result, "analytic")
+    assert bounds["failure_low"] < exact < bounds["failure_high"]
+
+
+def test_radii_of_clearances_are_held() -> None:
+    """With a radius that is either of two, a cycle's failures come from the wide half of the mechanisms."""
+    clearance = "reliability.clearances={O: {radial: 0.3, tolerance: 0.3, distribution: uniform, link: lever}}"
+    result = ask(LEVER, clearance)
+    radius = np.linspace(0, 0.6, 20_001)[1:]
+    kept = (1 - np.exp(-0.5 * (0.2 / (radius / 3)) ** 2)) ** 7
+    exact = 1 - kept.mean()
+    found = row(result, "monte_carlo")
+    assert found["failure_low"] < exact < found["failure_high"]
+
+
+# A small workspace section for the nodes.
+NODES = ["workspace.point=P", "workspace.scan.rays=3", "workspace.scan.about=[0, 0]"]
+GRID = "sweep: {theta1: {from: 30, to: 50, number: 3}, theta2: {from: 40, to: 60, number: 3}}"
+
+
+@pytest.mark.parametrize(
+    ("poses", "scopes"),
+    [
+        ("poses: [{theta1: 30, theta2: 60}, {theta1: 45, theta2: 45}]", {"pose"}),
+        ("sweep: {theta1: 30, theta2: 60}", {"pose"}),
+        (GRID, {"pose"}),
+        ("poses: workspace", {"pose"}),
+        ("sweep: {theta1: 30, theta2: {from: 40, to: 60, number: 3}}", {"pose", "cycle"}),
+        ("path: {P: [[14, 10], [14, 11], [13, 11]]}", {"pose", "cycle"}),
+    ],
+)
+def test_a_cycle_is_a_sweep_along_one_coordinate_or_a_path(poses: str, scopes: set[str]) -> None:
+    text = (CONFIGS / "two_link_arm.yaml").read_text(encoding="utf-8")
+    begin, end = text.rindex("  poses: ["), text.rindex("  outputs: [P]")
+    study = study_of(text[:begin] + f"  {poses}\n" + text[end:], "reliability.samples=300", *NODES)
+    assert set(mechdesign.reliability(study).tables["reliability"]["scope"]) == scopes
+
+
+def test_a_cycle_through_a_pose_that_cannot_be_assembled_has_no_probability() -> None:
+    """The nominal crank of 2.6 does not pass 180 deg: nan, and not valid."""
+    change = "mechanism.parameters.a=2.6"
+    found = row(ask(FOUR_BAR, change, "reliability.samples=500"), "monte_carlo")
+    assert np.isnan(found["failure"])
+    assert not found["valid"]
+
+
+@pytest.mark.parametrize("method", ["monte_carlo", "quasi_monte_carlo", "auto"])
+def test_the_number_of_threads_changes_nothing(method: str) -> None:
+    change = f"reliability.methods=[{method}]"
+    one, two = (row(ask(FOUR_BAR, "reliability.samples=50000", change, jobs=jobs), method) for jobs in (1, 2))
+    assert {k: v for k, v in one.items() if v == v} == {k: v for k, v in two.items() if v == v}
+    assert one["used"] == "monte_carlo"
+
+
+def test_auto_stops_at_its_precision() -> None:
+    changes = ["reliability.methods=[auto]", "reliability.precision={half_width: 0.01}", "reliability.samples=1000000"]
+    found = row(ask(FOUR_BAR, *changes), "auto")
+    assert 0.5 * (found["failure_high"] - found["failure_low"]) <= 0.01
+    assert found["samples"] < 100_000
+
+
+def test_without_a_failure_monte_carlo_warns_and_quasi_monte_carlo_gives_the_bound() -> None:
+    changes = ["reliability.dimensions={lever.length: 0.03}", "reliability.methods=[monte_carlo, quasi_monte_carlo]"]
+    result = ask(LEVER, *changes, "reliability.samples=40000")
+    plain, quasi = row(result, "monte_carlo"), row(result, "quasi_monte_carlo")
+    assert plain["failure"] == 0
+    assert quasi["failure"] == quasi["failure_high"] == plain["failure_high"]
+    bound = -np.log(0.0015) / 40_000
+    assert plain["failure_high"] == pytest.approx(bound, rel=1e-3)
+    told = f"the probability of failure is below {bound:.2g}"
+    assert f"monte_carlo: no failure in 40000 samples at 7 poses: {told}" in result.warnings
+    assert f"monte_carlo: no failure in 40000 made mechanisms over the whole cycle: {told}" in result.warnings
+
+
+def test_an_interrupt_gives_the_cycles_that_were_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = 0
+    whole = cycle.count_chunk
+
+    def chunk(*arguments: Any) -> cycle.Count:
+        nonlocal calls
+        calls += 1
+        if calls == 3:
+            raise KeyboardInterrupt
+        return whole(*arguments)
+
+    monkeypatch.setattr(cycle, "count_chunk", chunk)
+    with pytest.raises(Interrupted) as caught:
+        ask(FOUR_BAR, "reliability.samples=100000")
+    result = caught.value.result
+    found = row(result, "monte_carlo")
+    assert found["samples"] == 2 * 20_000
+    assert found["failure_low"] < 0.02975 < found["failure_high"]
+    # The poses had been simulated before.
+    table = result.tables["reliability"]
+    assert (table["samples"][table["scope"] == "pose"] == 100_000).all()
+    assert "interrupted" in result.interrupted
