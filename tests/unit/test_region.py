@@ -10,6 +10,9 @@ from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.analyses.workspace.panels import Effort, find_panels
+from mechdesign.analyses.workspace.rays import Designs, trace
+from mechdesign.analyses.workspace.region import BRISK, CLOSE, questions
 
 ARM = """
 units: {length: dimensionless}
@@ -211,3 +214,29 @@ def test_a_platform_at_constant_orientation(degrees: float) -> None:
     strokes = ((0.4, 1.4), (0.4, 1.4), (0.3, 1.6))
     rings_there = [(complex(c), low, high) for c, (low, high) in zip(centres, strokes, strict=True)]
     assert found["area"][0] == pytest.approx(common_area(rings_there), rel=1e-8)
+
+
+@pytest.mark.parametrize("effort", [BRISK, CLOSE], ids=["brisk", "close"])
+@pytest.mark.parametrize("assembly", ["any", "same"])
+def test_panels_end_at_corners_and_where_rays_touch(assembly: str, effort: Effort) -> None:
+    """The rays that touch the holes, of radius b - a about A and B, and those through where the outer circles meet."""
+    about, one, other, hole, reach = 0.05 + 0.45j, -0.15, 0.15, 0.15, 0.65
+    study = study_of(FIVE_BAR, f"workspace.assembly={assembly}", "workspace.scan.about=[0.05, 0.45]")
+    question = questions(study)[0]
+    panels = find_panels(Designs(question.field, {}, 1, about), question.scan, effort)
+    ends = np.concatenate([panels.low, panels.high])
+    touching = [np.angle(one - about) - np.arcsin(hole / abs(one - about)),
+                np.angle(other - about) + np.arcsin(hole / abs(other - about))]  # fmt: skip
+    corners = [np.angle(k * np.sqrt(reach**2 - 0.15**2) * 1j - about) for k in (1, -1)]
+    for angle in [*touching, *(corners if assembly == "any" else corners[:1])]:
+        assert np.abs((ends - angle + np.pi) % (2 * np.pi) - np.pi).min() < 1e-12
+
+
+def test_few_samples_find_a_gap_between_them() -> None:
+    """A gap that a determinant leaves, where it dips hardly steeper to one side of a sample than to the other."""
+    study = study_of(FIVE_BAR, "workspace.assembly=same", "mechanism.parameters.b=0.3675195822454308")
+    designs = Designs(questions(study)[0].field, {}, 1, 0.2267883835941191j)
+    zero, angle, reach = np.zeros(1, dtype=np.intp), np.array([4.377794174748168]), np.array([1.2])
+    few, many = (trace(designs, zero, angle, reach, effort.samples) for effort in (BRISK, CLOSE))
+    assert len(many.inner) == 3
+    np.testing.assert_allclose([few.inner, few.outer], [many.inner, many.outer], atol=1e-12)
