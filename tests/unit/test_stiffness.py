@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from helpers.stiffness import (
     ARM,
-    BENT,
     FIVE_BAR,
     METRES,
     ask_stiffness,
@@ -122,15 +121,10 @@ def test_result_does_not_depend_on_jobs_or_chunks(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (ARM.replace("angle: lower, from: upper", "angle: lower"), "drive 'elbow' holds the angle of link 'lower'"),
-        (
-            BENT.replace("link: plate\n  at: T", "link: bracket\n  at: M"),
-            "links bracket, plate, prop|no serial chain",
-        ),
         (FIVE_BAR.split("stiffness:")[0], "stiffness: is missing"),
         (FIVE_BAR.replace("at: P", "at: O1"), "does not move"),
     ],
 )
-def test_what_is_no_set_of_serial_legs_is_told(text: str, said: str) -> None:
+def test_what_has_no_stiffness_is_told(text: str, said: str) -> None:
     with pytest.raises(StudyError, match=said):
         ask_stiffness(text)

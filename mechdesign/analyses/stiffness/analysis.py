@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
@@ -10,16 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import judge_failures, pose_in_words, solve_poses
-from mechdesign.analyses.stiffness.chains import chain_of
-from mechdesign.analyses.stiffness.compliance import Held, hold
-from mechdesign.analyses.stiffness.legs import Beam, Leg, find_legs
-from mechdesign.analyses.stiffness.screws import (
-    Array,
-    constraint_compliance,
-    equivalent_springs,
-    joint_rank,
-    reciprocal_wrenches,
-)
+from mechdesign.analyses.stiffness.compliance import Held
+from mechdesign.analyses.stiffness.force_method import load, twists_of
+from mechdesign.analyses.stiffness.legs import Guide, Hinge, Leg, NotSerialError, find_legs
+from mechdesign.analyses.stiffness.loads import Effects, displacements_table, effects_of, forces_table
+from mechdesign.analyses.stiffness.network import Network, build_network
+from mechdesign.analyses.stiffness.screws import Array
+from mechdesign.analyses.stiffness.serial import hold_by_legs
 from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,
@@ -28,7 +25,7 @@ from mechdesign.analyses.stiffness.tables import (
     stiffness_table,
 )
 from mechdesign.errors import Problem, StudyError
-from mechdesign.mechanism import Configuration
+from mechdesign.mechanism import Configuration, Reason
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
@@ -47,6 +44,10 @@ class Asked:
 
     Parameters
     ----------
+    legs : tuple of Leg or None
+        Where the body stands on serial chains, those; None where it does not.
+    network : Network
+        All that carries, whatever it is.
     size : int
         3 for a body's twist, 2 for the displacement of a pin.
     condensed : bool
@@ -56,14 +57,15 @@ class Asked:
     """
 
     section: StiffnessSection
-    legs: tuple[Leg, ...]
+    legs: tuple[Leg, ...] | None
+    network: Network
     size: int
     condensed: bool
     length: float
 
 
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
-    """Stiffness of a body on serial-chain legs at every pose of the study.
+    """Stiffness of a body or a pin at every pose of the study.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     Raises
     ------
     StudyError
-        If the study has no stiffness section, or the legs are not serial chains.
+        If the study has no stiffness section, or what it asks does not move.
     AssemblyError
         If no pose at all can be assembled.
     """
@@ -106,6 +108,8 @@ class Found:
         K and C.
     reason : int8 array, shape (poses,)
         See `mechdesign.mechanism.Reason`.
+    effects : Effects or None
+        What the study's loads do, where it has any.
     """
 
     matrices: dict[str, Array]
@@ -114,6 +118,7 @@ class Found:
     margin: Array
     reason: NDArray[np.int8]
     springs: list[Springs]
+    effects: Effects | None
 
 
 def solve(study: Study, asked: Asked, poses: Poses, jobs: int | None = 1, progress: Progress = NULL) -> Found:
@@ -125,33 +130,50 @@ def solve(study: Study, asked: Asked, poses: Poses, jobs: int | None = 1, progre
     margin = np.full(poses.count, np.inf)
     reason = np.zeros(poses.count, dtype=np.int8)
     springs: list[Springs] = []
+    loads = asked.section.loads
+    effects = Effects.unknown(asked.network, poses.count, len(loads)) if loads else None
     for solved in solve_poses(study, poses):
         configuration = solved.configuration
         reason[solved.rows] = configuration.reason
-        places = [configuration.point(leg.tip) for leg in asked.legs] + [configuration.point(asked.section.at)]
-        assembled = np.flatnonzero(np.isfinite(np.sum(places, axis=0)))
+        assembled = np.flatnonzero(np.isin(configuration.reason, (Reason.OK, Reason.LIMIT)))
         chunks = [assembled[k : k + CHUNK] for k in range(0, len(assembled), CHUNK)]
         batches = (configuration.take(index) for index in chunks)
         answers = map_chunks(partial(evaluate, asked), batches, jobs)
-        for index, (held, found) in zip(chunks, answers, strict=True):
+        for index, (held, found, part) in zip(chunks, answers, strict=True):
             rows = solved.rows[index]
             matrices["K"][rows], matrices["C"][rows] = held.stiffness, held.compliance
             rank[rows], free[rows], margin[rows] = held.rank, held.free, held.margin
             springs += [Springs(rows[s.row], s.leg, s.stiffness, s.place, s.angle) for s in found]
+            if effects is not None and part is not None:
+                effects.put(rows, part)
             progress.update(len(index))
-    return Found(matrices, rank, free, margin, reason, springs)
+    return Found(matrices, rank, free, margin, reason, springs, effects)
 
 
 def tables(study: Study, asked: Asked, poses: Poses, found: Found) -> dict[str, Table]:
     """Tables ``stiffness``, ``compliance``, ``springs`` and, with loads, ``deflections``."""
     stiff, soft = found.matrices["K"], found.matrices["C"]
     made = [
-        stiffness_table(study, poses, stiff, soft, found.rank, found.free, found.reason == 0),
+        stiffness_table(
+            study,
+            poses,
+            stiff,
+            soft,
+            found.rank,
+            found.free,
+            found.reason == 0,
+            "serial legs" if asked.legs is not None else "force method",
+        ),
         compliance_table(study, poses, soft),
-        springs_table(study, poses, asked.legs, found.springs),
     ]
-    if asked.section.loads:
-        made.append(deflections_table(study, poses, np.array(asked.section.loads), soft))
+    if asked.legs is not None:
+        made.append(springs_table(study, poses, asked.legs, found.springs))
+    if found.effects is not None:
+        made += [
+            deflections_table(study, poses, np.array(asked.section.loads), soft),
+            forces_table(study, poses, asked.network, found.effects),
+            displacements_table(study, poses, asked.network, found.effects),
+        ]
     return {table.name: table for table in made}
 
 
@@ -161,7 +183,7 @@ def ask(study: Study) -> Asked:
     Raises
     ------
     StudyError
-        If the study has no stiffness section, or the legs are not serial chains.
+        If the study has no stiffness section, or what it asks does not move.
     """
     section = study.stiffness
     if section is None:
@@ -179,65 +201,28 @@ def ask(study: Study) -> Asked:
     condensed = link is None and len(bearers) == 1
     if condensed:
         link = bearers[0]
-    legs = find_legs(mechanism, link, section.at, section.elastic, section.actuators)
+    legs: tuple[Leg, ...] | None = None
+    with suppress(NotSerialError):
+        legs = find_legs(mechanism, link, section.at, section.elastic, section.actuators)
+    network = build_network(mechanism, section.link, section.at, section.elastic, section.actuators)
     length = section.characteristic_length or mechanism.size or 1.0
-    return Asked(section, legs, 2 if section.link is None else 3, condensed, length)
+    return Asked(section, legs, network, 2 if section.link is None else 3, condensed, length)
 
 
-def evaluate(asked: Asked, configuration: Configuration) -> tuple[Held, list[Springs]]:
-    """Stiffness and springs in a batch of assembled poses of shape (n,)."""
-    n = configuration.shape[0]
-    chains = [chain_of(leg, asked.section, configuration) for leg in asked.legs]
-    ranks = [np.broadcast_to(joint_rank(chain.passive, asked.length), (n,)) for chain in chains]
-    body = 3 if asked.condensed else asked.size
-    if not chains:
-        return _restrict(hold([np.zeros((3, 0, n))], [np.zeros((0, 0, n))], asked.length, body), asked), []
-    springs: list[Springs] = []
-    parts: list[tuple[NDArray[np.intp], Held]] = []
-    every = np.stack(ranks, axis=1)
-    for signature, rows in _signatures(every):
-        here = chains if len(rows) == n else [chain.take(rows) for chain in chains]
-        wrenches = [
-            reciprocal_wrenches(chain.passive, rank, asked.length, len(rows))
-            for chain, rank in zip(here, signature, strict=True)
-        ]
-        blocks = [constraint_compliance(w, chain) for w, chain in zip(wrenches, here, strict=True)]
-        parts.append((rows, hold(wrenches, blocks, asked.length, body)))
-        at = configuration.point(asked.section.at)[rows]
-        for k, (w, chain) in enumerate(zip(wrenches, here, strict=True)):
-            for spring in equivalent_springs(w, chain, asked.length):
-                springs.append(Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + at, spring.angle))
-    return _restrict(_join(parts, n), asked), springs
-
-
-def _signatures(ranks: NDArray[np.intp]) -> list[tuple[list[int], NDArray[np.intp]]]:
-    """Poses in which all legs have the same ranks together."""
-    if (ranks == ranks[:1]).all():
-        return [(ranks[0].tolist(), np.arange(len(ranks)))]
-    kinds, which = np.unique(ranks, axis=0, return_inverse=True)
-    return [(kind.tolist(), np.flatnonzero(which.reshape(-1) == k)) for k, kind in enumerate(kinds)]
-
-
-def _join(parts: Sequence[tuple[NDArray[np.intp], Held]], n: int) -> Held:
-    if len(parts) == 1:
-        return parts[0][1]
-    order = np.argsort(np.concatenate([rows for rows, _ in parts]))
-    names = ("stiffness", "compliance", "rank", "free", "margin")
-    return Held(*(np.concatenate([getattr(held, name) for _, held in parts])[order] for name in names))
-
-
-def _restrict(held: Held, asked: Asked) -> Held:
-    """Only displacements of the point, the link free to turn: the compliance is a part, its inverse the stiffness."""
-    if not asked.condensed:
-        return held
-    compliance = held.compliance[:, :2, :2]
-    stiffness = np.full(compliance.shape, np.nan)
-    determinant = np.linalg.det(compliance)
-    with np.errstate(invalid="ignore"):
-        good = determinant > 1e-12 * compliance[:, 0, 0] * compliance[:, 1, 1]
-    stiffness[good] = np.linalg.inv(compliance[good])
-    rank = np.where(np.isfinite(determinant), 2, np.minimum(held.rank, 1))
-    return Held(stiffness, compliance, rank, held.free[:, :2], held.margin)
+def evaluate(asked: Asked, configuration: Configuration) -> tuple[Held, list[Springs], Effects | None]:
+    """Stiffness and springs in a batch of assembled poses of shape (n,), and what the study's loads do."""
+    section = asked.section
+    serial = None
+    if asked.legs is not None:
+        serial = hold_by_legs(asked.legs, section, configuration, asked.length, asked.size, asked.condensed)
+        if not section.loads:
+            return *serial, None
+    loaded = load(
+        asked.network, twists_of(asked.network, section, configuration, asked.length), asked.length, asked.size
+    )
+    effects = effects_of(asked.network, loaded, section.at, configuration, section.loads) if section.loads else None
+    held, springs = serial if serial is not None else (loaded.held, [])
+    return held, springs, effects
 
 
 def _cautions(
@@ -256,8 +241,8 @@ def _cautions(
             f"{len(near)} of {poses.count} poses are nearly under-constrained (wrenches within "
             f"{margin[near].min():.1e} of dependence); the first: {pose_in_words(study, poses, int(near[0]))}"
         )
-    for leg in asked.legs:
-        if not any(not isinstance(element, Beam) and element.drive is None for element in leg.elements):
+    for leg in asked.legs or ():
+        if not any(isinstance(element, Hinge | Guide) and element.drive is None for element in leg.elements):
             told.append(
                 f"leg '{leg.name}' has no free joint: it holds three ways at once and has no equivalent springs"
             )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.stiffness.legs import Beam, Guide, Leg
+from mechdesign.analyses.stiffness.legs import Beam, Element, Guide, Leg, Shift
 from mechdesign.analyses.stiffness.screws import Array, Chain, hinge_twist, slide_twist
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
@@ -17,25 +19,32 @@ SHEAR_FACTOR = 5 / 6  # of a rectangle
 def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration) -> Chain:
     """A leg's joints and elastic elements in each pose, seen from the asked point."""
     at = configuration.point(section.at)
-    passive: list[Array] = []
-    elastic: list[Array] = []
-    compliance: list[Value] = []
-    for element in leg.elements:
+    found = list(freedoms(leg.elements, section, configuration, at))
+    return Chain(
+        [twist for twist, compliance in found if compliance is None],
+        [twist for twist, compliance in found if compliance is not None],
+        [compliance for _, compliance in found if compliance is not None],
+        configuration.point(leg.base) - at,
+        configuration.point(leg.tip) - at,
+    )
+
+
+def freedoms(
+    elements: Iterable[Element], section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]
+) -> Iterator[tuple[Array, Value | None]]:
+    """Twists (3, n) that elements allow, seen from places `at`, and their compliances; None where they are free."""
+    for element in elements:
         if isinstance(element, Beam):
-            twists, flexible = _beam(element, section.sections[element.section], configuration, at)
-            elastic += twists
-            compliance += flexible
-            continue
-        if isinstance(element, Guide):
-            twist = slide_twist(_slide_direction(element.slide, configuration))
+            yield from _beam(element, section.sections[element.section], configuration, at)
+        elif isinstance(element, Shift):
+            yield slide_twist(np.full(configuration.shape, element.direction)), None
         else:
-            twist = hinge_twist(configuration.point(element.point) - at)
-        if element.drive is None:
-            passive.append(twist)
-        else:
-            elastic.append(twist)
-            compliance.append(1 / section.actuators[element.drive])
-    return Chain(passive, elastic, compliance, configuration.point(leg.base) - at, configuration.point(leg.tip) - at)
+            twist = (
+                slide_twist(_slide_direction(element.slide, configuration))
+                if isinstance(element, Guide)
+                else hinge_twist(configuration.point(element.point) - at)
+            )
+            yield twist, None if element.drive is None else 1 / section.actuators[element.drive]
 
 
 def _slide_direction(slide: int, configuration: Configuration) -> NDArray[np.complex128]:
@@ -46,7 +55,7 @@ def _slide_direction(slide: int, configuration: Configuration) -> NDArray[np.com
 
 def _beam(
     beam: Beam, profile: Profile, configuration: Configuration, at: NDArray[np.complex128]
-) -> tuple[list[Array], list[Value]]:
+) -> Iterator[tuple[Array, Value]]:
     tail, head = configuration.point(beam.tail), configuration.point(beam.head)
     span = head - tail
     length = np.abs(span)
@@ -55,8 +64,9 @@ def _beam(
     else:
         along = np.divide(span, length, out=np.ones(span.shape, dtype=complex), where=length > 0)
     stretch, bend, shear = rigidities(profile)
-    twists = [slide_twist(along), slide_twist(1j * along), hinge_twist((tail + head) / 2 - at)]
-    return twists, [length / stretch, length**3 / (12 * bend) + length * shear, length / bend]
+    yield slide_twist(along), length / stretch
+    yield slide_twist(1j * along), length**3 / (12 * bend) + length * shear
+    yield hinge_twist((tail + head) / 2 - at), length / bend
 
 
 def rigidities(profile: Profile) -> tuple[float, float, float]:

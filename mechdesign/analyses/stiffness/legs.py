@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description, Link, Term
@@ -46,7 +45,14 @@ class Beam:
     axis: str | None = None
 
 
-Element = Hinge | Guide | Beam
+@dataclass(frozen=True)
+class Shift:
+    """A free displacement along a direction of the world: between links that only a motor holds to each other."""
+
+    direction: complex
+
+
+Element = Hinge | Guide | Beam | Shift
 
 
 @dataclass(frozen=True)
@@ -75,11 +81,8 @@ class Leg:
     elements: tuple[Element, ...]
 
 
-def not_serial(message: str) -> StudyError:
-    """The error of every structure that is no set of serial legs."""
-    return StudyError(
-        [Problem(f"{message}; the stiffness of such a mechanism comes with a later release", "stiffness")]
-    )
+class NotSerialError(Exception):
+    """The body does not stand on serial chains; says why."""
 
 
 def find_legs(
@@ -100,8 +103,10 @@ def find_legs(
 
     Raises
     ------
+    NotSerialError
+        Where the legs are not serial chains.
     StudyError
-        Where the legs are not serial chains, or what is asked does not move.
+        Where what is asked does not move.
     """
     description = mechanism.description
     bodies = build_bodies(mechanism, link, at, elastic)
@@ -172,7 +177,7 @@ def _as_path(contacts: list[Contact], target: str, bodies: Bodies) -> tuple[list
     if path[-1] != target or len(used) != len(contacts):
         links = sorted({bodies.link_of(end) for c in contacts for end in (c.a, c.b)} - {GROUND, ""})
         what = f"link '{bodies.link}'" if bodies.link else f"pin '{bodies.at}'"
-        raise not_serial(
+        raise NotSerialError(
             f"links {', '.join(links)} between the ground and {what} branch or form a loop, so they are no serial chain"
         )
     return path, used
@@ -236,13 +241,13 @@ class _LegBuilder:
                 return []
             own = {c.other(body) == rod_of(name): c for c in (entry, leave)}
             if True not in own or own[False].point != link.ends[0]:
-                raise not_serial(f"elastic leg '{name}' is joined elsewhere than at its ends")
+                raise NotSerialError(f"elastic leg '{name}' is joined elsewhere than at its ends")
             return [Beam(*link.ends, section, name)]
         nodes = self._way(link, entry.reach(body), leave.reach(body))
         return [Beam(a, b, section) for a, b in pairwise(nodes)]
 
     def _way(self, link: Link, entry: tuple[str, ...], leave: tuple[str, ...]) -> list[str]:
-        order = self._order(link)
+        order = points_along(self.mechanism, link)
         i, j = (order.index(reach[0]) if reach[0] in order else -1 for reach in (entry, leave))
         if i < 0 or j < 0:
             inner = [entry[0], leave[0]] if entry[0] != leave[0] else [entry[0]]
@@ -250,21 +255,22 @@ class _LegBuilder:
             inner = order[i : j + 1] if i <= j else order[j : i + 1][::-1]
         return [*entry[:0:-1], *inner, *leave[1:]]
 
-    def _order(self, link: Link) -> list[str]:
-        """Points along a link: as listed, and those on the line between the ends of a binary link where they lie."""
-        points = list(link.points)
-        if link.ends is None:
-            return points
 
-        def number(term: Term) -> float:
-            return self.mechanism.nominal[term] if isinstance(term, str) else term
+def points_along(mechanism: Mechanism, link: Link) -> list[str]:
+    """Points along a link: as listed, and those on the line between the ends of a binary link where they lie."""
+    points = list(link.points)
+    if link.ends is None:
+        return points
 
-        length = number(link.points[link.ends[1]][0])
-        place = {name: (number(x), number(y)) for name, (x, y) in link.points.items()}
-        between = [n for n, (x, y) in place.items() if 0 < x < length and abs(y) <= 1e-9 * length]
-        between.sort(key=lambda name: place[name][0])
-        rest = [name for name in points if name not in between and name not in link.ends]
-        return [link.ends[0], *between, link.ends[1], *rest]
+    def number(term: Term) -> float:
+        return mechanism.nominal[term] if isinstance(term, str) else term
+
+    length = number(link.points[link.ends[1]][0])
+    place = {name: (number(x), number(y)) for name, (x, y) in link.points.items()}
+    between = [n for n, (x, y) in place.items() if 0 < x < length and abs(y) <= 1e-9 * length]
+    between.sort(key=lambda name: place[name][0])
+    rest = [name for name in points if name not in between and name not in link.ends]
+    return [link.ends[0], *between, link.ends[1], *rest]
 
 
 def _check_drives(description: Description, bodies: Bodies, legs: list[Leg]) -> None:
@@ -273,10 +279,7 @@ def _check_drives(description: Description, bodies: Bodies, legs: list[Leg]) -> 
     held = {name for leg in legs for name in leg.drives}
     for name, drive in description.drives.items():
         if drive.kind == "angle" and name not in held and {drive.target, drive.reference} <= carrying:
-            mend = ""
-            if drive.reference == GROUND:
-                mend = " (if its motor sits at a joint, give the angle 'from' the link that carries it)"
-            raise not_serial(
+            raise NotSerialError(
                 f"drive '{name}' holds the angle of link '{drive.target}' from '{drive.reference}', and no joint of a "
-                f"leg is between the two: this is not a serial leg{mend}"
+                "leg is between the two"
             )

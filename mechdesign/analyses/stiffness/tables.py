@@ -42,7 +42,14 @@ def _entries(study: Study, letter: str, matrix: Array, what: str, meaning: str) 
 
 
 def stiffness_table(
-    study: Study, poses: Poses, stiff: Array, soft: Array, rank: NDArray[np.intp], free: Array, valid: NDArray[np.bool_]
+    study: Study,
+    poses: Poses,
+    stiff: Array,
+    soft: Array,
+    rank: NDArray[np.intp],
+    free: Array,
+    valid: NDArray[np.bool_],
+    method: str,
 ) -> Table:
     units = study.units
     size = stiff.shape[1]
@@ -70,6 +77,11 @@ def stiffness_table(
             Column(name, free[:, k], per, "the free twist, per radian where it turns; nan where none is free")
         )
     columns.append(Column("valid", valid, "", "1 where the pose is assembled and within its limits"))
+    columns.append(
+        Column(
+            "method", np.full(poses.count, method), "", "serial legs: reciprocal screws [S4]; force method: any other"
+        )
+    )
     return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
 
 

@@ -79,7 +79,9 @@ def _springs(study: Study) -> Figure | None:
 
 def _coils(study: Study, configuration: Configuration, scene: Scene) -> list[Coil]:
     asked = ask(study)
-    _, springs = evaluate(asked, configuration)
+    if asked.legs is None:
+        return []
+    _, springs, _ = evaluate(asked, configuration)
     length = _COIL * scene.span
     coils = []
     for spring in springs:

@@ -1,0 +1,143 @@
+"""What loads at the asked point do to the whole mechanism: displacements of all points, forces in all joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.poses import pose_columns
+from mechdesign.analyses.stiffness.force_method import Loaded
+from mechdesign.analyses.stiffness.legs import Beam
+from mechdesign.analyses.stiffness.network import Network
+from mechdesign.analyses.stiffness.screws import Array
+from mechdesign.mechanism import Configuration
+from mechdesign.results import Column, Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+
+@dataclass(frozen=True, eq=False)
+class Effects:
+    """Effects of loads in n poses.
+
+    Parameters
+    ----------
+    forces : ndarray, shape (n, joints, loads, 3)
+        Force and moment about the joint's place, of the second body on the first, in the order of `joints_of`.
+    moved : complex ndarray, shape (n, points, loads)
+        Displacements of the points that `points_of` names.
+    places : complex ndarray, shape (n, points)
+        Where those are without a load.
+    """
+
+    forces: Array
+    moved: NDArray[np.complex128]
+    places: NDArray[np.complex128]
+
+    @staticmethod
+    def unknown(network: Network, poses: int, loads: int) -> Effects:
+        """Room for effects, all nan."""
+        joints, points = len(joints_of(network)), len(points_of(network))
+        return Effects(
+            np.full((poses, joints, loads, 3), np.nan),
+            np.full((poses, points, loads), complex(np.nan, np.nan)),
+            np.full((poses, points), complex(np.nan, np.nan)),
+        )
+
+    def put(self, rows: NDArray[np.intp], part: Effects) -> None:
+        """Fill in some poses."""
+        self.forces[rows], self.moved[rows], self.places[rows] = part.forces, part.moved, part.places
+
+
+def joints_of(network: Network) -> list[int]:
+    """Edges of the network that are joints, not beams, and bear something."""
+    return [
+        k for k, edge in enumerate(network.edges) if not any(isinstance(element, Beam) for element in edge.elements)
+    ]
+
+
+def points_of(network: Network) -> list[tuple[str, str, str]]:
+    """Link, point and vertex of every point whose displacement is known."""
+    return [
+        (link, point, vertex)
+        for link, points in network.points.items()
+        for point, vertex in points
+        if vertex in network.paths
+    ]
+
+
+def effects_of(
+    network: Network, loaded: Loaded, at: str, configuration: Configuration, loads: tuple[tuple[float, ...], ...]
+) -> Effects:
+    """What each load (fx, fy, mz) does in a batch of poses."""
+    size = loaded.wrenches.shape[3]
+    applied = np.array(loads)[:, :size].T
+    origin = configuration.point(at)
+    forces = []
+    for k in joints_of(network):
+        wrench = loaded.wrenches[:, k] @ applied
+        arm = (configuration.point(network.edges[k].point) - origin)[:, None]
+        moment = wrench[:, 2] - (arm.real * wrench[:, 1] - arm.imag * wrench[:, 0])
+        forces.append(np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1))
+    moved, places = [], []
+    for _, point, vertex in points_of(network):
+        twist = loaded.displacements[vertex] @ applied
+        place = configuration.point(point)
+        places.append(place)
+        moved.append(twist[:, 0] + 1j * twist[:, 1] + 1j * twist[:, 2] * (place - origin)[:, None])
+    return Effects(np.stack(forces, axis=1), np.stack(moved, axis=1), np.stack(places, axis=1))
+
+
+def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
+    """``forces.csv``: what every joint bears, a row a pose, load and joint."""
+    edges = [network.edges[k] for k in joints_of(network)]
+    count, joints, loads, _ = effects.forces.shape
+    values = effects.forces.swapaxes(1, 2).reshape(-1, 3)
+    units = study.units
+    columns = _of_loads(study, poses, loads, joints)
+    columns += [
+        Column("joint", np.tile([edge.name for edge in edges], count * loads), "", "point or slide"),
+        Column("from", np.tile([_link(edge.a) for edge in edges], count * loads), "", "what the force acts on"),
+        Column("to", np.tile([_link(edge.b) for edge in edges], count * loads), "", "what it comes from"),
+        Column("fx", values[:, 0], units.label("force"), "force in the joint, axes of the world"),
+        Column("fy", values[:, 1], units.label("force"), "force in the joint, axes of the world"),
+        Column("mz", values[:, 2], units.label("moment"), "moment about the joint's point"),
+    ]
+    return Table("forces", tuple(columns), "what the joints bear under the study's loads")
+
+
+def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
+    """``displacements.csv``: where every point goes, a row a pose, load and point of a link."""
+    points = points_of(network)
+    count, number, loads = effects.moved.shape
+    moved = effects.moved.swapaxes(1, 2).ravel()
+    places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
+    length = study.units.label("length")
+    columns = _of_loads(study, poses, loads, number)
+    columns += [
+        Column("link", np.tile([link for link, _, _ in points], count * loads), "", "link"),
+        Column("point", np.tile([point for _, point, _ in points], count * loads), "", "its point"),
+        Column("x", places.real, length, "place without a load"),
+        Column("y", places.imag, length, "place without a load"),
+        Column("dx", moved.real, length, "displacement"),
+        Column("dy", moved.imag, length, "displacement"),
+    ]
+    return Table("displacements", tuple(columns), "displacements of all points under the study's loads")
+
+
+def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]:
+    """Pose columns and the number of the load, for so many rows of each."""
+    repeat = np.repeat(np.arange(poses.count), loads * rows)
+    return [
+        *(Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)),
+        Column(
+            "load", np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count), "", "which of the study's loads"
+        ),
+    ]
+
+
+def _link(vertex: str) -> str:
+    """The link that a vertex is a part of; of massless ones their kind."""
+    return vertex.split("@")[0].removesuffix(":rod").removeprefix(":")

@@ -1,0 +1,235 @@
+"""Any mechanism as bodies held together by joints and beams: its loops, and what lies on the way to each body.
+
+Vertices are rigid bodies, and the nodes of elastic links; edges are joints and beams. A tree from the ground reaches
+every vertex; every other edge closes a loop. Motors that hold the angle between two links that no joint joins are edges
+of their own: free to shift, held in turning.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
+from mechdesign.analyses.stiffness.legs import Beam, Element, Guide, Hinge, Shift, points_along
+from mechdesign.mechanism.graph import GROUND, rod_of
+from mechdesign.mechanism.mechanism import Mechanism
+
+Signs = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A joint or a beam from vertex `a` to vertex `b`, its freedoms in order from `a`.
+
+    Parameters
+    ----------
+    name : str
+        Of the joint's point or slide, or of the link that the beam is a part of.
+    point : str
+        Where it is; of a beam its second end.
+    """
+
+    a: str
+    b: str
+    elements: tuple[Element, ...]
+    name: str
+    point: str
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """Vertices, edges and loops.
+
+    Parameters
+    ----------
+    asked : str
+        The vertex whose displacement is asked.
+    paths : mapping of str to ((int, int), ...)
+        To each vertex, the edges on the way from the ground and whether they are gone along (1) or against (-1).
+    loops : tuple of ((int, int), ...)
+        Edges of each loop, with their directions.
+    points : mapping of str to tuple of (str, str)
+        Of each link, its points and the vertices that bear them.
+    """
+
+    edges: tuple[Edge, ...]
+    asked: str
+    paths: Mapping[str, tuple[tuple[int, int], ...]]
+    loops: tuple[tuple[tuple[int, int], ...], ...]
+    points: Mapping[str, tuple[tuple[str, str], ...]]
+
+    def signs(self, way: Sequence[tuple[int, int]]) -> Signs:
+        """Sign of each edge on a way, 0 where it is not on it, shape (edges,)."""
+        found = np.zeros(len(self.edges))
+        for edge, sign in way:
+            found[edge] += sign
+        return found
+
+
+def build_network(
+    mechanism: Mechanism, link: str | None, at: str, elastic: Mapping[str, str], actuators: Mapping[str, float]
+) -> Network:
+    """The network of a mechanism; parts that carry nothing are left out.
+
+    Parameters
+    ----------
+    link : str or None
+        The asked link; None for the pin `at` itself.
+    elastic : mapping of str to str
+        Section of each elastic link.
+    actuators : mapping of str to float
+        Stiffness of each compliant drive.
+
+    Raises
+    ------
+    StudyError
+        If the asked point does not move.
+    """
+    bodies = build_bodies(mechanism, link, at, elastic)
+    builder = _Builder(mechanism, bodies, elastic, actuators)
+    edges = builder.edges()
+    edges = _carrying(edges, bodies.asked)
+    return _looped(tuple(edges), bodies.asked, builder.points())
+
+
+@dataclass(frozen=True)
+class _Builder:
+    mechanism: Mechanism
+    bodies: Bodies
+    elastic: Mapping[str, str]
+    actuators: Mapping[str, float]
+
+    def edges(self) -> list[Edge]:
+        """All joints and beams, and the drives that sit at no joint."""
+        found: list[Edge] = []
+        taken: set[str] = set()
+        for contact in self.bodies.contacts:
+            drive = self.drive(contact)
+            elements: tuple[Element, ...] = ()
+            if drive is not None:
+                taken.add(drive)
+            if contact.kind != "clamp" and (drive is None or drive in self.actuators):
+                elements = (Hinge(contact.point, drive),) if contact.slide is None else (Guide(contact.slide, drive),)
+            name = contact.point if contact.slide is None else self.mechanism.graph.slides[contact.slide]
+            found.append(
+                Edge(self._vertex(contact, contact.a, found), self._vertex(contact, contact.b, found), elements, name,
+                     contact.point)
+            )  # fmt: skip
+        for name, section in self.elastic.items():
+            found += self._beams(name, section)
+        for name, drive_of in self.mechanism.description.drives.items():
+            if drive_of.kind == "angle" and name not in taken:
+                elements = (Shift(1.0 + 0j), Shift(1j))
+                point = next(iter(self.mechanism.description.links[drive_of.target].points))
+                if name in self.actuators:
+                    elements = (*elements, Hinge(point, name))
+                found.append(Edge(self._end(drive_of.reference), self._end(drive_of.target), elements, name, point))
+        return found
+
+    def points(self) -> dict[str, tuple[tuple[str, str], ...]]:
+        """Points of every link that moves, and their vertices."""
+        found = {}
+        for name, link in self.mechanism.description.links.items():
+            if name == GROUND:
+                continue
+            here = [(point, self._node(name, point)) for point in link.points]
+            if link.telescopic and link.ends is not None:
+                here.append((link.ends[1], self._node(rod_of(name), link.ends[1])))
+            found[name] = tuple(here)
+        return found
+
+    def drive(self, contact: Contact) -> str | None:
+        """The drive that sits at a joint."""
+        for name, drive in self.mechanism.description.drives.items():
+            if contact.slide is not None:
+                if drive.kind != "angle" and drive.target == self.mechanism.graph.slides[contact.slide]:
+                    return name
+            elif drive.kind == "angle" and contact.joins(drive.target, drive.reference):
+                return name
+        return None
+
+    def _end(self, link: str) -> str:
+        """The vertex of a link whose angle a drive holds: of an elastic one where it begins."""
+        if link == GROUND or link not in self.elastic:
+            return link
+        return self._node(link, next(iter(self.mechanism.description.links[link].points)))
+
+    def _node(self, body: str, point: str) -> str:
+        """The vertex of a body at one of its points."""
+        link = self.bodies.link_of(body)
+        if link not in self.elastic:
+            return body
+        telescopic = self.mechanism.description.links[link].telescopic
+        # Of a telescopic leg the first body is rigid, and the second the cantilever, from the leg's base to its end.
+        if telescopic and body == link:
+            return body
+        return f"{body}@{point}"
+
+    def _vertex(self, contact: Contact, body: str, found: list[Edge]) -> str:
+        """The vertex of a body at a contact; a slide on an elastic link grows with a beam of its own."""
+        if body in (GROUND, ASKED) or self.bodies.link_of(body) not in self.elastic:
+            return body
+        link = self.bodies.link_of(body)
+        described = self.mechanism.description.links[link]
+        if described.telescopic and described.ends is not None:
+            if body == link:
+                return body
+            inner = contact.slide is not None and contact.other(body) == link
+            return f"{body}@{described.ends[0 if inner else 1]}"
+        reach = contact.reach(body)
+        for tail, head in pairwise(reach):
+            found.append(Edge(f"{body}@{tail}", f"{body}@{head}", (Beam(tail, head, self.elastic[link]),), link, head))
+        return f"{body}@{reach[-1]}"
+
+    def _beams(self, name: str, section: str) -> list[Edge]:
+        link = self.mechanism.description.links[name]
+        if link.telescopic and link.ends is not None:
+            rod, (tail, head) = rod_of(name), link.ends
+            return [Edge(f"{rod}@{tail}", f"{rod}@{head}", (Beam(tail, head, section, name),), name, head)]
+        return [
+            Edge(f"{name}@{a}", f"{name}@{b}", (Beam(a, b, section),), name, b)
+            for a, b in pairwise(points_along(self.mechanism, link))
+        ]
+
+
+def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
+    """Edges that can carry a load from the asked vertex: what hangs by one edge is taken off, again and again."""
+    while True:
+        degree: dict[str, int] = {}
+        for edge in edges:
+            for end in (edge.a, edge.b):
+                degree[end] = degree.get(end, 0) + 1
+        loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, asked)}
+        if not loose:
+            return edges
+        edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
+
+
+def _looped(edges: tuple[Edge, ...], asked: str, points: Mapping[str, tuple[tuple[str, str], ...]]) -> Network:
+    """A tree from the ground, as short ways as possible, and a loop for every other edge."""
+    paths: dict[str, tuple[tuple[int, int], ...]] = {GROUND: ()}
+    queue = deque([GROUND])
+    tree: set[int] = set()
+    while queue:
+        vertex = queue.popleft()
+        for k, edge in enumerate(edges):
+            for near, far, sign in ((edge.a, edge.b, 1), (edge.b, edge.a, -1)):
+                if near == vertex and far not in paths:
+                    paths[far] = (*paths[vertex], (k, sign))
+                    tree.add(k)
+                    queue.append(far)
+    loops = []
+    for k, edge in enumerate(edges):
+        if k not in tree and edge.a in paths and edge.b in paths:
+            total: dict[int, int] = {k: 1}
+            for way, sign in ((paths[edge.a], 1), (paths[edge.b], -1)):
+                for other, direction in way:
+                    total[other] = total.get(other, 0) + sign * direction
+            loops.append(tuple((e, s) for e, s in total.items() if s))
+    return Network(edges, asked, paths, tuple(loops), points)
