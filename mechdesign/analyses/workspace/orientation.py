@@ -23,8 +23,8 @@ from mechdesign.study import Study
 from mechdesign.study.workspace_models import Over
 
 EFFORT = Effort(48, 16)
-# Rays of the table of the boundary, and the relative tolerance of the area.
-RAYS, AREA = 181, 1e-6
+# Rays of the table of the boundary, and the tolerance of means of which the area gets a tenth.
+RAYS, AREA = 181, 1e-5
 
 
 def reachable(study: Study, progress: Progress) -> Result:
