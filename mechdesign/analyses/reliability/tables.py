@@ -22,7 +22,7 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.reliability.analysis import Question
+    from mechdesign.analyses.reliability.question import Question
 
 Floats = NDArray[np.float64]
 

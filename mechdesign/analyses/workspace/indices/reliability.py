@@ -19,7 +19,7 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism import Configuration, Mechanism
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.reliability.analysis import Question
+    from mechdesign.analyses.reliability.question import Question
     from mechdesign.study import Study
 
 # Standard deviations beyond which nothing counts, and nodes between there and here.
@@ -32,7 +32,7 @@ DEPENDENT = 0.5
 def prepare(study: Study) -> Evaluate:
     """Find what varies and what it is limited to."""
     # Here, for the poses of a reliability question may themselves be nodes of a workspace.
-    from mechdesign.analyses.reliability.analysis import ask
+    from mechdesign.analyses.reliability.question import ask
 
     sources = find_sources(study)[0]
     assert study.reliability is not None

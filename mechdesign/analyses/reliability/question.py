@@ -1,0 +1,103 @@
+"""What a reliability section asks: outputs by order, and the limits on their errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.analyses.kinematics.motion import default_outputs
+from mechdesign.analyses.poses import expand_outputs, radians
+from mechdesign.analyses.reliability.error_limits import Band, Disc
+from mechdesign.analyses.reliability.first_order import Channel, Rates
+from mechdesign.errors import MechanismError, StudyError
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.study import Study
+from mechdesign.study.reliability_models import ReliabilitySection, split_order
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked: channels (outputs by order), and the limits on them.
+
+    Parameters
+    ----------
+    orders : int
+        1 where positions are asked only, 3 with velocities and accelerations.
+    channels : tuple of Channel
+        Outputs, order by order: all positions first.
+    pair : (int, int) or None
+        The two limited channels, where there are just two; without limits, the two outputs.
+    """
+
+    outputs: tuple[Coordinate, ...]
+    orders: int
+    channels: tuple[Channel, ...]
+    rates: Rates
+    bands: tuple[Band, ...]
+    discs: tuple[Disc, ...]
+    pair: tuple[int, int] | None
+
+    @property
+    def limited(self) -> bool:
+        """Whether a reliability is asked."""
+        return bool(self.bands or self.discs)
+
+
+def ask(study: Study, section: ReliabilitySection) -> Question:
+    """Channels and limits of a section; limited coordinates are outputs too."""
+    mechanism = study.mechanism
+    limits = [(*_limited(mechanism, name), limit) for name, limit in section.limits.items()]
+    limited = [
+        part
+        for base, _, limit in limits
+        for part in ((f"{base}.x", f"{base}.y") if limit.radius is not None else (base,))
+    ]
+    names = section.outputs or (() if limited else default_outputs(mechanism))
+    outputs = expand_outputs(study, tuple(names))
+    known = [output.name for output in outputs]
+    outputs += expand_outputs(study, tuple(dict.fromkeys(name for name in limited if name not in known)))
+    known = [output.name for output in outputs]
+    for name in section.rates | section.accelerations:
+        if name not in mechanism.drives:
+            raise StudyError(
+                f"reliability.rates: '{name}' is not a drive; the drives are {', '.join(mechanism.drives)}"
+            )
+    rates = Rates(*(
+        tuple(float(radians(study, mechanism.coordinate(name), given.get(name, 0.0))) for name in mechanism.drives)
+        for given in (section.rates, section.accelerations)
+    ))  # fmt: skip
+    orders = 3 if section.rates or section.accelerations else 1
+    bands, discs = [], []
+    for base, order, limit in limits:
+        begin = order * len(outputs)
+        if limit.radius is not None:
+            discs.append(Disc(begin + known.index(f"{base}.x"), begin + known.index(f"{base}.y"), limit.radius))
+        else:
+            low, high = (
+                float(radians(study, mechanism.coordinate(base), value)) if value is not None else bound
+                for value, bound in ((limit.min, -np.inf), (limit.max, np.inf))
+            )
+            bands.append(Band(begin + known.index(base), low, high))
+    pair: tuple[int, int] | None = None
+    if len(bands) == 2 and not discs:
+        pair = (bands[0].output, bands[1].output)
+    elif len(discs) == 1 and not bands:
+        pair = (discs[0].x, discs[0].y)
+    elif not limited and len(outputs) == 2:
+        pair = (0, 1)
+    channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
+    return Question(tuple(outputs), orders, channels, rates, tuple(bands), tuple(discs), pair)
+
+
+def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
+    """The coordinate or point of a limit, and the order that is limited."""
+
+    def known(name: str) -> bool:
+        try:
+            return name in mechanism.points or bool(mechanism.coordinate(name))
+        except MechanismError:
+            return False
+
+    return split_order(name, known)
