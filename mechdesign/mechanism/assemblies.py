@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -59,7 +60,9 @@ def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
     return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)
 
 
-def assemblies(mechanism: Mechanism, given: Sequence[str]) -> tuple[Assembly, ...]:
+# The command asks, then its picture.
+@lru_cache(maxsize=1)
+def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, ...]:
     """Every assembly mode of the plan of given coordinates, the sketch's first.
 
     Groups with a closed form have two modes each, whether or not they close at the sketch. Those of a group without

@@ -9,6 +9,7 @@ from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.errors import AssemblyError
 
 FIVE_BAR = """
 units: {length: m}
@@ -165,3 +166,19 @@ def test_the_turning_legs_against_counted_orientations() -> None:
     assert (turning.always(z, reach, *span) <= held.all(axis=0)).all()
     assert np.mean(turning.reached(z, reach, *span) != held.any(axis=0)) < 2e-3
     assert np.mean(turning.always(z, reach, *span) != held.all(axis=0)) < 2e-3
+
+
+@pytest.mark.parametrize("measures", ["{}", "{turn: platform.angle*1}"])
+def test_a_held_value_that_cannot_be_reached_is_an_empty_row(measures: str) -> None:
+    """Whether the inverse problem has a closed form or, for a measure that is an expression, has none."""
+    name = "platform.angle" if measures == "{}" else "turn"
+    held = f"workspace.at={{{name}: [15, 175]}}"
+    changes = [f"mechanism.measures={measures}", held, "workspace.integrate.tolerance=1e-3"]
+    result = mechdesign.workspace(study_of(RPR, *changes))
+    area = result.tables["indices"]["area"]
+    assert area[0] > 0
+    assert area[1] == 0
+    (warning,) = (warning for warning in result.warnings if "nothing is reachable" in warning)
+    assert f"{name} = 175" in warning
+    with pytest.raises(AssemblyError, match="reaches nothing"):
+        mechdesign.workspace(study_of(RPR, changes[0], f"workspace.at={{{name}: [175]}}"))

@@ -21,6 +21,11 @@ from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.workspace_models import Over
 
+ROOTLESS = (
+    "without a closed form of the inverse problem the workspace grows from the sketch, and with the held values the "
+    "mechanism does not reach the point's place in it; draw it nearer to them"
+)
+
 
 def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Reachable region of a point: indices (GII, GRI, SUI), local indices on a grid, and the boundary.
@@ -79,6 +84,8 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 def _unreachable(study: Study, question: Question) -> str:
     assert study.workspace is not None
+    if question.field.rootless:
+        return f"point {study.workspace.point} reaches nothing: {ROOTLESS}"
     return (
         f"point {study.workspace.point} reaches nothing on the scan about ({question.about.real:g}, "
         f"{question.about.imag:g}): its links cannot close there in the sketch's assembly, or a limit forbids it"
@@ -89,7 +96,7 @@ def _doubts(question: Question, given: Answer) -> Iterator[str]:
     where = ", ".join(f"{name} = {value:g}" for name, value in question.held.items())
     where = f" at {where}" if where else ""
     if not given.panels.closes[0]:
-        yield f"nothing is reachable{where}"
+        yield f"nothing is reachable{where}" + (f": {ROOTLESS}" if question.field.rootless else "")
         return
     for name in ("GII", "GRI"):
         error, value = given.errors[name][0], given.values[name][0]

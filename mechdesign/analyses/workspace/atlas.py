@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mechdesign.analyses.workspace.approach import Approach, Complex, Flags, Floats, unknowns
-from mechdesign.errors import AssemblyError
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import unknowns_of
@@ -85,26 +84,24 @@ class Atlas:
     def of(plan: Plan, held: tuple[float, ...]) -> Atlas:
         """Poses of the nominal mechanism, grown from the sketch's place until nothing more is reached.
 
-        Raises
-        ------
-        AssemblyError
-            If the mechanism cannot be brought from its sketch to the held values.
+        There are none where the mechanism cannot be brought from its sketch to the held values.
         """
         sketch = plan.mechanism.sketch_configuration
         origin = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
         given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, held)]
         first = plan.solve(given, limits=False)
-        if not first.valid[0]:
-            raise AssemblyError(
-                "the workspace grows from the sketch, where the inverse problem has no closed form, and with the held "
-                "values the mechanism does not reach the point's place in the sketch; draw it nearer to them"
-            )
         guess = unknowns_of(plan.structure, plan.all_rotations(first, given), first.slides, first.nodes)
         state = plan.run(given, first.vectors, guess)
         signs = [float(np.sign(np.ravel(d)[0])) for d in state.determinants]
         atlas = Atlas(plan, Approach(plan, held, signs), origin)
-        (atlas.known[b""],) = atlas._grown({}, np.zeros(1, dtype=np.intp), np.zeros(1, complex), unknowns(state, (1,)))
+        seeds = np.flatnonzero(first.valid)
+        (atlas.known[b""],) = atlas._grown({}, seeds, np.zeros(len(seeds), complex), unknowns(state, (1,))[:, seeds])
         return atlas
+
+    @property
+    def empty(self) -> bool:
+        """Whether the held values cannot be had at the point's place in the sketch, where poses would grow from."""
+        return not self.known[b""].tree.n
 
     @property
     def spacing(self) -> float:
@@ -168,7 +165,7 @@ class Atlas:
 
     def _nearest(self, z: Complex, sizes: Mapping[str, Floats]) -> tuple[Complex, Floats, Floats, Floats]:
         """Places of the nearest solved poses (nan where there is none), their unknowns, slopes and grip."""
-        if not sizes:
+        if not sizes or self.empty:
             return _pick(self.known[b""], z)
         rows = np.stack(list(sizes.values()), axis=-1)
         rows, which = np.unique(rows, axis=0, return_inverse=True)

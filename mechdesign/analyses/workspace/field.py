@@ -69,6 +69,11 @@ class Field:
             np.zeros((), dtype=np.int8), places,
         )  # fmt: skip
 
+    @property
+    def rootless(self) -> bool:
+        """Whether poses would have to grow from the sketch's place of the point, and cannot be had there."""
+        return self.plan.iterative and self._atlas.empty
+
     @cached_property
     def _atlas(self) -> Atlas:
         return Atlas.of(self.plan, self.held)
