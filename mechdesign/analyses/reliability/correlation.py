@@ -64,6 +64,13 @@ class Correlation:
         return np.asarray(self.root @ u)
 
 
+def pair_nodes(rho: float) -> tuple[Floats, Floats, Floats]:
+    """Nodes of two standard normal variables of this correlation, and their weights, each of shape (nodes, nodes)."""
+    first = np.broadcast_to(_NODES[:, None], (len(_NODES), len(_NODES)))
+    second = rho * first + np.sqrt(1 - rho * rho) * _NODES
+    return first, second, np.outer(_WEIGHTS, _WEIGHTS)
+
+
 def _behind(one: Marginal, other: Marginal, coefficient: float) -> float:
     """Correlation of the normal variables behind two laws."""
     from scipy.optimize import brentq

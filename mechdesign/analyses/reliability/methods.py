@@ -117,6 +117,13 @@ def normal(method: str, task: Task, mean: Floats, covariance: Floats) -> Found:
     return Found(method, estimates, mean, sigma, rho)
 
 
+def second_order(task: Task) -> Found:
+    """Second-order errors, normal about the shifted mean; no interval is claimed."""
+    from mechdesign.analyses.reliability.second_order import moments
+
+    return normal("second_order", task, *moments(task))
+
+
 def monte_carlo(task: Task) -> Found:
     """Plain simulation; an interrupt leaves what was drawn so far in `Found.sums`."""
     sums: list[Sums | None] = [None] * len(task.settings)
@@ -292,6 +299,7 @@ def _each(method: str, task: Task, work: Callable[[Setting], Estimate]) -> Found
 
 METHODS: dict[str, Callable[[Task], Found]] = {
     "analytic": analytic,
+    "second_order": second_order,
     "monte_carlo": monte_carlo,
     "quasi_monte_carlo": quasi_monte_carlo,
     "form": form,

@@ -1,0 +1,122 @@
+"""Errors to the second order: the shift of the mean, and the variance with it.
+
+error = f0 + a z + z H z / 2 for deviations z of all that varies; mean and covariance follow from the cumulants of z.
+[Mandel, The statistical analysis of experimental data, 1964; McCullagh, Tensor methods in statistics, 1987.]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.reliability.cumulants import Cumulants, cumulants
+from mechdesign.analyses.reliability.methods import Task
+from mechdesign.analyses.reliability.simulation import Setting, errors_of
+from mechdesign.analyses.reliability.sources import Drawn, Sources
+from mechdesign.parallel import map_chunks
+
+Floats = NDArray[np.float64]
+
+# Steps of the differences, as a part of the mechanism's size or in radians: the fourth root of rounding, at which a
+# second derivative has about seven digits.
+_STEP = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """Errors of all channels as quadratic functions of the components that vary.
+
+    Parameters
+    ----------
+    value : ndarray, shape (channels,)
+    gradient : ndarray, shape (channels, components)
+    hessian : ndarray, shape (channels, components, components)
+    """
+
+    value: Floats
+    gradient: Floats
+    hessian: Floats
+
+    def moments(self, law: Cumulants) -> tuple[Floats, Floats]:
+        """Mean, shape (channels,), and covariance, shape (channels, channels); exact for quadratic functions."""
+        bent = self.hessian @ law.mean
+        slope = self.gradient + bent
+        weighted = self.hessian @ law.covariance
+        mean = self.value + (self.gradient + 0.5 * bent) @ law.mean + 0.5 * np.trace(weighted, axis1=1, axis2=2)
+        covariance = slope @ law.covariance @ slope.T + 0.5 * np.einsum("cij,dji->cd", weighted, weighted)
+        (i, j, k), value = law.third[0].T, law.third[1]
+        mixed = 0.5 * np.einsum("ct,dt,t->cd", slope[:, i], self.hessian[:, j, k], value)
+        (i, j, k, other), value = law.fourth[0].T, law.fourth[1]
+        flat = 0.25 * np.einsum("ct,dt,t->cd", self.hessian[:, i, j], self.hessian[:, k, other], value)
+        return mean, covariance + mixed + mixed.T + flat
+
+
+def moments(task: Task) -> tuple[Floats, Floats]:
+    """Mean errors, shape (channels, poses), and their covariances, shape (poses, channels, channels)."""
+    law, steps = cumulants(task.sources), step_sizes(task.sources)
+    mean = np.full((task.channels, task.poses), np.nan)
+    covariance = np.full((task.poses, task.channels, task.channels), np.nan)
+
+    def work(setting: Setting) -> tuple[Floats, Floats]:
+        return quadratic(setting, task.sources, steps).moments(law)
+
+    task.progress.start(len(task.settings), "poses")
+    for setting, (middle, spread) in zip(task.settings, map_chunks(work, task.settings, task.jobs), strict=True):
+        mean[:, setting.pose], covariance[setting.pose] = middle, spread
+        task.progress.update(1)
+    return mean, covariance
+
+
+def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
+    """Second differences of the exact errors of mechanisms made beside the nominal one; nan where one is not assembled.
+
+    Parameters
+    ----------
+    steps : ndarray, shape (components,)
+    """
+    count = len(steps)
+    i, j = np.triu_indices(count, 1)
+    single, pairs = np.diag(steps), np.zeros((count, len(i)))
+    places = np.arange(len(i))
+    pairs[i, places], pairs[j, places] = steps[i], steps[j]
+    z = np.concatenate([np.zeros((count, 1)), single, -single, pairs, -pairs], axis=1)
+    errors, valid = errors_of(setting, sources.made(_drawn(sources, z)), z.shape[1])
+    found = np.where(valid, np.stack(errors), np.nan)
+    ends = np.cumsum([1, count, count, len(i)])
+    value, ahead, back, both_ahead, both_back = np.split(found, ends, axis=1)
+    hessian = np.empty((len(found), count, count))
+    diagonal = np.arange(count)
+    hessian[:, diagonal, diagonal] = (ahead + back - 2.0 * value) / steps**2
+    alone = ahead[:, i] + back[:, i] + ahead[:, j] + back[:, j]
+    hessian[:, i, j] = (both_ahead + both_back + 2.0 * value - alone) / (2.0 * steps[i] * steps[j])
+    hessian[:, j, i] = hessian[:, i, j]
+    return Quadratic(value[:, 0], (ahead - back) / (2.0 * steps), hessian)
+
+
+def step_sizes(sources: Sources) -> Floats:
+    """Step of each component that moves the mechanism little: by a small part of its size, or a small angle."""
+    mechanism = sources.study.mechanism
+    length = mechanism.size or 1.0
+    steps = []
+    for scalar, source in zip(sources.scalars, sources.first_order, strict=False):
+        if scalar.kind == "load":
+            # Deflections are linear in the loads.
+            steps.append(np.sqrt(source.variance) or 1.0)
+            continue
+        reach = []
+        for name, slope in source.directions[0].items():
+            quantity = (
+                mechanism.quantity(name) if scalar.kind == "drive" else mechanism.description.places[name].quantity
+            )
+            if slope:
+                reach.append((1.0 if quantity == "angle" else length) / abs(slope))
+        steps.append(_STEP * min(reach, default=1.0))
+    return np.array([*steps, *[_STEP * length] * (2 * len(sources.pins))])
+
+
+def _drawn(sources: Sources, z: Floats) -> Drawn:
+    count = len(sources.scalars)
+    pins = z[count:].reshape(-1, 2, z.shape[1])
+    return Drawn(list(z[:count]), [1.0] * len(pins), [(x, y) for x, y in pins])
