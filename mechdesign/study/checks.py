@@ -230,6 +230,16 @@ class Checker:
             path = (*root, "actuators", drive)
             if self.known(drive, self.names.drives, "drive", path, at_key=True):
                 self.kind(path, _STIFFNESS_KINDS[self.names.drives[drive]])
+        for joint, bearing in section.bearings.items():
+            path = (*root, "bearings", joint)
+            slides = [*self.names.section.joints, *(n for n, k in self.names.section.links.items() if k.telescopic)]
+            pins = [point for point, owners in self.names.owners.items() if len(owners) > 1]
+            if self.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
+                self.kind(path, "stiffness")
+                self.kind((*path, "radial"), "stiffness")
+                self.kind((*path, "moment"), "rotational_stiffness")
+                if bearing.moment is not None and joint not in slides:
+                    self.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
         loads = []
         for index, load in enumerate(section.loads):
             path = (*root, "loads", index)

@@ -21,6 +21,7 @@ from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,
     deflections_table,
+    eigen_table,
     springs_table,
     stiffness_table,
 )
@@ -163,9 +164,12 @@ def tables(study: Study, asked: Asked, poses: Poses, found: Found) -> dict[str, 
             found.free,
             found.reason == 0,
             "serial legs" if asked.legs is not None else "force method",
+            None if asked.section.direction is None else asked.section.direction * study.units.angle_factor,
         ),
         compliance_table(study, poses, soft),
     ]
+    if asked.size == 3 and asked.section.characteristic_length is not None:
+        made.append(eigen_table(study, poses, soft, asked.section.characteristic_length))
     if asked.legs is not None:
         made.append(springs_table(study, poses, asked.legs, found.springs))
     if found.effects is not None:
@@ -203,8 +207,8 @@ def ask(study: Study) -> Asked:
         link = bearers[0]
     legs: tuple[Leg, ...] | None = None
     with suppress(NotSerialError):
-        legs = find_legs(mechanism, link, section.at, section.elastic, section.actuators)
-    network = build_network(mechanism, section.link, section.at, section.elastic, section.actuators)
+        legs = find_legs(mechanism, link, section.at, section)
+    network = build_network(mechanism, section.link, section.at, section)
     length = section.characteristic_length or mechanism.size or 1.0
     return Asked(section, legs, network, 2 if section.link is None else 3, condensed, length)
 

@@ -7,13 +7,11 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.stiffness.legs import Beam, Element, Guide, Leg, Shift
+from mechdesign.analyses.stiffness.legs import Beam, Bearing, Element, Guide, Leg, Shift
 from mechdesign.analyses.stiffness.screws import Array, Chain, hinge_twist, slide_twist
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.study.stiffness_models import Profile, StiffnessSection
-
-SHEAR_FACTOR = 5 / 6  # of a rectangle
 
 
 def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration) -> Chain:
@@ -38,6 +36,8 @@ def freedoms(
             yield from _beam(element, section.sections[element.section], configuration, at)
         elif isinstance(element, Shift):
             yield slide_twist(np.full(configuration.shape, element.direction)), None
+        elif isinstance(element, Bearing):
+            yield from _bearing(element, section, configuration, at)
         else:
             twist = (
                 slide_twist(_slide_direction(element.slide, configuration))
@@ -45,6 +45,18 @@ def freedoms(
                 else hinge_twist(configuration.point(element.point) - at)
             )
             yield twist, None if element.drive is None else 1 / section.actuators[element.drive]
+
+
+def _bearing(
+    bearing: Bearing, section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]
+) -> Iterator[tuple[Array, Value]]:
+    given = section.bearings[bearing.name]
+    across = [1.0 + 0j, 1j] if bearing.slide is None else [1j * _slide_direction(bearing.slide, configuration)]
+    if given.radial is not None:
+        for direction in across:
+            yield slide_twist(np.broadcast_to(direction, configuration.shape)), 1 / given.radial
+    if given.moment is not None:
+        yield hinge_twist(configuration.point(bearing.point) - at), 1 / given.moment
 
 
 def _slide_direction(slide: int, configuration: Configuration) -> NDArray[np.complex128]:
@@ -70,12 +82,7 @@ def _beam(
 
 
 def rigidities(profile: Profile) -> tuple[float, float, float]:
-    """EA, EI and the shear compliance per length (zero unless asked for) of a section; its height lies in the plane."""
-    if profile.width is not None and profile.height is not None:
-        area, inertia = profile.width * profile.height, profile.width * profile.height**3 / 12
-    else:
-        assert profile.area is not None
-        assert profile.inertia is not None
-        area, inertia = profile.area, profile.inertia
-    shear = 1 / (SHEAR_FACTOR * profile.G * area) if profile.shear and profile.G is not None else 0.0
+    """EA, EI and the shear compliance per length (zero unless asked for) of a section."""
+    area, inertia, factor = profile.extent
+    shear = 1 / (factor * profile.G * area) if profile.shear and profile.G is not None else 0.0
     return profile.E * area, profile.E * inertia, shear

@@ -9,7 +9,7 @@ such a path is told as such.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,6 +17,7 @@ from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_b
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description, Link, Term
+from mechdesign.study.stiffness_models import StiffnessSection
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,16 @@ class Shift:
     direction: complex
 
 
-Element = Hinge | Guide | Beam | Shift
+@dataclass(frozen=True)
+class Bearing:
+    """The give of a joint itself, named as in the study; across its slide, or in all directions of a pin."""
+
+    name: str
+    point: str
+    slide: int | None = None
+
+
+Element = Hinge | Guide | Beam | Shift | Bearing
 
 
 @dataclass(frozen=True)
@@ -85,9 +95,7 @@ class NotSerialError(Exception):
     """The body does not stand on serial chains; says why."""
 
 
-def find_legs(
-    mechanism: Mechanism, link: str | None, at: str, elastic: Mapping[str, str], actuators: Mapping[str, float]
-) -> tuple[Leg, ...]:
+def find_legs(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> tuple[Leg, ...]:
     """Find the legs that carry a body, by structure alone.
 
     Parameters
@@ -96,10 +104,8 @@ def find_legs(
         The asked link; None for the pin `at` itself.
     at : str
         The asked point.
-    elastic : mapping of str to str
-        Section of each elastic link.
-    actuators : mapping of str to float
-        Stiffness of each compliant drive.
+    section : StiffnessSection
+        What is elastic.
 
     Raises
     ------
@@ -109,8 +115,8 @@ def find_legs(
         Where what is asked does not move.
     """
     description = mechanism.description
-    bodies = build_bodies(mechanism, link, at, elastic)
-    builder = _LegBuilder(mechanism, bodies, elastic, actuators)
+    bodies = build_bodies(mechanism, link, at, section.elastic)
+    builder = _LegBuilder(mechanism, bodies, section)
     legs = [builder.build(path) for path in _paths(bodies)]
     order = {name: k for k, name in enumerate(description.links)}
     legs.sort(key=lambda leg: min((order[name] for name in leg.links), default=len(order)))
@@ -187,18 +193,16 @@ def _as_path(contacts: list[Contact], target: str, bodies: Bodies) -> tuple[list
 class _LegBuilder:
     mechanism: Mechanism
     bodies: Bodies
-    elastic: Mapping[str, str]
-    actuators: Mapping[str, float]
+    section: StiffnessSection
 
     def build(self, path: tuple[list[str], list[Contact]]) -> Leg:
         names, contacts = self._without_pins(*path)
-        drives = [self._drive(contact) for contact in contacts]
+        drives = [drive_at(self.mechanism, contact) for contact in contacts]
         elements: list[Element] = []
         for k, (contact, drive) in enumerate(zip(contacts, drives, strict=True)):
             if k:
                 elements += self._beams(names[k], contacts[k - 1], contact)
-            if contact.kind != "clamp" and (drive is None or drive in self.actuators):
-                elements.append(Hinge(contact.point, drive) if contact.slide is None else Guide(contact.slide, drive))
+            elements += joint_elements(self.mechanism, contact, drive, self.section)
         links = tuple(dict.fromkeys(filter(None, map(self.bodies.link_of, names[1:]))))
         if names[-1] != ASKED:
             links = tuple(link for link in links if link != self.bodies.link)
@@ -220,19 +224,10 @@ class _LegBuilder:
                 joints.append(contacts[k])
         return [*kept, names[-1]], joints
 
-    def _drive(self, contact: Contact) -> str | None:
-        for name, drive in self.mechanism.description.drives.items():
-            if contact.slide is not None:
-                if drive.kind != "angle" and drive.target == self.mechanism.graph.slides[contact.slide]:
-                    return name
-            elif drive.kind == "angle" and contact.joins(drive.target, drive.reference):
-                return name
-        return None
-
     def _beams(self, body: str, entry: Contact, leave: Contact) -> list[Element]:
         """Beams of one body between its two contacts; of a telescopic leg, its whole length at its second body."""
         name = self.bodies.link_of(body)
-        section = self.elastic.get(name)
+        section = self.section.elastic.get(name)
         if section is None:
             return []
         link = self.mechanism.description.links[name]
@@ -254,6 +249,32 @@ class _LegBuilder:
         else:
             inner = order[i : j + 1] if i <= j else order[j : i + 1][::-1]
         return [*entry[:0:-1], *inner, *leave[1:]]
+
+
+def drive_at(mechanism: Mechanism, contact: Contact) -> str | None:
+    """The drive that sits at a joint."""
+    for name, drive in mechanism.description.drives.items():
+        if contact.slide is not None:
+            if drive.kind != "angle" and drive.target == mechanism.graph.slides[contact.slide]:
+                return name
+        elif drive.kind == "angle" and contact.joins(drive.target, drive.reference):
+            return name
+    return None
+
+
+def joint_elements(
+    mechanism: Mechanism, contact: Contact, drive: str | None, section: StiffnessSection
+) -> list[Element]:
+    """What gives at a joint: its freedom, unless a rigid drive holds it, and its bearing."""
+    found: list[Element] = []
+    if contact.kind == "clamp":
+        return found
+    if drive is None or drive in section.actuators:
+        found.append(Hinge(contact.point, drive) if contact.slide is None else Guide(contact.slide, drive))
+    name = contact.point if contact.slide is None else mechanism.graph.slides[contact.slide]
+    if name in section.bearings:
+        found.append(Bearing(name, contact.point, contact.slide))
+    return found
 
 
 def points_along(mechanism: Mechanism, link: Link) -> list[str]:

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.analyses.stiffness.legs import Beam, Element, Guide, Hinge, Shift, points_along
+from mechdesign.analyses.stiffness.legs import Beam, Element, Hinge, Shift, drive_at, joint_elements, points_along
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
+from mechdesign.study.stiffness_models import StiffnessSection
 
 Signs = NDArray[np.float64]
 
@@ -72,27 +73,23 @@ class Network:
         return found
 
 
-def build_network(
-    mechanism: Mechanism, link: str | None, at: str, elastic: Mapping[str, str], actuators: Mapping[str, float]
-) -> Network:
+def build_network(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> Network:
     """The network of a mechanism; parts that carry nothing are left out.
 
     Parameters
     ----------
     link : str or None
         The asked link; None for the pin `at` itself.
-    elastic : mapping of str to str
-        Section of each elastic link.
-    actuators : mapping of str to float
-        Stiffness of each compliant drive.
+    section : StiffnessSection
+        What is elastic.
 
     Raises
     ------
     StudyError
         If the asked point does not move.
     """
-    bodies = build_bodies(mechanism, link, at, elastic)
-    builder = _Builder(mechanism, bodies, elastic, actuators)
+    bodies = build_bodies(mechanism, link, at, section.elastic)
+    builder = _Builder(mechanism, bodies, section)
     edges = builder.edges()
     edges = _carrying(edges, bodies.asked)
     return _looped(tuple(edges), bodies.asked, builder.points())
@@ -102,34 +99,31 @@ def build_network(
 class _Builder:
     mechanism: Mechanism
     bodies: Bodies
-    elastic: Mapping[str, str]
-    actuators: Mapping[str, float]
+    section: StiffnessSection
 
     def edges(self) -> list[Edge]:
         """All joints and beams, and the drives that sit at no joint."""
         found: list[Edge] = []
         taken: set[str] = set()
         for contact in self.bodies.contacts:
-            drive = self.drive(contact)
-            elements: tuple[Element, ...] = ()
+            drive = drive_at(self.mechanism, contact)
             if drive is not None:
                 taken.add(drive)
-            if contact.kind != "clamp" and (drive is None or drive in self.actuators):
-                elements = (Hinge(contact.point, drive),) if contact.slide is None else (Guide(contact.slide, drive),)
+            elements = tuple(joint_elements(self.mechanism, contact, drive, self.section))
             name = contact.point if contact.slide is None else self.mechanism.graph.slides[contact.slide]
             found.append(
                 Edge(self._vertex(contact, contact.a, found), self._vertex(contact, contact.b, found), elements, name,
                      contact.point)
             )  # fmt: skip
-        for name, section in self.elastic.items():
+        for name, section in self.section.elastic.items():
             found += self._beams(name, section)
         for name, drive_of in self.mechanism.description.drives.items():
             if drive_of.kind == "angle" and name not in taken:
-                elements = (Shift(1.0 + 0j), Shift(1j))
+                held: tuple[Element, ...] = (Shift(1.0 + 0j), Shift(1j))
                 point = next(iter(self.mechanism.description.links[drive_of.target].points))
-                if name in self.actuators:
-                    elements = (*elements, Hinge(point, name))
-                found.append(Edge(self._end(drive_of.reference), self._end(drive_of.target), elements, name, point))
+                if name in self.section.actuators:
+                    held = (*held, Hinge(point, name))
+                found.append(Edge(self._end(drive_of.reference), self._end(drive_of.target), held, name, point))
         return found
 
     def points(self) -> dict[str, tuple[tuple[str, str], ...]]:
@@ -144,26 +138,16 @@ class _Builder:
             found[name] = tuple(here)
         return found
 
-    def drive(self, contact: Contact) -> str | None:
-        """The drive that sits at a joint."""
-        for name, drive in self.mechanism.description.drives.items():
-            if contact.slide is not None:
-                if drive.kind != "angle" and drive.target == self.mechanism.graph.slides[contact.slide]:
-                    return name
-            elif drive.kind == "angle" and contact.joins(drive.target, drive.reference):
-                return name
-        return None
-
     def _end(self, link: str) -> str:
         """The vertex of a link whose angle a drive holds: of an elastic one where it begins."""
-        if link == GROUND or link not in self.elastic:
+        if link == GROUND or link not in self.section.elastic:
             return link
         return self._node(link, next(iter(self.mechanism.description.links[link].points)))
 
     def _node(self, body: str, point: str) -> str:
         """The vertex of a body at one of its points."""
         link = self.bodies.link_of(body)
-        if link not in self.elastic:
+        if link not in self.section.elastic:
             return body
         telescopic = self.mechanism.description.links[link].telescopic
         # Of a telescopic leg the first body is rigid, and the second the cantilever, from the leg's base to its end.
@@ -173,7 +157,7 @@ class _Builder:
 
     def _vertex(self, contact: Contact, body: str, found: list[Edge]) -> str:
         """The vertex of a body at a contact; a slide on an elastic link grows with a beam of its own."""
-        if body in (GROUND, ASKED) or self.bodies.link_of(body) not in self.elastic:
+        if body in (GROUND, ASKED) or self.bodies.link_of(body) not in self.section.elastic:
             return body
         link = self.bodies.link_of(body)
         described = self.mechanism.description.links[link]
@@ -184,7 +168,9 @@ class _Builder:
             return f"{body}@{described.ends[0 if inner else 1]}"
         reach = contact.reach(body)
         for tail, head in pairwise(reach):
-            found.append(Edge(f"{body}@{tail}", f"{body}@{head}", (Beam(tail, head, self.elastic[link]),), link, head))
+            found.append(
+                Edge(f"{body}@{tail}", f"{body}@{head}", (Beam(tail, head, self.section.elastic[link]),), link, head)
+            )
         return f"{body}@{reach[-1]}"
 
     def _beams(self, name: str, section: str) -> list[Edge]:

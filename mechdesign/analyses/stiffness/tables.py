@@ -50,6 +50,7 @@ def stiffness_table(
     free: Array,
     valid: NDArray[np.bool_],
     method: str,
+    direction: float | None,
 ) -> Table:
     units = study.units
     size = stiff.shape[1]
@@ -69,6 +70,11 @@ def stiffness_table(
         Column("k_max", high, unit, "stiffness to a force in the stiffest direction, the body free to turn"),
         Column("k_angle", angle / units.angle_factor, units.label("angle"), "angle of the stiffest direction"),
     ]
+    if direction is not None:
+        along = np.array([np.cos(direction), np.sin(direction)])
+        with np.errstate(divide="ignore"):
+            value = 1 / np.einsum("i,nij,j->n", along, soft[:, :2, :2], along)
+        columns.append(Column("k_direction", value, unit, "force in the asked direction over displacement along it"))
     columns += _entries(study, "K", stiff, "stiffness", "stiffness matrix at the asked point; nan where rigid")
     columns.append(Column("rank", rank, "", "number of independent wrenches that hold the body"))
     for k, name in enumerate(("free_x", "free_y", "free_phi")[:size]):
@@ -95,6 +101,35 @@ def _principal(soft: Array) -> tuple[Array, Array, Array]:
         low = 1 / (mean + radius)
     angle = np.mod(np.arctan2(soft[:, 0, 1], half) / 2 + np.pi / 2, np.pi)
     return low, high, angle
+
+
+def eigen_table(study: Study, poses: Poses, soft: Array, length: float) -> Table:
+    """``eigen.csv``: eigen-stiffnesses of a body, softest first, and the twists along which they act.
+
+    Of K with rotations counted as lengths: a twist (dx, dy, length dphi) of unit size meets a wrench along itself.
+    """
+    scale = np.array([1.0, 1.0, length])
+    known = np.isfinite(soft).all(axis=(1, 2))
+    values, vectors = np.full((len(soft), 3), np.nan), np.full((len(soft), 3, 3), np.nan)
+    values[known], vectors[known] = np.linalg.eigh(soft[known] * np.outer(scale, scale))
+    with np.errstate(divide="ignore"):
+        stiffness = np.where(values > 1e-13 * values[:, -1:], 1 / values, np.where(np.isnan(values), np.nan, np.inf))
+    # Softest first; a twist points up, or to the right.
+    order = slice(None, None, -1)
+    stiffness, twists = stiffness[:, order], vectors.swapaxes(1, 2)[:, order]
+    lead = np.argmax(np.abs(twists) > 1e-9, axis=2)
+    twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
+    repeat = np.repeat(np.arange(poses.count), 3)
+    units = study.units
+    columns = [Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns += [
+        Column("mode", np.tile([1, 2, 3], poses.count), "", "softest first"),
+        Column("stiffness", stiffness.ravel(), units.label("stiffness"), "eigenvalue of the scaled stiffness matrix"),
+        Column("dx", twists[:, :, 0].ravel(), "", "its twist, of unit size"),
+        Column("dy", twists[:, :, 1].ravel(), "", "its twist, of unit size"),
+        Column("turn", twists[:, :, 2].ravel(), "", "its twist: the characteristic length times dphi"),
+    ]
+    return Table("eigen", tuple(columns), "eigen-stiffnesses by the characteristic length")
 
 
 def compliance_table(study: Study, poses: Poses, soft: Array) -> Table:
