@@ -9,8 +9,9 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
+from mechdesign.report.figures.deflected import round_down
 from mechdesign.report.figures.springs import Coil, quantity
-from mechdesign.report.figures.stiffness import figures, round_down
+from mechdesign.report.figures.stiffness import figures
 
 
 def pictures(text: str, *overrides: str) -> set[str]:

@@ -14,6 +14,7 @@ from mechdesign.report.figures import style
 
 PAD = 0.5  # inches around what is drawn, for symbols and names
 LEAST = 1.5  # inches, height of a window
+HIGHEST = 6.2  # inches, of a whole picture
 # Inches left of a window and below it, for axis labels, and above and right of it.
 LEFT, BELOW, ABOVE, RIGHT = 0.78, 0.55, 0.12, 0.15
 
@@ -69,6 +70,26 @@ def framed(
         (LEFT / style.WIDTH, BELOW / outer, window.width / style.WIDTH, window.height / outer)
     )  # fmt: skip
     window.limit(axes)
+    axes.set_xlabel(style.axis_label("x", unit))
+    axes.set_ylabel(style.axis_label("y", unit))
+    return figure, axes
+
+
+def equal_canvas(places: np.ndarray, unit: str) -> tuple[Figure, Axes]:
+    """Axes of one scale that hold the places, as large as the page allows."""
+    low = complex(places.real.min(), places.imag.min())
+    high = complex(places.real.max(), places.imag.max())
+    wide, tall = max((high - low).real, 1e-9), max((high - low).imag, 1e-9)
+    pad, left, below, above = 0.55, 0.68, 0.5, 0.35
+    inches = min((style.WIDTH - left - 0.15 - 2 * pad) / wide, (HIGHEST - below - above - 2 * pad) / tall)
+    width, height = style.WIDTH - left - 0.15, max(inches * tall + 2 * pad, 1.5)
+    outer = height + below + above
+    figure = style.new_figure(style.WIDTH, outer, layout=None)
+    axes = figure.add_axes((left / style.WIDTH, below / outer, width / style.WIDTH, height / outer))
+    middle = (low + high) / 2
+    axes.set_xlim(middle.real - width / 2 / inches, middle.real + width / 2 / inches)
+    axes.set_ylim(middle.imag - height / 2 / inches, middle.imag + height / 2 / inches)
+    axes.set_aspect("equal")
     axes.set_xlabel(style.axis_label("x", unit))
     axes.set_ylabel(style.axis_label("y", unit))
     return figure, axes

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import pose_in_words, solve_poses
+from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import ask, evaluate
 from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import name_labels, obstacles
+from mechdesign.report.figures.deflected import deflections, first_pose, free_motion
 from mechdesign.report.figures.drawing import draw_mechanism, link_colors
+from mechdesign.report.figures.framing import equal_canvas
 from mechdesign.report.figures.labels import place_labels
-from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.report.figures.scene import Scene, pose
 from mechdesign.report.figures.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
 from mechdesign.results import Result
 from mechdesign.study import Study
 
 MOST_DIRECTIONS = 4
 _COIL = 0.17  # length of a coil over the size of the mechanism
-MOST_LOADS = 4
-_MOVED = 0.12  # largest drawn deflection over the size of the mechanism
-_HEIGHT = 6.2  # inches at most
 
 
 def figures(study: Study, result: Result) -> dict[str, Figure]:
@@ -32,10 +30,9 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
     springs = _springs(study)
     if springs is not None:
         found["springs"] = springs
-    if study.stiffness is not None and study.stiffness.loads:
-        deflections = _deflections(study, result)
-        if deflections is not None:
-            found["deflections"] = deflections
+    for name, figure in (("deflections", deflections(study)), ("free", free_motion(study, result))):
+        if figure is not None:
+            found[name] = figure
     directions = _directions(study, result)
     if directions is not None:
         found["directions"] = directions
@@ -48,15 +45,6 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
     return found
 
 
-def first_pose(study: Study) -> tuple[Configuration, int] | None:
-    """The first pose that can be assembled, and its row."""
-    for solved in solve_poses(study, study.poses("stiffness")):
-        valid = np.flatnonzero(solved.configuration.valid)
-        if len(valid):
-            return solved.configuration.take(valid[:1]), int(solved.rows[valid[0]])
-    return None
-
-
 def _springs(study: Study) -> Figure | None:
     found = first_pose(study)
     if found is None:
@@ -67,7 +55,7 @@ def _springs(study: Study) -> Figure | None:
     if scene is None or not coils:
         return None
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
-    figure, axes = _canvas(places, study.units.label("length"))
+    figure, axes = equal_canvas(places, study.units.label("length"))
     axes.set_title(f"equivalent springs at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
     draw_mechanism(axes, study.mechanism, configuration, labels=False, drives=False)
     draw_coils(axes, coils)
@@ -101,78 +89,6 @@ def _coils(study: Study, configuration: Configuration, scene: Scene) -> list[Coi
         text = quantity(float(spring.stiffness[0]), study.units.label("stiffness"))
         coils.append(Coil(text, place, anchor, tip, length, grounded))
     return coils
-
-
-def _deflections(study: Study, result: Result) -> Figure | None:
-    """The asked link, much enlarged, where each load moves it."""
-    found = first_pose(study)
-    section, table = study.stiffness, result.tables["deflections"]
-    if found is None or section is None:
-        return None
-    configuration, row = found
-    scene = pose(study.mechanism, configuration)
-    loads = section.loads[:MOST_LOADS]
-    rows = row * len(section.loads) + np.arange(len(loads))
-    if scene is None or not np.isfinite(table["dx"][rows]).all():
-        return None
-    at = scene.points[section.at]
-    body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
-    moves = []
-    for k in rows:
-        turn = float(table["dphi"][k]) if "dphi" in table else 0.0
-        shift = complex(table["dx"][k], table["dy"][k])
-        moves.append(np.array([shift + 1j * turn * (place - at) for place in body]))
-    scales = [round_down(_MOVED * scene.span / max(abs(move).max(), 1e-300)) for move in moves]
-    places = np.concatenate([[*scene.points.values()], *(body + s * m for s, m in zip(scales, moves, strict=True))])
-    figure, axes = _canvas(places, study.units.label("length"))
-    draw_mechanism(axes, study.mechanism, configuration, faint=True)
-    for color, load, scale, move in zip(style.PALETTE, loads, scales, moves, strict=False):
-        moved = np.array(body) + scale * move
-        outline = np.append(moved[1:], moved[1:2])
-        axes.plot(outline.real, outline.imag, color=color, linewidth=2, zorder=5)
-        axes.plot([at.real, moved[0].real], [at.imag, moved[0].imag], color=color, linewidth=1, zorder=5)
-        axes.plot(
-            [moved[0].real], [moved[0].imag], "o", color=color, zorder=6, label=_load_in_words(study, load, scale)
-        )
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(f"deflections, enlarged, at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
-    return figure
-
-
-def round_down(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
-
-
-def _load_in_words(study: Study, load: tuple[float, ...], scale: float) -> str:
-    units = [study.units.label(kind) for kind in ("force", "force", "moment")]
-    parts = [
-        f"{name} = {value:g} {unit}"
-        for name, value, unit in zip(("fx", "fy", "mz"), load, units, strict=False)
-        if value
-    ]
-    return f"{', '.join(parts) or 'no load'} (x {scale:g})"
-
-
-def _canvas(places: np.ndarray, unit: str) -> tuple[Figure, Axes]:
-    """Axes of one scale that hold the places, as large as the page allows."""
-    low = complex(places.real.min(), places.imag.min())
-    high = complex(places.real.max(), places.imag.max())
-    wide, tall = max((high - low).real, 1e-9), max((high - low).imag, 1e-9)
-    pad, left, below, above = 0.55, 0.68, 0.5, 0.35
-    inches = min((style.WIDTH - left - 0.15 - 2 * pad) / wide, (_HEIGHT - below - above - 2 * pad) / tall)
-    width, height = style.WIDTH - left - 0.15, max(inches * tall + 2 * pad, 1.5)
-    outer = height + below + above
-    figure = style.new_figure(style.WIDTH, outer, layout=None)
-    axes = figure.add_axes((left / style.WIDTH, below / outer, width / style.WIDTH, height / outer))
-    middle = (low + high) / 2
-    axes.set_xlim(middle.real - width / 2 / inches, middle.real + width / 2 / inches)
-    axes.set_ylim(middle.imag - height / 2 / inches, middle.imag + height / 2 / inches)
-    axes.set_aspect("equal")
-    axes.set_xlabel(style.axis_label("x", unit))
-    axes.set_ylabel(style.axis_label("y", unit))
-    return figure, axes
 
 
 def _directions(study: Study, result: Result) -> Figure | None:
