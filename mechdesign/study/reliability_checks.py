@@ -56,6 +56,14 @@ def _allocate(
                       at_key=True)  # fmt: skip
     if not section.limits:
         checker.reporter.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
+    wide = [name for name, dimension in dimensions.items() if name not in LOADS and _varies(dimension)]
+    if not wide and not section.allocate.cost:
+        message = "nothing to allocate: no dimension has a tolerance, and a clearance is held unless 'cost' names it"
+        checker.reporter.report(("reliability", "allocate"), message)
+
+
+def _varies(dimension: Dimension) -> bool:
+    return bool(dimension.sigma) if dimension.tolerance is None else dimension.tolerance[0] < dimension.tolerance[1]
 
 
 def _clearance(checker: Checker, point: str, clearance: Clearance) -> Clearance | None:

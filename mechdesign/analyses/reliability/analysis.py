@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.kinematics.continuity import continuous
 from mechdesign.analyses.poses import judge_failures, solve_poses
 from mechdesign.analyses.reliability import sobol, tables
+from mechdesign.analyses.reliability.allocation import Allocated, allocate
 from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.comparison import disagreements
 from mechdesign.analyses.reliability.cycle import with_cycle
@@ -79,11 +80,13 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     found: list[Found] = []
     interrupted = ""
     indices: dict[int, sobol.Indices] = {}
+    allocated = Allocated()
     try:
         for method in section.methods:
             said = first if method == first.method else METHODS[method](task)
             found.append(with_cycle(said, task, found))
         indices = sobol.indices(task, section, poses.listed)
+        allocated = allocate(study, poses, task)
     except Partial as partial:
         found.append(partial.found)
         interrupted = "interrupted: "
@@ -114,8 +117,9 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     if interrupted:
         interrupted += f"{counts.get('samples', 0)} samples, {', '.join(each.method for each in found)}"
     result = Result(
-        "reliability", tables.build(answer), [*warnings, *failures], counts, failed, interrupted=interrupted
-    )
+        "reliability", tables.build(answer) | allocated.tables, [*warnings, *failures, *allocated.notes], counts,
+        "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
+    )  # fmt: skip
     if interrupted:
         raise Interrupted(result)
     return result

@@ -1,0 +1,187 @@
+"""The cheapest tolerances that keep the failure probabilities of the first-order model below what is asked.
+
+Minimise sum a_k / T_k^e_k over log T, where the normal errors of the linear model break their limits no more often than
+asked at any pose. The cost is convex in log T, and so is the variance of every error; poses enter as constraints as
+far as they are broken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.reliability.error_limits import Band, Disc
+from mechdesign.analyses.reliability.first_order import FirstOrder
+from mechdesign.analyses.reliability.probability import failure_probability
+from mechdesign.analyses.reliability.simulation import Setting
+from mechdesign.analyses.reliability.sources import Sources
+from mechdesign.analyses.reliability.tolerances import Tolerance, moments
+
+Floats = NDArray[np.float64]
+
+# Tolerances stay between these multiples of what is given.
+TIGHTEST, WIDEST = 1e-3, 10.0
+# Step of difference quotients in log T, and how far a constraint may be broken.
+_STEP, _SLACK = 1e-4, 1e-9
+# Poses that become constraints at once, and how often more of them may.
+_MORE, _ROUNDS = 6, 30
+_TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Failure probabilities of the first-order model, of tolerances so many times as wide as given.
+
+    Parameters
+    ----------
+    settings : sequence of Setting
+        Poses.
+    linear : FirstOrder
+        Of all poses, with the given tolerances.
+    free : ndarray of int
+        Sources whose tolerance is allocated.
+    widest : ndarray
+        As many times as the given one each of them may be.
+    """
+
+    settings: Sequence[Setting]
+    sources: Sources
+    linear: FirstOrder
+    tolerances: Sequence[Tolerance]
+    free: NDArray[np.intp]
+    widest: Floats
+
+    def scales(self, x: Floats) -> Floats:
+        """Factor of each source's tolerance; 1 where it is held."""
+        scales = np.ones(len(self.tolerances))
+        scales[self.free] = np.exp(x)
+        return scales
+
+    def with_scales(self, scales: Floats) -> FirstOrder:
+        """The linear model of these tolerances."""
+        mean, variance = moments(self.sources, scales)
+        owner = self.linear.owner
+        return replace(self.linear, mean=mean[owner], variance=variance[owner])
+
+    def failures(self, scales: Floats, which: Sequence[int]) -> Floats:
+        """Probability of failure at some of the poses."""
+        rows = [self.settings[k].pose for k in which]
+        linear = self.with_scales(scales)
+        linear = replace(linear, components=linear.components[:, :, rows])
+        covariance, mean = linear.covariance(), linear.shift()
+        bands: Sequence[Band] = self.settings[0].bands
+        discs: Sequence[Disc] = self.settings[0].discs
+        return np.array([failure_probability(c, bands, discs, m) for c, m in zip(covariance, mean.T, strict=True)])
+
+    def cost(self, x: Floats) -> tuple[float, Floats]:
+        """Cost of all that is allocated, and its derivatives by x."""
+        prices, slopes = [], []
+        for k, scale in zip(self.free.tolist(), np.exp(x).tolist(), strict=True):
+            tolerance = self.tolerances[k]
+            assert tolerance.cost is not None
+            prices.append(tolerance.price(tolerance.given * scale))
+            slopes.append(-tolerance.cost.exponent * prices[-1])
+        return float(sum(prices)), np.array(slopes)
+
+
+class UnreachableError(Exception):
+    """Not even the tightest tolerances reach what is asked.
+
+    Parameters
+    ----------
+    failures : ndarray, shape (poses,)
+        That they leave.
+    """
+
+    def __init__(self, failures: Floats) -> None:
+        super().__init__()
+        self.failures = failures
+
+
+def cheapest(model: Model, allowed: Floats) -> Floats:
+    """Factors of all tolerances.
+
+    Parameters
+    ----------
+    allowed : ndarray, shape (poses,)
+        Probability of failure that is allowed at each pose.
+
+    Raises
+    ------
+    UnreachableError
+        If the tightest tolerances break a constraint.
+    """
+    from scipy.optimize import minimize
+
+    count = len(model.free)
+    lowest, highest = np.full(count, np.log(TIGHTEST)), np.log(model.widest)
+    every = range(len(model.settings))
+    wanted = _distance(allowed)
+
+    def margins(x: Floats, which: Sequence[int]) -> Floats:
+        return _distance(model.failures(model.scales(x), which)) - wanted[list(which)]
+
+    def slopes(x: Floats, which: Sequence[int]) -> Floats:
+        steps = _STEP * np.eye(count)
+        return np.stack([(margins(x + h, which) - margins(x - h, which)) / (2 * _STEP) for h in steps], axis=1)
+
+    if margins(lowest, every).min() < 0:
+        raise UnreachableError(model.failures(model.scales(lowest), every))
+    if margins(highest, every).min() >= 0:
+        return model.scales(highest)
+    alike = _shifted(margins, np.zeros(count), lowest, highest, every)
+    unit = model.cost(alike)[0]
+    active = [int(np.argmin(margins(alike, every)))]
+    for _ in range(_ROUNDS):
+        constraint = {"type": "ineq", "fun": margins, "jac": slopes, "args": (tuple(active),)}
+        found: Any = minimize(
+            lambda x: model.cost(x)[0] / unit, alike, jac=lambda x: model.cost(x)[1] / unit, method="SLSQP",
+            bounds=list(zip(lowest.tolist(), highest.tolist(), strict=True)), constraints=constraint,
+            options={"maxiter": 300, "ftol": 1e-12},
+        )  # type: ignore[call-overload]  # fmt: skip
+        x = np.clip(found.x, lowest, highest)
+        left = margins(x, every)
+        broken = [k for k in np.argsort(left).tolist() if left[k] < -_SLACK and k not in active]
+        if not broken:
+            break
+        active += broken[:_MORE]
+    x = _shifted(margins, x, lowest, highest, every)
+    return model.scales(x if model.cost(x)[0] <= model.cost(alike)[0] else alike)
+
+
+def _distance(failure: Floats) -> Floats:
+    """Logarithm of the standard deviations that a normal error of this failure probability may have about it.
+
+    Of errors that grow with their tolerances it is nearly linear in the logarithm of these.
+    """
+    from scipy.special import ndtri
+
+    return np.asarray(np.log(np.maximum(-ndtri(0.5 * np.maximum(failure, _TINY)), 1e-6)))
+
+
+def _shifted(
+    margins: Callable[..., Floats], x: Floats, lowest: Floats, highest: Floats, every: Sequence[int]
+) -> Floats:
+    """All tolerances as much wider or tighter together as the poses allow just so."""
+    from scipy.optimize import brentq
+
+    reach = float((highest - lowest).max())
+    active: list[int] = []
+    shifted = x
+    while True:
+        left = margins(shifted, every)
+        worst = int(np.argmin(left))
+        if active and (left[worst] >= -_SLACK or worst in active):
+            return shifted
+        active.append(worst)
+
+        def least(shift: float) -> float:
+            return float(margins(np.clip(x + shift, lowest, highest), tuple(active)).min())
+
+        # On the safe side of the root.
+        shift = brentq(least, -reach, reach, xtol=1e-10) - 2e-10
+        shifted = np.clip(x + shift, lowest, highest)

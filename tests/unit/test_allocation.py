@@ -1,0 +1,281 @@
+"""Allocated tolerances: closed forms of linear chains, what is out of reach, and the study that is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+from scipy.special import ndtri
+
+import mechdesign
+from mechdesign.errors import StudyError
+from mechdesign.results import Result
+
+# A slider on the x axis whose error is that of a, b and the travel: a - b + travel, and c, which changes nothing.
+CHAIN = """\
+# Where the slider stops.
+units: {length: mm, angle: deg}
+mechanism:
+  parameters: {a: 50, b: 30, c: 20}
+  links:
+    ground: {O: [0, 0], G: ["a - b", 0], H: [c, 5]}
+    slider: {B: [0, 0]}
+  joints: {guide: {prismatic: [ground, slider], through: G}}
+  drives: {travel: {slide: guide}}
+  sketch: {B: [30, 0]}
+reliability:
+  dimensions:
+    a: {tolerance: 0.1}       # the wall
+    b: 0.2
+    travel: {sigma: 0.05}     # the motor
+  poses: [{travel: 10}]
+  outputs: [B.x]
+  limits: {B.x: 0.3}
+  samples: 100000
+  sobol: 0
+  allocate: {reliability: 0.999}
+"""
+LEVER = """
+mechanism:
+  links: {ground: {O: [0, 0]}, lever: [O, P, 100]}
+  drives: {theta: {angle: lever}}
+  sketch: {P: [100, 0]}
+reliability:
+  poses: [{theta: 0}]
+  samples: 100000
+  sobol: 0
+  limits: {P.x: 0.3}
+  allocate: {reliability: 0.99}
+"""
+
+
+def allocated(result: Result) -> dict[str, float]:
+    table = result.tables["allocation"]
+    return dict(zip(table["source"].tolist(), table["allocated"].tolist(), strict=True))
+
+
+def ask(text: str, *overrides: str) -> Result:
+    return mechdesign.reliability(study_of(text, *overrides))
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0])
+def test_a_linear_chain_has_lagranges_tolerances(exponent: float) -> None:
+    """Minimise sum a/T^k where sum (s T)^2 is given: T ~ (a/s^2)^(1/(k + 2)); the motor's s is 3, of its sigma."""
+    prices = {"a": 1.0, "b": 5.0, "travel": 0.3}
+    cost = ", ".join(f"{name}: {{a: {a}, exponent: {exponent}}}" for name, a in prices.items())
+    result = ask(CHAIN, f"reliability.allocate.cost={{{cost}}}")
+    slopes = np.array([1 / 3, 1 / 3, 1.0])
+    a = np.array(list(prices.values()))
+    expected = (a / slopes**2) ** (1 / (exponent + 2))
+    expected *= 0.3 / -ndtri(0.0005) / np.linalg.norm(slopes * expected)
+    found = allocated(result)
+    assert list(found) == list(prices)
+    assert list(found.values()) == pytest.approx(expected, rel=2e-5)
+    assert not result.failed
+    table = result.tables["allocation"]
+    given = np.array([0.1, 0.2, 0.05])
+    assert table["given"] == pytest.approx(given)
+    assert table["kind"].tolist() == ["tolerance", "tolerance", "sigma"]
+    assert table["cost_given"] == pytest.approx(a / given**exponent)
+    assert table["cost_allocated"] == pytest.approx(a / expected**exponent, rel=1e-4)
+    assert table["share"] == pytest.approx((slopes * expected) ** 2 / np.sum((slopes * expected) ** 2), rel=1e-4)
+    # Cheaper than all tolerances widened alike.
+    alike = 0.3 / -ndtri(0.0005) / np.linalg.norm(slopes * given)
+    assert table["cost_allocated"].sum() < 0.99 * (a / (alike * given) ** exponent).sum()
+
+
+def test_the_simulation_confirms_it_and_the_study_written_reaches_it() -> None:
+    result = ask(CHAIN)
+    confirmation = result.tables["confirmation"]
+    assert confirmation["analytic"] == pytest.approx([0.999], abs=1e-6)
+    assert confirmation["analytic"] >= 0.999
+    assert confirmation["low"] < 0.999 < confirmation["high"]
+    assert confirmation["met"].all()
+    assert confirmation["method"].tolist() == ["monte_carlo"]
+    again = mechdesign.reliability(study_of(result.files["allocated.yaml"], "seed=7", "reliability.allocate="))
+    table = again.tables["reliability"]
+    simulated = table["method"] == "monte_carlo"
+    assert table["low"][simulated] < 0.999 < table["high"][simulated]
+    assert table["reliability"][~simulated] == pytest.approx([0.999], abs=1e-6)
+
+
+def test_the_file_keeps_its_comments_and_says_the_new_tolerances(tmp_path: Path) -> None:
+    (tmp_path / "chain.yaml").write_text(CHAIN)
+    result = mechdesign.reliability(mechdesign.load(tmp_path / "chain.yaml"))
+    text = result.files["allocated.yaml"]
+    found = allocated(result)
+    assert f"    a: {{tolerance: {found['a']}}}       # the wall\n    b: {found['b']}\n" in text
+    assert f"    travel: {{sigma: {found['travel']}}}     # the motor\n" in text
+    assert "# Where the slider stops." in text
+
+
+def test_rare_failures_are_confirmed_by_auto() -> None:
+    result = ask(CHAIN, "reliability.allocate.reliability=0.9999999")
+    confirmation = result.tables["confirmation"]
+    assert confirmation["method"].tolist() == ["auto"]
+    assert 0.9 < (1 - confirmation["analytic"][0]) / 1e-7 <= 1 + 1e-6
+    assert confirmation["low"] < 1 - 1e-7 < confirmation["high"]
+    assert confirmation["evaluations"][0] < 100_000
+
+
+def test_where_the_model_is_too_careful_simulation_makes_it_cheaper() -> None:
+    """Uniform deviations have no tails: the normal model asks for tighter tolerances than they need."""
+    text = CHAIN.replace("b: 0.2", "b: {tolerance: 0.2, distribution: uniform}")
+    result = ask(text, "reliability.allocate.cost={b: 5}")
+    confirmation = result.tables["confirmation"]
+    assert confirmation["target"] < 0.998
+    assert confirmation["analytic"] == pytest.approx(confirmation["target"], abs=1e-5)
+    assert confirmation["low"] < 0.999 < confirmation["high"]
+    assert any("was corrected" in note for note in result.warnings)
+
+
+def test_where_the_model_is_careless_simulation_makes_it_tighter() -> None:
+    """A lognormal deviation of large spread has a longer tail than the normal of the same moments."""
+    text = LEVER + "  dimensions: {lever.length: {sigma: 3, distribution: lognormal}}\n"
+    result = ask(text, "reliability.limits={P.x: {max: 20}}")
+    confirmation = result.tables["confirmation"]
+    assert confirmation["target"] > 0.99
+    assert confirmation["analytic"] == pytest.approx(confirmation["target"], abs=1e-5)
+    assert confirmation["low"] < 0.99 < confirmation["high"]
+    # ln(120/mean) = 2.3263 s - s^2/2, solved for the deviation of mean 100.
+    s = np.roots([0.5, -2.3263478740408408, np.log(1.2)]).real.min()
+    assert allocated(result)["lever.length"] == pytest.approx(100 * np.sqrt(np.expm1(s * s)), rel=0.02)
+
+
+def test_every_pose_reaches_it() -> None:
+    sweep = "reliability.sweep={theta: {from: 0, to: 90, step: 5}}"
+    result = ask(LEVER + "  dimensions: {lever.length: 0.2, theta: 0.2}\n", "reliability.poses=", sweep)
+    confirmation = result.tables["confirmation"]
+    assert len(confirmation) == 19
+    assert (confirmation["analytic"] >= 0.99).all()
+    assert confirmation["analytic"].min() == pytest.approx(0.99, abs=1e-5)
+    assert confirmation["met"].all()
+    # The lever's length counts at 0 and its angle at 90 degrees; either fills its own limit there, less elsewhere.
+    found = allocated(result)
+    alone = 3 * 0.3 / -ndtri(0.005)
+    assert found["lever.length"] == pytest.approx(alone, rel=1e-3)
+    assert found["theta"] == pytest.approx(np.degrees(alone / 100), rel=1e-3)
+
+
+def test_what_has_no_influence_is_as_wide_as_allowed_and_is_told() -> None:
+    result = ask(CHAIN, "reliability.dimensions.c=0.05")
+    assert allocated(result)["c"] == pytest.approx(0.5)
+    assert [note for note in result.warnings if "'c' has no influence" in note]
+    assert allocated(result)["a"] == pytest.approx(allocated(ask(CHAIN))["a"], rel=1e-4)
+
+
+def test_what_only_simulation_sees_is_not_widened() -> None:
+    """At a stretched lever the angle's error counts in the second order only: 100 (1 - cos)."""
+    result = ask(LEVER + "  dimensions: {lever.length: 0.2, theta: 2}\n", "reliability.limits={P.x: 0.5}")
+    assert not result.failed
+    assert allocated(result)["theta"] == pytest.approx(2)
+    assert [note for note in result.warnings if "'theta' has no influence" in note and "keeps" in note]
+    assert result.tables["confirmation"]["met"].all()
+
+
+def test_loose_limits_do_not_run_away() -> None:
+    result = ask(CHAIN, "reliability.limits.B.x=100")
+    assert list(allocated(result).values()) == pytest.approx([1.0, 2.0, 0.5])
+    assert sum("as wide as allowed" in note for note in result.warnings) == 3
+
+
+def test_held_clearances_that_break_the_limits_alone_are_named_with_what_is_reachable() -> None:
+    text = LEVER.replace("theta: 0}", "theta: 90}") + (
+        "  dimensions: {lever.length: 0.2}\n  clearances: {O: {radial: 0.3, link: lever}}\n"
+    )
+    result = ask(text)
+    # The pin's sigma is a third of its radius; along the lever at 90 degrees nothing else moves P.x.
+    reach = 1 - 2 * 0.0013498980316300933
+    assert not result.failed
+    result = ask(text, "reliability.allocate.reliability=0.999")
+    assert "allocation" not in result.tables
+    assert "O (100%)" in result.failed
+    assert f"{reach:.4f};" in result.failed
+    assert "theta = 90 deg" in result.failed
+    # Named in the cost it is allocated too.
+    result = ask(text, "reliability.allocate={reliability: 0.999, cost: {O: 1}}")
+    assert not result.failed
+    assert allocated(result)["O"] == pytest.approx(0.3 / -ndtri(0.0005) * 3, rel=1e-3)
+
+
+def test_limits_that_no_tolerance_keeps() -> None:
+    assert "shrink to nothing" in ask(CHAIN, "reliability.limits.B.x=1e-5").failed
+    moved = ask(CHAIN, "reliability.dimensions.a=[0.5, 0.7]")
+    assert "mean errors" in moved.failed
+
+
+def test_asymmetric_tolerances_keep_their_middle() -> None:
+    result = ask(CHAIN, "reliability.dimensions.a=[-0.05, 0.15]")
+    found = study_of(result.files["allocated.yaml"]).reliability
+    assert found is not None
+    low, high = found.dimensions["a"].tolerance
+    assert 0.5 * (low + high) == pytest.approx(0.05)
+    assert 0.5 * (high - low) == pytest.approx(allocated(result)["a"])
+    assert result.tables["confirmation"]["met"].all()
+
+
+WILD = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    upper: [O, E, 100]
+    fore: [E, P, 80]
+  drives: [upper, fore]
+  sketch: {E: [100, 0], P: [180, 0]}
+reliability:
+  dimensions: {"*.length": 0.03}
+  poses: [{upper: 0, fore: ANGLE}]
+  limits: {P.x: 0.05}
+  samples: 20000
+  sobol: 0
+  allocate: {reliability: 0.99}
+"""
+
+
+@pytest.mark.parametrize(("angle", "names"), [("0", ["*.length"]), ("60", ["upper.length", "fore.length"])])
+def test_a_wildcard_is_written_out_unless_its_places_stay_alike(angle: str, names: list[str]) -> None:
+    result = ask(WILD.replace("ANGLE", angle))
+    study = study_of(result.files["allocated.yaml"])
+    assert list(study.resolved["reliability"]["dimensions"]) == names
+    assert study.reliability is not None
+    for name, size in allocated(result).items():
+        assert study.reliability.dimensions[name].tolerance == pytest.approx((-size, size))
+    assert not result.failed
+
+
+def test_a_diameter_stays_a_diameter() -> None:
+    text = LEVER.replace("theta: 0}", "theta: 90}") + (
+        "  clearances: {O: {diametral: 0.8, tolerance: [-0.1, 0.3], link: lever}}\n"
+    )
+    result = ask(text, "reliability.allocate.cost={O: 1}")
+    given = result.tables["allocation"]["given"]
+    assert given == pytest.approx([0.4])
+    scale = allocated(result)["O"] / 0.4
+    found = study_of(result.files["allocated.yaml"]).resolved["reliability"]["clearances"]["O"]
+    assert found["diametral"] == pytest.approx(0.8 * scale, rel=1e-5)
+    assert found["tolerance"] == pytest.approx([-0.1 * scale, 0.3 * scale])
+
+
+def test_correlated_tolerances() -> None:
+    """Two that go together by 0.6 have the variance T^2 (2 + 1.2)/9 where they are alike."""
+    text = CHAIN.replace("    travel: {sigma: 0.05}     # the motor\n", "").replace("a - b", "a + b - 60")
+    result = ask(text, "reliability.correlation=[[a, b, 0.6]]")
+    expected = 0.3 / -ndtri(0.0005) * 3 / np.sqrt(3.2)
+    assert list(allocated(result).values()) == pytest.approx([expected, expected], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["reliability.limits="], "give some"),
+        (["reliability.dimensions={a: 0}"], "nothing to allocate"),
+        (["reliability.allocate.cost={z: 1}"], "'z'"),
+        (["reliability.allocate.cost={a: {a: 1, exponent: 0}}"], "must be positive"),
+        (["reliability.allocate.reliability=1"], "between 0 and 1"),
+    ],
+)
+def test_what_cannot_be_asked(overrides: list[str], message: str) -> None:
+    with pytest.raises(StudyError, match=message):
+        study_of(CHAIN, *overrides)
