@@ -13,8 +13,8 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
 
-# Poses of all regions together, at most: a question may cost much at each.
-MOST = 2000
+# About so many poses of all regions together (a question may cost much at each), and so many rays of a patch at least.
+MOST, _FEWEST = 2000, 3
 
 
 def workspace_nodes(study: Study) -> Poses:
@@ -46,13 +46,17 @@ def workspace_nodes(study: Study) -> Poses:
 
 
 def _grid(question: Question, most: int) -> Value:
-    """Nodes of one region, shape (rays, GRID), on at most `most` rays."""
+    """Nodes of one region, shape (rays, GRID), on about `most` rays."""
     designs = Designs(question.field, {}, 1, question.about)
     panels = find_panels(designs, question.scan, CLOSE)
     if not panels.closes[0]:
         return np.zeros((0, GRID), dtype=complex)
-    found = patches(designs, panels, min(question.rays or RAYS, most), CLOSE.samples)
-    grid = np.concatenate([patch.grid(question.about) for patch in found])
-    # Every panel has a fewest number of rays: of too many, some are left out.
-    kept = np.unique(np.linspace(0, len(grid) - 1, min(max(most, 1), len(grid))).round().astype(int))
-    return np.asarray(grid[kept])
+    found = list(patches(designs, panels, min(question.rays or RAYS, most), CLOSE.samples))
+    # Every panel has a fewest number of rays: of too many some are left out, never the ends of a patch: others begin.
+    total = sum(float(np.ptp(patch.theta)) for patch in found)
+    grids = []
+    for patch in found:
+        number = max(_FEWEST, round(most * float(np.ptp(patch.theta)) / total))
+        kept = np.unique(np.linspace(0, len(patch.theta) - 1, min(number, len(patch.theta))).round().astype(int))
+        grids.append(patch.grid(question.about)[kept])
+    return np.asarray(np.concatenate(grids))

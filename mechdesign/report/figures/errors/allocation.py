@@ -47,7 +47,7 @@ def allocation_figure(study: Study, table: Table) -> Figure:
     section = study.reliability
     assert section is not None
     assert section.allocate is not None
-    total = [float(np.sum(table[name])) for name in ("cost_given", "cost_allocated")]
+    total = [float(np.nansum(table[name])) for name in ("cost_given", "cost_allocated")]
     note = f"cost {total[0]:.4g} as given, {total[1]:.4g} allocated ({100 * (total[1] / total[0] - 1):+.1f} %)"
     title(figure, f"Cheapest tolerances for a reliability of {section.allocate.reliability:.10g}", note, left=margin)
     handles, labels = one.get_legend_handles_labels()

@@ -58,7 +58,9 @@ def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
         axis.set_xlabel("share of the variance [%]")
     which = ""
     if sobol is not None:
-        which = f"at {pose_in_words(study, poses, sobol)}; bars: 99.7 % intervals"
+        which = f"at {pose_in_words(study, poses, sobol)}; whiskers: 99.7 % intervals"
+        if not np.isfinite(table["sobol_first"][: len(names)]).all():
+            which += "; correlated sources have no Sobol index"
     elif poses.count == 1:
         which = f"at {pose_in_words(study, poses, 0)}"
     elif not each:
@@ -96,8 +98,9 @@ def _shares(study: Study, axis: Axes, shares: Floats, names: list[str], poses: P
 def _indices(axis: Axes, table: Table, rows: NDArray[np.bool_], names: list[str], pose: int) -> None:
     """First-order share, first and total index of each source, by the total one."""
     own = np.flatnonzero(rows)[pose * len(names) : (pose + 1) * len(names)]
-    total = np.nan_to_num(table["sobol_total"][own])
-    ranked = own[np.argsort(-total, kind="stable")[:MOST_SOURCES]]
+    # Correlated sources have no indices of their own: they are ranked by their share.
+    largest = np.fmax(table["sobol_total"][own], table["share"][own])
+    ranked = own[np.argsort(-np.nan_to_num(largest), kind="stable")[:MOST_SOURCES]]
     height = 0.8 / len(_SOBOL)
     for k, (column, (words, color)) in enumerate(_SOBOL.items()):
         values, reach = 100.0 * table[column][ranked], None
@@ -111,6 +114,6 @@ def _indices(axis: Axes, table: Table, rows: NDArray[np.bool_], names: list[str]
 
 def _name(axis: Axes, names: list[str]) -> None:
     axis.set_yticks(np.arange(len(names)), names)
-    axis.invert_yaxis()
-    axis.margins(x=0.18, y=0.02)
+    axis.set_ylim(len(names) - 0.42, -0.58)
+    axis.margins(x=0.18)
     axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.get_xlim()[0] < -2.0 else 0.0)

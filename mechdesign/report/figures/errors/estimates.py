@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.report.figures.errors.looks import LOOKS, Look, methods, select
-from mechdesign.report.figures.errors.panels import Along, Floats, framed, legend_below, name_abscissa, title
+from mechdesign.report.figures.errors.panels import Along, Floats, framed, legend_below, number, tick_abscissa, title
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 # Listed poses whose names fit below a picture.
 MOST_LISTED = 12
+# Values that are written beside their marks.
+MOST_WRITTEN = 8
 # Values farther apart than this are drawn on a logarithmic scale.
 _WIDE = 8.0
 # Handles by their words; error bars are no artists.
@@ -32,9 +34,10 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
     bottom = 0.35 + 0.15 * lines + 0.2 * (2 if len(known) > 2 else 1)
     figure = framed(bottom + 3.6, left=0.95, right=0.15, top=0.7, bottom=bottom + 0.2)
     axes = figure.subplots()
-    floor = _scale(axes, table)
+    floor, unseen = _scale(axes, table), _unseen(table)
     entries: Legend = {}
     many = poses.count > MOST_LISTED
+    written = swept is None and poses.count * len(known) <= MOST_WRITTEN
     place = np.arange(poses.count, dtype=float) if swept is None else swept.values
     apart = min(0.14, 0.8 / len(known)) if swept is None else 0.0
     for k, method in enumerate(known):
@@ -51,6 +54,10 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
             value = np.where(table["failure"][rows] > 0, table["failure"][rows], np.nan if floor else 0.0)
             (line,) = axes.plot(at, value, linestyle=drawn, marker=marker, color=look.color)
             entries[look.words] = line
+        for x, row in zip(at, rows, strict=True) if written else ():
+            height = float(table["failure_high" if unseen[row] else "failure"][row])
+            axes.annotate(f"< {number(height)}" if unseen[row] else number(height), (x, height), xytext=(8, 0),
+                          textcoords="offset points", va="center", fontsize=8)  # fmt: skip
     for method in known:
         _cycle(axes, table, method, entries)
     axes.set_ylabel("failure probability")
@@ -62,10 +69,11 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
         axes.set_xlim(-0.6, count - 0.4)
         heading += f" (first {count} of {poses.count} poses)" if many else ""
     else:
-        name_abscissa(axes, swept.label)
+        axes.set_xlabel(swept.label)
+        tick_abscissa(axes, swept)
         axes.margins(x=0.02)
-    title(figure, heading, "bars: 99.7 % intervals; arrows: no failure was seen, upper end of the interval"
-          if _unseen(table).any() else "bars: 99.7 % intervals", left=0.95)  # fmt: skip
+    title(figure, heading, "whiskers: 99.7 % intervals; open arrows: no failure was seen, upper end of the interval"
+          if unseen.any() else "whiskers: 99.7 % intervals", left=0.95)  # fmt: skip
     legend_below(figure, list(entries.values()), list(entries))
     return figure
 
@@ -119,9 +127,9 @@ def _cycle(axes: Axes, table: Table, method: str, entries: Legend) -> None:
         look = LOOKS[method]
         low, high, value = (float(table[name][row]) for name in ("failure_low", "failure_high", "failure"))
         between = axes.axhspan(max(low, axes.get_ylim()[0]), high, color=look.color, alpha=0.15, linewidth=0)
-        if look.simulated:
+        if table["used"][row] == "bounds":
+            entries[f"whole cycle, bounds by {look.words}"] = between
+        else:
             entries[f"whole cycle, {look.words}"] = axes.axhline(
                 value, color=look.color, linestyle=(0, (7, 2)), linewidth=1.6
             )
-        else:
-            entries[f"whole cycle, {look.words} (bounds)"] = between

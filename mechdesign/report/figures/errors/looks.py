@@ -28,14 +28,15 @@ class Look:
         return self.dashes == ""
 
 
+# Vermilion is left to limits.
 LOOKS = {
     "analytic": Look("first order", style.BLUE, "D", "-"),
     "second_order": Look("second order", style.SKY, "s", "--"),
     "form": Look("FORM", style.GREEN, "P", ":"),
-    "monte_carlo": Look("Monte Carlo", style.VERMILION, "o", ""),
-    "quasi_monte_carlo": Look("quasi Monte Carlo", style.ORANGE, "^", ""),
+    "monte_carlo": Look("Monte Carlo", style.INK, "o", ""),
+    "quasi_monte_carlo": Look("quasi Monte Carlo", style.FAINT, "^", ""),
     "importance_sampling": Look("importance sampling", style.PURPLE, "X", ""),
-    "auto": Look("auto", style.INK, "*", ""),
+    "auto": Look("auto", style.ORANGE, "*", ""),
 }
 # What is nearest to the truth, the best first.
 _TRUST = ("auto", "importance_sampling", "quasi_monte_carlo", "monte_carlo", "second_order", "form", "analytic")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,9 +20,11 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
+Extend = Literal["neither", "min", "max", "both"]
+
 MOST_MAPS = 4
-# Neighbouring lines of a grid farther apart than this, in medians, belong to different patches.
-_JUMP = 6.0
+# Rays that differ in direction by less than this (radians) are the end of one patch and the begin of another.
+_SAME = 1e-6
 _LEFT, _BELOW, _BAR, _TOP, _GAP = 0.75, 0.55, 1.1, 0.7, 0.5  # inches
 _TALLEST = 5.2
 
@@ -34,11 +37,14 @@ class Plane:
     x: Floats
     y: Floats
     equal: bool
+    rays: bool
 
     def patches(self) -> Iterator[slice]:
-        """Lines that follow one another: a workspace in parts has gaps that are not to be filled."""
-        steps = np.nanmax(np.hypot(np.diff(self.x, axis=0), np.diff(self.y, axis=0)), axis=1, initial=0.0)
-        cuts = np.flatnonzero(steps > _JUMP * np.median(steps)) + 1 if len(steps) else np.zeros(0, dtype=int)
+        """Lines that belong together: rays of a workspace turn on within a patch, and stay or turn back to the next."""
+        cuts = np.zeros(0, dtype=int)
+        if self.rays:
+            ray = (self.x[:, -1] - self.x[:, 0]) + 1j * (self.y[:, -1] - self.y[:, 0])
+            cuts = np.flatnonzero(np.angle(ray[1:] / ray[:-1]) < _SAME) + 1
         for begin, end in zip([0, *cuts], [*cuts, len(self.x)], strict=True):
             if end - begin > 1:
                 yield slice(int(begin), int(end))
@@ -51,7 +57,9 @@ def plane(study: Study, poses: Poses) -> Plane | None:
         return None
     x, y = (poses.values[name].reshape(poses.grid) for name in names)
     quantities = {study.mechanism.quantity(name) for name in names}
-    return Plane((names[0], names[1]), x, y, quantities == {"length"})
+    section = study.reliability
+    assert section is not None
+    return Plane((names[0], names[1]), x, y, quantities == {"length"}, section.at_nodes)
 
 
 def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
@@ -114,13 +122,18 @@ def _map(axes: Axes, bar: Axes, over: Plane, values: Floats, logarithmic: bool) 
         bar.set_visible(False)
         return
     levels = _powers(values[known]) if logarithmic else _round(values[known])
-    norm = BoundaryNorm(levels, 256, extend="both")
-    # Below the last level is all that is smaller, a failure never seen too.
-    shown = np.ma.masked_invalid(np.maximum(values, 1e-3 * levels[0]) if logarithmic else values)
+    if logarithmic:
+        # Between nodes powers are interpolated; below the last level is all that is smaller, even 0.
+        values, levels = np.log10(np.maximum(values, 1e-3 * levels[0])), np.log10(levels)
+    shown = np.ma.masked_invalid(values)
+    ends = bool(shown.min() < levels[0]), bool(shown.max() > levels[-1])
+    extend: Extend = "both" if all(ends) else "min" if ends[0] else "max" if ends[1] else "neither"
+    norm = BoundaryNorm(levels, 256, extend=extend)
     for patch in over.patches():
         axes.contourf(over.x[patch], over.y[patch], shown[patch], levels=levels, cmap=style.COLORMAP, norm=norm,
-                      extend="both")  # fmt: skip
+                      extend=extend)  # fmt: skip
         axes.contour(over.x[patch], over.y[patch], shown[patch], levels=levels, colors="white", linewidths=0.5,
+                     linestyles="solid",
                      alpha=0.7)  # fmt: skip
         if over.equal:
             for end in (0, -1):
@@ -129,7 +142,7 @@ def _map(axes: Axes, bar: Axes, over: Plane, values: Floats, logarithmic: bool) 
     assert figure is not None
     colors = figure.colorbar(ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
     if logarithmic:
-        bar.set_yticks(levels, [_power(level) for level in levels])
+        bar.set_yticks(levels, [_power(10.0**level) for level in levels])
     bar.tick_params(labelsize=8)
     colors.outline.set_visible(False)
 

@@ -22,10 +22,11 @@ Floats = NDArray[np.float64]
 # More of them in one picture cannot be told apart.
 MOST_PANELS = 6
 SUFFIXES = {"position": "", "velocity": "_velocity", "acceleration": "_acceleration"}
-_LEFT, _RIGHT, _TOP, _APART = 0.95, 0.3, 0.62, 0.42  # inches
+_LEFT, _RIGHT, _TOP, _APART = 0.88, 0.3, 0.62, 0.42  # inches
 _TALL = 1.75
 # Below the lowest panel: its axis alone, and with a legend of one or two rows.
 BARE, WITH_LEGEND = 0.6, 0.95
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _LETTER = 0.56  # mean width of a letter in font sizes
 
 
@@ -111,14 +112,14 @@ def stack(
         axis.yaxis.set_label_coords(-(_LEFT - 0.05) / (style.WIDTH - _LEFT - _RIGHT), 0.5, transform=axis.transAxes)
         axis.yaxis.label.set_verticalalignment("top")
     axes[-1].xaxis.set_label_coords(0.5, -0.35 / tall, transform=axes[-1].transAxes)
-    name_abscissa(axes[-1], label)
+    axes[-1].set_xlabel(label)
     return figure, axes
 
 
-def name_abscissa(axis: Axes, label: str) -> None:
-    """Label the axis of a sweep; degrees are told in parts of a turn."""
-    axis.set_xlabel(label)
-    steps = [1, 1.5, 3, 4.5, 6, 9, 10] if label.endswith("[deg]") else [1, 2, 2.5, 5, 10]
+def tick_abscissa(axis: Axes, swept: Along) -> None:
+    """Places for the ticks of a sweep: degrees of much of a turn are told in parts of a turn."""
+    turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
+    steps = [1, 3, 4.5, 6, 9, 10] if turning else [1, 2, 2.5, 5, 10]
     axis.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=steps))
 
 
@@ -126,6 +127,14 @@ def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) 
     """One legend at the bottom, in as many columns as the width holds."""
     if labels:
         figure.legend(handles, labels, loc="lower center", ncols=fitting(labels), borderaxespad=0.2)
+
+
+def number(value: float) -> str:
+    """A probability in three digits, as it is set in print: 1.66·10⁻⁹."""
+    if value == 0 or value >= 1e-3:
+        return f"{value:.3g}"
+    digits, power = f"{value:.2e}".split("e")
+    return f"{digits}\N{MIDDLE DOT}10{str(int(power)).translate(_RAISED)}"
 
 
 def fitting(labels: Sequence[str]) -> int:

@@ -16,6 +16,7 @@ from mechdesign.report.figures.errors.panels import (
     error_limits,
     framed,
     legend_below,
+    number,
     stack,
     title,
 )
@@ -27,6 +28,8 @@ _FAR = 1.8
 # Above that many samples their axis is logarithmic.
 _MANY = 400_000
 _DASHED = (0, (5, 2))
+# Probabilities farther apart than this are drawn on a logarithmic scale.
+_WIDE = 50.0
 
 
 def histogram_figure(study: Study, table: Table, where: str, method: str) -> Figure:
@@ -50,10 +53,9 @@ def histogram_figure(study: Study, table: Table, where: str, method: str) -> Fig
         _limits(study, axis, output, order, unit, entries)
         axis.set_title(output if order == "position" else f"{output} {order}", loc="left", fontsize=9.5)
         axis.set_xlabel(style.axis_label("error", unit))
+        axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}"))
         axis.locator_params(axis="x", nbins=6)
         axis.locator_params(axis="y", nbins=5)
-    for axis in grid[: len(shown) : columns]:
-        axis.set_ylabel("density")
     title(figure, "Errors of made mechanisms", f"at {where}; {LOOKS[method].words}, {samples:,} samples", left=0.75)
     legend_below(figure, list(entries.values()), list(entries))
     return figure
@@ -97,7 +99,7 @@ def convergence_figure(table: Table, moments: Table, pose: int, where: str, meth
         axis.fill_between(samples, final - band, final + band, color=style.SKY, alpha=0.3, linewidth=0,
                           label="three standard errors")  # fmt: skip
         axis.plot(samples, mean, color=style.BLUE, marker="." if len(samples) == 1 else "", label="mean")
-        axis.axhline(moments["nominal"][row], color=style.VERMILION, linestyle="--", linewidth=1.0, label="nominal")
+        axis.axhline(moments["nominal"][row], color=style.INK, linestyle="--", linewidth=1.0, label="nominal")
         axis.set_ylabel(style.axis_label(output if order == "position" else f"{output}\n{order}", unit))
         axis.ticklabel_format(axis="y", useOffset=False)
     _sample_axis(axes[-1], table["samples"])
@@ -107,25 +109,36 @@ def convergence_figure(table: Table, moments: Table, pose: int, where: str, meth
 
 def trend_figure(table: Table, reliability: Table, pose: int, where: str) -> Figure:
     """Failure probability against the number of samples with its interval, beside what other methods say."""
+    known = [method for method in methods(reliability) if method != "monte_carlo"]
     figure, (axis,) = stack(1, "Failure probability as samples are added", "samples", note=f"at {where}", tall=2.8,
-                            bottom=1.15)  # fmt: skip
+                            bottom=0.65 + 0.1 * (len(known) + 3))  # fmt: skip
     samples, value, low, high = (table[name] for name in ("samples", "failure", "failure_low", "failure_high"))
-    axis.fill_between(samples, low, high, color=style.VERMILION, alpha=0.2, linewidth=0, label="99.7 % interval")
-    axis.plot(samples, value, color=style.VERMILION, marker="." if len(samples) == 1 else "", label="plain samples")
-    ends = [low[len(low) // 20 :].min(), high[len(high) // 20 :].max()]
-    for method in methods(reliability):
+    late = len(samples) // 20
+    ends = [low[late:].min(), value[-1], high[late:].max()]
+    lines = []
+    for method in known:
         row = np.flatnonzero(select(reliability, method=method, scope="pose"))[pose]
         failure = float(reliability["failure"][row])
-        if method == "monte_carlo" or not np.isfinite(failure):
-            continue
-        look = LOOKS[method]
-        used = str(reliability["used"][row])
-        words = look.words if used == method or used not in LOOKS else f"{look.words} ({LOOKS[used].words})"
-        axis.axhline(failure, color=look.color, linestyle=look.dashes or (0, (1, 1)), linewidth=1.4,
-                     label=f"{words}: {failure:.3g}")  # fmt: skip
-        ends.append(failure)
-    margin = 0.06 * (max(ends) - min(ends))
-    axis.set_ylim(max(min(ends) - margin, 0.0), max(ends) + margin)
+        if np.isfinite(failure):
+            look, used = LOOKS[method], str(reliability["used"][row])
+            by = "" if used == method else f" by {LOOKS[used].words}"
+            lines.append((failure, look, f"{look.words}{by}: {number(failure)}"))
+            ends.append(failure)
+    positive = [end for end in ends if end > 0]
+    floor = 0.0
+    if positive and max(positive) > _WIDE * min(positive):
+        axis.set_yscale("log")
+        floor = 0.3 * min(positive)
+        axis.set_ylim(floor, 2.0 * max(ends))
+    else:
+        margin = 0.06 * (max(ends) - min(ends))
+        axis.set_ylim(max(min(ends) - margin, 0.0), max(ends) + margin or 1.0)
+    axis.fill_between(samples, np.maximum(low, floor), high, color=style.INK, alpha=0.15, linewidth=0,
+                      label="plain samples, 99.7 % interval")  # fmt: skip
+    axis.plot(samples, value, color=style.INK, marker="." if len(samples) == 1 else "",
+              label=f"plain samples: {number(float(value[-1]))}")  # fmt: skip
+    for failure, look, words in lines:
+        axis.axhline(failure, color=look.color, linestyle=look.dashes or (0, (1, 1)), linewidth=1.4, label=words)
     axis.set_ylabel("failure probability")
     _sample_axis(axis, samples)
     legend_below(figure, *axis.get_legend_handles_labels())

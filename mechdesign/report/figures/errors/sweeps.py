@@ -21,6 +21,7 @@ from mechdesign.report.figures.errors.panels import (
     error_limits,
     legend_below,
     stack,
+    tick_abscissa,
 )
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -46,6 +47,7 @@ def _bands(study: Study, moments: Table, swept: Along) -> Figure:
     known = methods(moments)
     figure, axes = stack(len(shown), "Errors of made mechanisms: mean \N{PLUS-MINUS SIGN} 3 standard deviations",
                          swept.label)  # fmt: skip
+    tick_abscissa(axes[-1], swept)
     entries: dict[str, Any] = {}
     filled = next((method for method in known if not LOOKS[method].simulated), None)
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
@@ -80,6 +82,7 @@ def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
     """A panel for each order and unit; outputs by colour, methods by dashes or dots."""
     panels, known = _grouped(moments), methods(moments)
     figure, axes = stack(len(panels), heading, swept.label)
+    tick_abscissa(axes[-1], swept)
     single = all(len(outputs) == 1 for _, _, outputs in panels)
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
         for output, color in zip(outputs, style.PALETTE, strict=False):
@@ -110,6 +113,7 @@ def _difference(moments: Table, swept: Along, reference: str) -> Figure:
         swept.label,
         bottom=WITH_LEGEND if len(others) > 1 else BARE,
     )
+    tick_abscissa(axes[-1], swept)
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
         axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
         named = []

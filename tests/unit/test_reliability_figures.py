@@ -1,0 +1,275 @@
+"""Pictures of reliability: which are drawn for which study, and what is in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+from matplotlib.figure import Figure
+
+import mechdesign
+from mechdesign.report.figures import style
+from mechdesign.report.figures.errors.allocation import allocation_figure
+from mechdesign.report.figures.errors.contributions import contributions_figure
+from mechdesign.report.figures.errors.looks import LOOKS
+from mechdesign.report.figures.errors.maps import Plane
+from mechdesign.report.figures.errors.panels import number
+from mechdesign.report.figures.reliability import figures
+from mechdesign.results import Column, Table
+from mechdesign.study.reliability_models import METHODS
+
+SLIDER = """
+units: {length: mm}
+mechanism:
+  parameters: {r: 40, l: 120}
+  links:
+    ground: {O: [0, 0]}
+    crank: [O, A, r]
+    rod: [A, B, l]
+    slider: {B: [0, 0]}
+  joints:
+    guide: {prismatic: [ground, slider], through: O}
+  drives: [crank]
+  sketch: {A: [30, 20], B: [150, 0]}
+reliability:
+  dimensions: {r: 0.3, l: 0.3}
+  outputs: [B.x]
+  limits: {B.x: 0.2}
+  samples: 2000
+"""
+ARM = """
+units: {length: mm}
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    upper: [O, E, 100]
+    lower: [E, P, 80]
+  drives: {q1: {angle: upper}, q2: {angle: lower}}
+  sketch: {E: [70, 70], P: [50, 140]}
+workspace: {point: P, scan: {about: [0, 0]}}
+reliability:
+  dimensions: {"*.length": 0.3}
+  clearances: {E: {radial: 0.1, pin: normal_in_disc, link: lower}}
+  outputs: [P]
+  limits: {P: {radius: 0.25}}
+  samples: 2000
+"""
+LISTED = "reliability.poses=[{crank: 30}, {crank: 60}]"
+SWEPT = "reliability.sweep={crank: {from: 0, to: 180, step: 30}}"
+CORNER = "reliability.poses=[{q1: 30, q2: 90}]"
+
+
+def drawn(text: str, *overrides: str):
+    study = study_of(text, *overrides)
+    result = mechdesign.reliability(study)
+    with style.context():
+        found = figures(study, result)
+        for figure in found.values():
+            assert style.to_png(figure).startswith(b"\x89PNG")
+    return found, result
+
+
+def legend(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def texts(figure: Figure) -> str:
+    return " ".join(text.get_text() for text in figure.texts)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_alone_is_drawn(method: str) -> None:
+    found, _ = drawn(SLIDER, LISTED, f"reliability.methods=[{method}]")
+    assert {"reliability", "contributions"} <= set(found)
+    assert len(legend(found["reliability"])) >= 1
+    assert legend(found["reliability"])[0].startswith(LOOKS[method].words)
+
+
+def test_methods_look_different() -> None:
+    assert set(LOOKS) == set(METHODS)
+    for aspect in ("words", "color", "marker"):
+        assert len({getattr(look, aspect) for look in LOOKS.values()}) == len(LOOKS)
+
+
+def test_intervals_are_drawn_where_a_method_claims_one() -> None:
+    found, result = drawn(SLIDER, LISTED, "reliability.methods=[analytic, form, monte_carlo]")
+    axes = found["reliability"].axes[0]
+    (bars,) = axes.containers
+    table = result.tables["reliability"]
+    rows = table["method"] == "monte_carlo"
+    ends = np.sort(bars.lines[2][0].get_segments()[0][:, 1])
+    assert ends == pytest.approx([table["failure_low"][rows][0], table["failure_high"][rows][0]])
+    assert legend(found["reliability"]) == ["first order", "FORM", "Monte Carlo"]
+
+
+def test_auto_tells_what_it_used_and_what_it_cost() -> None:
+    found, result = drawn(SLIDER, LISTED, "reliability.methods=[auto]", "reliability.limits.B.x=0.5")
+    table = result.tables["reliability"]
+    (used,) = set(table["used"].tolist())
+    assert used != "auto"
+    assert legend(found["reliability"]) == [f"auto by {LOOKS[used].words}, {table['evaluations'].sum():,} solved"]
+
+
+def test_no_failure_seen_is_an_arrow_at_the_upper_end() -> None:
+    found, result = drawn(SLIDER, "reliability.poses=[{crank: 30}]", "reliability.methods=[analytic, monte_carlo]",
+                          "reliability.limits.B.x=1.2")  # fmt: skip
+    axes = found["reliability"].axes[0]
+    (arrow,) = (line for line in axes.lines if line.get_marker() == "v")
+    table = result.tables["reliability"]
+    high = float(table["failure_high"][table["method"] == "monte_carlo"][0])
+    assert arrow.get_ydata() == pytest.approx([high])
+    assert f"< {number(high)}" in [text.get_text() for text in axes.texts]
+    assert axes.get_yscale() == "log"
+
+
+def test_sweep_has_bands_with_limits_and_the_cycle() -> None:
+    found, result = drawn(SLIDER, SWEPT, "reliability.methods=[analytic, monte_carlo]")
+    assert set(found) == {"bands", "means", "deviations", "difference", "reliability", "contributions", "histogram",
+                          "convergence", "estimate"}  # fmt: skip
+    (axes,) = found["bands"].axes
+    assert axes.get_ylabel() == "error [mm]"
+    assert axes.get_xlabel() == "crank [deg]"
+    assert legend(found["bands"]) == ["first order", "Monte Carlo", "limit of the error"]
+    level = [line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1]
+    assert {-0.2, 0.0, 0.2} <= set(level)
+    moments = result.tables["moments"]
+    rows = moments["method"] == "monte_carlo"
+    high = (moments["mean"] - moments["nominal"] + 3 * moments["sigma"])[rows]
+    assert any(len(line.get_ydata()) == 7 and line.get_ydata() == pytest.approx(high) for line in axes.lines)
+    assert {"whole cycle, bounds by first order", "whole cycle, Monte Carlo"} <= set(legend(found["reliability"]))
+
+
+def test_velocities_have_panels_and_limits_of_their_own() -> None:
+    found, _ = drawn(SLIDER, SWEPT, "reliability.methods=[analytic, monte_carlo]", "reliability.rates={crank: 60}",
+                     "reliability.limits={B.x_velocity: {max: 0.3}}")  # fmt: skip
+    axes = found["bands"].axes
+    assert [axis.get_title(loc="left") for axis in axes] == ["B.x", "B.x velocity", "B.x acceleration"]
+    assert [axis.get_ylabel() for axis in axes] == ["error [mm]", "error [mm/s]", "error [mm/s²]"]
+    limits = [[line for line in axis.lines if line.get_color() == style.VERMILION] for axis in axes]
+    assert [len(lines) for lines in limits] == [0, 1, 0]
+    assert set(limits[1][0].get_ydata()) == {0.3}
+
+
+def test_histogram_shows_every_sample_and_the_limits() -> None:
+    found, _ = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]")
+    (axes,) = found["histogram"].axes
+    (bars,) = axes.containers
+    assert sum(bar.get_width() * bar.get_height() for bar in bars) == pytest.approx(1.0, abs=2e-3)
+    assert "2,000 samples" in texts(found["histogram"])
+    assert "crank = 30 deg" in texts(found["histogram"])
+    limits = [line.get_xdata()[0] for line in axes.lines if line.get_color() == style.VERMILION]
+    assert limits == [-0.2, 0.2]
+    assert axes.get_xlabel() == "error [mm]"
+    assert axes.get_ylabel() == "density [1/mm]"
+
+
+def test_a_far_limit_is_told_in_words() -> None:
+    found, _ = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]", "reliability.limits.B.x=5")
+    (axes,) = found["histogram"].axes
+    assert [text.get_text() for text in axes.texts] == ["limit -5, +5 mm, outside"]
+    assert max(abs(x) for x in axes.get_xlim()) < 2
+
+
+def test_estimate_stands_beside_the_other_methods() -> None:
+    found, result = drawn(SLIDER, LISTED, "reliability.methods=[analytic, form, monte_carlo]")
+    (axes,) = found["estimate"].axes
+    table = result.tables["reliability"]
+    first = {str(m): float(f) for m, f in zip(table["method"][:3], table["failure"][:3], strict=True)}
+    level = [
+        line.get_ydata()[0] for line in axes.lines if len(line.get_ydata()) == 2 and line.get_linestyle() != "None"
+    ]
+    assert {first["analytic"], first["form"]} <= set(level)
+    assert f"plain samples: {number(first['monte_carlo'])}" in legend(found["estimate"])
+
+
+def test_density_has_the_circle_of_the_limit() -> None:
+    found, _ = drawn(ARM, CORNER, "reliability.methods=[auto]")
+    axes = found["density_contours"].axes
+    assert [axis.patches[0].get_radius() for axis in axes] == [0.25, 0.25]
+    assert [axis.get_xlabel() for axis in axes] == ["P.x error [mm]"] * 2
+    assert axes[1].get_title() == "simulation (auto)"
+
+
+def test_density_of_velocities_has_their_limits() -> None:
+    found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
+                     "reliability.limits={P.x_velocity: 0.3, P.y_velocity: {min: -0.2, max: 0.3}}")  # fmt: skip
+    box = found["density_contours"].axes[0].patches[0]
+    assert (box.get_y(), box.get_height()) == pytest.approx((-0.2, 0.5))
+    assert found["density_contours"].axes[0].get_xlabel() == "P.x velocity error [mm/s]"
+
+
+def test_workspace_has_maps() -> None:
+    found, _ = drawn(ARM, "reliability.poses=workspace", "reliability.methods=[analytic]")
+    assert set(found) == {"deviation_map", "failure_map", "contributions"}
+    maps = found["deviation_map"].axes[::2]
+    assert [axis.get_title(loc="left") for axis in maps] == ["P.x [mm]", "P.y [mm]"]
+    assert all(axis.get_aspect() == 1 for axis in maps)
+    assert found["failure_map"].axes[0].get_xlabel() == "P.x [mm]"
+    # The arm turns as it likes: nothing depends on the direction, so every level is a circle about its shoulder.
+    lines = [line for line in found["failure_map"].axes[0].lines if len(line.get_xdata()) > 20]
+    assert np.hypot(*lines[0].get_xydata().T) == pytest.approx(np.full(len(lines[0].get_xdata()), 20.0), abs=0.1)
+
+
+def test_grid_of_drives_has_maps_over_them() -> None:
+    found, _ = drawn(ARM, "reliability.sweep={q1: {from: 0, to: 60, step: 20}, q2: {from: 80, to: 140, step: 15}}",
+                     "reliability.methods=[analytic]")  # fmt: skip
+    axes = found["failure_map"].axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("q1 [deg]", "q2 [deg]")
+    assert axes.get_aspect() == "auto"
+
+
+def test_patches_of_a_workspace_are_kept_apart() -> None:
+    def rays(*degrees: float):
+        return np.exp(1j * np.radians(degrees))[:, None] * np.linspace(1, 2, 4)
+
+    z = np.concatenate([rays(0, 10, 20), rays(20, 30), 3 * rays(20, 25, 30), rays(30)])
+    plane = Plane(("x", "y"), z.real, z.imag, True, True)
+    assert list(plane.patches()) == [slice(0, 3), slice(3, 5), slice(5, 8)]
+    assert list(Plane(("x", "y"), z.real, z.imag, True, False).patches()) == [slice(0, 9)]
+
+
+def test_path_in_the_plane_is_drawn_over_its_poses() -> None:
+    path = "reliability.path={P: [[60, 100], [70, 110], [80, 100], [70, 90], [60, 100]]}"
+    found, _ = drawn(ARM, path, "reliability.methods=[analytic]")
+    assert found["reliability"].axes[0].get_xlabel() == "pose along the path"
+    assert found["reliability"].axes[0].lines[0].get_xdata().tolist() == [1, 2, 3, 4, 5]
+
+
+def test_contributions_are_ranked_with_sobol_indices_beside() -> None:
+    study = study_of(SLIDER, "reliability.poses=[{crank: 60}]")
+    columns = {
+        "crank": [60.0, 60.0], "source": ["r", "l"], "output": ["B.x", "B.x"], "order": ["position"] * 2,
+        "share": [0.3, 0.7], "sobol_first": [0.28, 0.6], "sobol_first_low": [0.2, 0.5], "sobol_first_high": [0.3, 0.7],
+        "sobol_total": [0.4, 0.72], "sobol_total_low": [0.3, 0.7], "sobol_total_high": [0.5, 0.75],
+    }  # fmt: skip
+    table = Table("contributions", tuple(Column(name, np.array(values)) for name, values in columns.items()))
+    with style.context():
+        figure = contributions_figure(study, table, study.poses("reliability"))
+    (axes,) = figure.axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["l", "r"]
+    widths = [[bar.get_width() for bar in bars] for bars in axes.containers if hasattr(bars, "patches")]
+    assert widths == [pytest.approx([70, 30]), pytest.approx([60, 28]), pytest.approx([72, 40])]
+    assert legend(figure) == ["first-order share", "Sobol index, alone", "Sobol index, with all interactions"]
+
+
+def test_allocation_shows_given_beside_allocated() -> None:
+    study = study_of(SLIDER, LISTED, "reliability.allocate={reliability: 0.999}")
+    columns = {
+        "source": ["r", "l", "O"], "given": [0.3, 0.3, 0.1], "allocated": [0.2, 0.25, 0.1], "unit": ["mm"] * 3,
+        "cost_given": [10.0, 5.0, np.nan], "cost_allocated": [15.0, 6.0, np.nan], "share": [0.5, 0.4, 0.1],
+    }  # fmt: skip
+    table = Table("allocation", tuple(Column(name, np.array(values)) for name, values in columns.items()))
+    with style.context():
+        figure = allocation_figure(study, table)
+    tolerances, costs = figure.axes
+    assert [[bar.get_width() for bar in bars] for bars in tolerances.containers] == [[0.3, 0.3, 0.1], [0.2, 0.25, 0.1]]
+    assert [label.get_text() for label in tolerances.get_yticklabels()] == ["r", "l", "O"]
+    assert tolerances.get_xlabel() == "tolerance [mm]"
+    assert costs.get_xlabel() == "cost"
+    assert "0.999" in texts(figure)
+    assert "cost 15 as given, 21 allocated (+40.0 %)" in texts(figure)
+
+
+@pytest.mark.parametrize(("value", "text"), [(1.6566e-9, "1.66·10⁻⁹"), (0.0277, "0.0277"), (0.0, "0")])
+def test_probabilities_in_three_digits(value: float, text: str) -> None:
+    assert number(value) == text
