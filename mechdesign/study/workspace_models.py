@@ -23,11 +23,14 @@ from mechdesign.study.numbers import (
 )
 
 INDEX_NAMES = (
-    "inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max", "k_min", "sigma_position",
-    "reliability",
+    "inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max", "k_min", "k_direction",
+    "deflection", "sigma_position", "reliability",
 )  # fmt: skip
 # The section of the study that an index needs beside the workspace.
-NEEDED = {"k_min": "stiffness", "sigma_position": "reliability", "reliability": "reliability"}
+NEEDED = {
+    "k_min": "stiffness", "k_direction": "stiffness", "deflection": "stiffness", "sigma_position": "reliability",
+    "reliability": "reliability",
+}  # fmt: skip
 
 
 class Scan(Model):

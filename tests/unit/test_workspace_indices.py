@@ -193,16 +193,20 @@ def test_only_the_indices_asked_for() -> None:
 
 def test_stiffness_and_position_errors_are_indices() -> None:
     """The same numbers as the questions themselves give at the nodes of the workspace."""
-    study = study_of(FIVE_BAR, ERRORS, ELASTIC, "workspace.indices=[k_min, sigma_position, reliability]",
-                     "workspace.integrate.tolerance=1e-3")  # fmt: skip
+    names = ["k_min", "k_direction", "deflection", "sigma_position", "reliability"]
+    study = study_of(FIVE_BAR, ERRORS, ELASTIC, f"workspace.indices=[{', '.join(names)}]", "stiffness.direction=30",
+                     "stiffness.loads=[[100, 0], [0, 50]]", "workspace.integrate.tolerance=1e-3")  # fmt: skip
     row = mechdesign.workspace(study).main
     poses = study.poses("stiffness")
     place = poses.values["P.x"] + 1j * poses.values["P.y"]
     assert 1000 < poses.count <= 2000
     found = questions(study)[0].field.local(place, {})
-    indices = prepare(study, ["k_min", "sigma_position", "reliability"])
-    k_min, sigma, chance = (np.asarray(index.values(found)) for index in indices)
-    assert k_min == pytest.approx(mechdesign.stiffness(study).main["k_min"], rel=1e-6)
+    k_min, k_direction, deflection, sigma, chance = (np.asarray(i.values(found)) for i in prepare(study, names))
+    stiff = mechdesign.stiffness(study)
+    assert k_min == pytest.approx(stiff.main["k_min"], rel=1e-6)
+    assert k_direction == pytest.approx(stiff.main["k_direction"], rel=1e-6)
+    moved = np.hypot(stiff.tables["deflections"]["dx"], stiff.tables["deflections"]["dy"]).reshape(-1, 2)
+    assert deflection == pytest.approx(moved.max(axis=1), rel=1e-6)
     errors = mechdesign.reliability(study)
     moments = errors.tables["moments"]
     x, y = (moments["sigma"][moments["output"] == f"P.{axis}"] for axis in "xy")
@@ -230,6 +234,13 @@ def test_what_indices_need(change: str, said: str | None) -> None:
         return
     with pytest.raises(StudyError, match=said):
         study_of(FIVE_BAR, change)
+
+
+@pytest.mark.parametrize(("name", "said"), [("k_direction", "needs a direction"), ("deflection", "needs loads")])
+def test_stiffness_indices_need_what_they_are_about(name: str, said: str) -> None:
+    study = study_of(FIVE_BAR, ELASTIC, f"workspace.indices=[{name}]")
+    with pytest.raises(StudyError, match=said):
+        mechdesign.workspace(study)
 
 
 def test_reliability_as_an_index_needs_limits() -> None:

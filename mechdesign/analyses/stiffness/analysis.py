@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import judge_failures, pose_in_words, solve_poses
 from mechdesign.analyses.stiffness.compliance import Held
-from mechdesign.analyses.stiffness.force_method import load, twists_of
+from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
 from mechdesign.analyses.stiffness.legs import Guide, Hinge, Leg, NotSerialError, find_legs
 from mechdesign.analyses.stiffness.loads import Effects, displacements_table, effects_of, forces_table
 from mechdesign.analyses.stiffness.network import Network, build_network
@@ -213,20 +213,27 @@ def ask(study: Study) -> Asked:
     return Asked(section, legs, network, 2 if section.link is None else 3, condensed, length)
 
 
-def evaluate(asked: Asked, configuration: Configuration) -> tuple[Held, list[Springs], Effects | None]:
-    """Stiffness and springs in a batch of assembled poses of shape (n,), and what the study's loads do."""
+def hold(asked: Asked, configuration: Configuration) -> tuple[Held, list[Springs]]:
+    """Stiffness and springs in a batch of assembled poses of shape (n,)."""
     section = asked.section
-    serial = None
     if asked.legs is not None:
-        serial = hold_by_legs(asked.legs, section, configuration, asked.length, asked.size, asked.condensed)
-        if not section.loads:
-            return *serial, None
-    loaded = load(
-        asked.network, twists_of(asked.network, section, configuration, asked.length), asked.length, asked.size
-    )
-    effects = effects_of(asked.network, loaded, section.at, configuration, section.loads) if section.loads else None
-    held, springs = serial if serial is not None else (loaded.held, [])
-    return held, springs, effects
+        return hold_by_legs(asked.legs, section, configuration, asked.length, asked.size, asked.condensed)
+    return _loaded(asked, configuration).held, []
+
+
+def evaluate(asked: Asked, configuration: Configuration) -> tuple[Held, list[Springs], Effects | None]:
+    """As `hold`, and what the study's loads do."""
+    section = asked.section
+    if not section.loads:
+        return *hold(asked, configuration), None
+    loaded = _loaded(asked, configuration)
+    held, springs = hold(asked, configuration) if asked.legs is not None else (loaded.held, [])
+    return held, springs, effects_of(asked.network, loaded, section.at, configuration, section.loads)
+
+
+def _loaded(asked: Asked, configuration: Configuration) -> Loaded:
+    twists = twists_of(asked.network, asked.section, configuration, asked.length)
+    return load(asked.network, twists, asked.length, asked.size)
 
 
 def _cautions(

@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from mechdesign.analyses.workspace.indices import (
+    deflection,
     inverse_condition,
+    k_direction,
     k_min,
     manipulability,
     reliability,
@@ -22,7 +24,8 @@ from mechdesign.analyses.workspace.indices.local import Local
 from mechdesign.study import Study
 
 _MODULES = (
-    inverse_condition, resistivity, manipulability, sigma_min, sigma_max, k_min, sigma_position, reliability,
+    inverse_condition, resistivity, manipulability, sigma_min, sigma_max, k_min, k_direction, deflection,
+    sigma_position, reliability,
 )  # fmt: skip
 INDICES: Mapping[str, Index] = {module.INDEX.name: module.INDEX for module in _MODULES}
 OF_JACOBIAN = tuple(name for name, index in INDICES.items() if not index.section)

@@ -1,0 +1,38 @@
+"""Stiffness of the point of the stiffness section in the direction that it names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechdesign.analyses.workspace.indices.compliance import of_compliance
+from mechdesign.analyses.workspace.indices.index import Evaluate, Index
+from mechdesign.errors import Problem, StudyError
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
+
+
+def prepare(study: Study) -> Evaluate:
+    """As ``k_direction`` of stiffness.csv; 0 where the point is free.
+
+    Raises
+    ------
+    StudyError
+        If the section names no direction.
+    """
+    assert study.stiffness is not None
+    direction = study.stiffness.direction
+    if direction is None:
+        message = "the index 'k_direction' needs a direction, for example {direction: 90}"
+        raise StudyError((Problem(message, "stiffness.direction", str(study.path or "")),))
+    turn = direction * study.units.angle_factor
+    along = np.array([np.cos(turn), np.sin(turn)])
+    return of_compliance(study, lambda soft: 1 / np.einsum("i,nij,j->n", along, soft[:, :2, :2], along), 0.0)
+
+
+INDEX = Index(
+    "k_direction", "stiffness to a force in the stiffness section's direction, at its point", prepare,
+    lambda study, field: study.units.label("stiffness"), crossing=0.0, section="stiffness",
+)  # fmt: skip
