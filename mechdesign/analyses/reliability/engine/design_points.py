@@ -6,19 +6,20 @@ for reliability analysis, 1995, whose merit function makes the iteration converg
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.reliability.engine.problem import Floats, Problem
+from mechdesign.analyses.reliability.engine.problem import Floats, Problem, failed
 
 Ints = NDArray[np.intp]
 
-# Standard deviations of the samples that starts are taken from, how many of each, and of how many failures.
+# Standard deviations of the samples that starts are taken from, how many of each, and starts of one limit.
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
-SAMPLES, STARTS = 160, 3
-ITERATIONS = 40
+SAMPLES, STARTS = 160, 8
+EXPLORED = len(SPREADS) * SAMPLES
+HALVINGS, ITERATIONS = 10, 40
 # Fractions of a step that are tried where the whole of it does not improve.
 FRACTIONS = np.array([0.5, 0.25, 0.0625])
 # A point is a design point where a step is shorter than this, or nothing improves, and the margin this small.
@@ -39,11 +40,14 @@ class DesignPoints:
         Which limit; -1 where the margins end.
     normal : ndarray, shape (points, dimension)
         Unit vectors into the failure.
+    seen : ndarray, shape (dimension, n)
+        Failures among the samples of all spreads.
     """
 
     u: Floats
     limit: Ints
     normal: Floats
+    seen: Floats
 
     @property
     def distance(self) -> Floats:
@@ -53,46 +57,63 @@ class DesignPoints:
 
 def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     """Look for the design points of all limits."""
-    limits, u, lost = _starts(problem, rng)
-    scale = np.abs(problem.margins(np.zeros((problem.dimension, 1))))[:, 0]
-    scale = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
-    found = _descend(problem, limits, u, scale)
-    # Where margins end there is no slope: the end is bracketed along the ray, and its normal taken to be the ray's.
-    ends = _ends(problem, lost)
-    points = np.concatenate([found.u, ends])
-    limit = np.concatenate([found.limit, np.full(len(ends), -1, dtype=np.intp)])
-    length = np.linalg.norm(ends, axis=1, keepdims=True)
-    normal = np.concatenate([found.normal, ends / np.where(length > 0, length, 1.0)])
-    return _distinct(DesignPoints(points, limit, normal))
-
-
-def _starts(problem: Problem, rng: np.random.Generator) -> tuple[Ints, Floats, Floats]:
-    """Limit and place of each start, and places without margins.
-
-    Of every limit a point by the mean, and the failures that are found nearest to it by samples of growing spread.
-    """
     d = problem.dimension
     near = 0.1 * rng.standard_normal((d, 1)) / np.sqrt(d)
-    count = len(problem.margins(near))
-    limits, places = [np.arange(count)], [np.repeat(near, count, axis=1)]
-    seen = np.zeros(count, dtype=int)
-    lost: list[Floats] = []
-    for spread in SPREADS:
-        u = spread * rng.standard_normal((d, SAMPLES))
-        margins = problem.margins(u)
-        nowhere = np.any(np.isnan(margins), axis=0)
-        order = np.argsort((u**2).sum(axis=0), kind="stable")
-        lost += [u[:, k] for k in order[nowhere[order]][: STARTS - len(lost)]]
-        for limit in np.flatnonzero(seen < STARTS):
-            chosen = order[(margins[limit] < 0)[order]][: STARTS - seen[limit]]
-            seen[limit] += len(chosen)
-            limits.append(np.full(len(chosen), limit))
-            places.append(u[:, chosen])
-    return np.concatenate(limits), np.concatenate(places, axis=1), np.array(lost).reshape(-1, d)
+    u = np.concatenate([near, *(spread * rng.standard_normal((d, SAMPLES)) for spread in SPREADS)], axis=1)
+    margins = problem.margins(u)
+    limit, starts = _starts(problem, u, margins)
+    ends = starts[:, limit < 0]
+    limits = np.arange(len(margins))
+    starts = np.concatenate([np.repeat(near, len(limits), axis=1), starts[:, limit >= 0]], axis=1)
+    scale = np.abs(problem.margins(np.zeros((d, 1))))[:, 0]
+    scale = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
+    found = _descend(problem, np.concatenate([limits, limit[limit >= 0]]), starts, scale)
+    # Where margins end there is no slope: the end's normal is taken to be the ray's.
+    length = np.linalg.norm(ends, axis=0)
+    points = _distinct(
+        np.concatenate([found[0], ends], axis=1),
+        np.concatenate([found[1], np.full(len(length), -1, dtype=np.intp)]),
+        np.concatenate([found[2], ends / np.where(length > 0, length, 1.0)], axis=1),
+    )
+    return replace(points, seen=u[:, failed(margins)])
 
 
-def _descend(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> DesignPoints:
-    """Step all starts, shape (dimension, starts), to the nearest point of their limits."""
+def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]:
+    """Limits (-1 where margins end) and their edges towards samples, shape (dimension, starts), that lie far apart.
+
+    A limit may be reached in several directions.
+    """
+    nowhere = np.isnan(margins).any(axis=0)
+    broken = [(margin < 0) & ~nowhere for margin in margins]
+    chosen = [_apart(u[:, beyond]) for beyond in (*broken, nowhere)]
+    limit = np.repeat([*range(len(margins)), -1], [part.shape[1] for part in chosen])
+    far = np.concatenate(chosen, axis=1)
+    low, high = np.zeros(len(limit)), np.ones(len(limit))
+    for _ in range(HALVINGS if len(limit) else 0):
+        middle = 0.5 * (low + high)
+        found = problem.margins(middle * far)
+        ended = np.isnan(found).any(axis=0)
+        out = np.where(limit < 0, ended, ended | (found[limit, np.arange(len(limit))] < 0))
+        high, low = np.where(out, middle, high), np.where(out, low, middle)
+    return limit, np.asarray(high * far)
+
+
+def _apart(u: Floats) -> Floats:
+    """The nearest point, and one after the other the one whose direction is farthest from those chosen."""
+    if not u.shape[1]:
+        return u
+    size = np.linalg.norm(u, axis=0)
+    directions = u / np.where(size > 0, size, 1.0)
+    chosen = [int(np.argmin(size))]
+    cosine = directions[:, chosen[0]] @ directions
+    while len(chosen) < STARTS and cosine.min() < ALIKE:
+        chosen.append(int(np.argmin(cosine)))
+        cosine = np.maximum(cosine, directions[:, chosen[-1]] @ directions)
+    return u[:, chosen]
+
+
+def _descend(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats]:
+    """Step all starts, shape (dimension, starts), to the nearest point of their limits: points, limits, normals."""
     active = np.ones(len(limit), dtype=bool)
     good = np.zeros(len(limit), dtype=bool)
     normal = np.zeros_like(u)
@@ -124,7 +145,8 @@ def _descend(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> DesignP
         done = (np.linalg.norm(step, axis=0) < SHORT * (1 + np.linalg.norm(at, axis=0))) | ~(merit < before)
         good[lanes[done]] = np.abs(g[done]) < ZERO
         active[lanes[done]] = False
-        u[:, lanes[~done]] = trial[:, ~done]
+        better = merit < before
+        u[:, lanes[better]] = trial[:, better]
         # Starts that have come together go on as one.
         for i, lane in enumerate(lanes):
             others = lanes[:i][active[lanes[:i]] | good[lanes[:i]]]
@@ -135,7 +157,7 @@ def _descend(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> DesignP
     if lanes.size:
         margins = problem.margins(u[:, lanes])
         good[lanes] = np.abs(margins[limit[lanes], np.arange(len(lanes))] / scale[limit[lanes]]) < 10 * ZERO
-    return DesignPoints(u.T[good], limit[good], normal.T[good])
+    return u[:, good], limit[good], normal[:, good]
 
 
 def _merit(problem: Problem, u: Floats, limit: Ints, scale: Floats, weight: Floats) -> Floats:
@@ -145,31 +167,25 @@ def _merit(problem: Problem, u: Floats, limit: Ints, scale: Floats, weight: Floa
     return np.asarray(np.where(np.isfinite(merit), merit, np.inf))
 
 
-def _ends(problem: Problem, lost: Floats) -> Floats:
-    """The first points without margins on the rays to `lost`, shape (points, dimension)."""
-    if not len(lost):
-        return lost
-    low, high = np.zeros(len(lost)), np.ones(len(lost))
-    for _ in range(12):
-        middle = 0.5 * (low + high)
-        nowhere = np.isnan(problem.margins((middle[:, None] * lost).T)).any(axis=0)
-        high, low = np.where(nowhere, middle, high), np.where(nowhere, low, middle)
-    return np.asarray(high[:, None] * lost)
-
-
-def _distinct(points: DesignPoints) -> DesignPoints:
+def _distinct(u: Floats, limit: Ints, normal: Floats) -> DesignPoints:
     """Nearest first, each place once."""
-    order = np.argsort(points.distance, kind="stable")
+    order = np.argsort((u * normal).sum(axis=0), kind="stable")
     kept: list[int] = []
     for k in order.tolist():
         if len(kept) == MOST:
             break
-        same = [j for j in kept if _alike(points.u[k], points.u[j]) and points.normal[k] @ points.normal[j] > ALIKE]
-        if not same:
+        if not any(_alike(u[:, k], u[:, j]) and normal[:, k] @ normal[:, j] > ALIKE for j in kept):
             kept.append(k)
-    return DesignPoints(points.u[kept], points.limit[kept], points.normal[kept])
+    return DesignPoints(u.T[kept], limit[kept], normal.T[kept], u[:, :0])
 
 
 def _alike(one: Floats, other: Floats) -> bool:
     gap = float(np.linalg.norm(one - other))
     return gap < 0.3 or gap < 0.2 * float(np.linalg.norm(one))
+
+
+def explored_weights(u: Floats) -> Floats:
+    """Standard normal density over that of the samples of all spreads, at `u` of shape (dimension, n): shape (n,)."""
+    half, d = 0.5 * (u * u).sum(axis=0), len(u)
+    logs = np.stack([half * (1 - spread**-2) - d * np.log(spread) for spread in SPREADS])
+    return np.asarray(len(SPREADS) / np.exp(logs).sum(axis=0))

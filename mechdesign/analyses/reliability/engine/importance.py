@@ -8,10 +8,11 @@ sampling, 2000.]
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.design_points import DesignPoints
+from mechdesign.analyses.reliability.engine.design_points import EXPLORED, MOST, DesignPoints, explored_weights
 from mechdesign.analyses.reliability.engine.intervals import weighted
 from mechdesign.analyses.reliability.engine.precision import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Floats, Problem, failed
@@ -19,7 +20,11 @@ from mechdesign.analyses.reliability.engine.problem import Estimate, Floats, Pro
 # Points farther than the nearest one by this many standard deviations bring nothing.
 FAR = 4.0
 # Rounds of learning, and their samples a dimension and at least. All rounds' failures are learned from together.
-ROUNDS, SAMPLES, LEAST = 5, 150, 1200
+ROUNDS, SAMPLES, LEAST = 6, 40, 1600
+# Learned enough where the relative variance of a round's weights is below this.
+GOOD = 2.0
+# A part more, of this weight, where a failure adds so much to that variance and lacks so many times its samples.
+ADDED, LACKING = 0.05, (0.1, 10.0)
 # Share of the samples that stay with the design points, and with the least of them.
 FIXED, SMALLEST = 0.1, 0.02
 # A learned covariance is what it would be if so many samples a dimension of the standard normal law had been seen too.
@@ -45,6 +50,11 @@ class Mixture:
     centre: Floats
     root: Floats
 
+    @cached_property
+    def inverse(self) -> Floats:
+        """Inverse factors."""
+        return np.asarray(np.linalg.inv(self.root), dtype=np.float64)
+
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Points, shape (dimension, count)."""
         part = rng.choice(len(self.weight), count, p=self.weight)
@@ -57,12 +67,12 @@ class Mixture:
 
     def logs(self, u: Floats) -> Floats:
         """Logarithm of each part's weighted density over the standard normal one at 0, shape (parts, n)."""
-        from scipy.linalg import solve_triangular
-
         found = np.empty((len(self.weight), u.shape[1]))
-        for k, (weight, centre, root) in enumerate(zip(self.weight, self.centre, self.root, strict=True)):
-            z = solve_triangular(root, u - centre[:, None], lower=True, check_finite=False)
-            found[k] = np.log(weight) - np.log(np.diagonal(root)).sum() - 0.5 * (z * z).sum(axis=0)
+        constant = np.log(self.weight) - np.log(np.diagonal(self.root, axis1=1, axis2=2)).sum(axis=1)
+        for row, one, inverse, centre in zip(found, constant, self.inverse, self.centre, strict=True):
+            z = inverse @ u
+            z -= (inverse @ centre)[:, None]
+            row[:] = one - 0.5 * np.einsum("dn,dn->n", z, z)
         return found
 
 
@@ -89,8 +99,8 @@ def importance_sampling(
     """
     if not len(points.u):
         return Estimate(0.0, 0.0, 1.0, problem.evaluations)
-    mixture = _learned(problem, _about(points), rng)
-    total = squares = 0.0
+    mixture = _learned(problem, points, rng)
+    total = squares = most = 0.0
     done = failures = invalid = 0
     wanted = samples if precision is None else min(FIRST, samples)
     while done < wanted:
@@ -99,15 +109,16 @@ def importance_sampling(
         margins = problem.margins(u)
         broken = failed(margins)
         weights = _weights(mixture, u[:, broken])
-        total, squares = total + float(weights.sum()), squares + float((weights * weights).sum())
+        total, squares = total + float(weights.sum()), squares + float(weights @ weights)
+        most = max(most, float(weights.max(initial=0.0)))
         done, failures = done + count, failures + int(broken.sum())
         invalid += int(np.isnan(margins).any(axis=0).sum())
         if done == wanted < samples and precision is not None and total > 0:
             mean = total / done
-            if not precision.reached(mean, *weighted(total, squares, done)):
+            if not precision.reached(mean, *weighted(total, squares, most, done)):
                 more = MARGIN * precision.needed(mean, squares / done - mean * mean)
                 wanted = int(min(samples, max(1.2 * done, more)))
-    low, high = weighted(total, squares, done)
+    low, high = weighted(total, squares, most, done)
     return Estimate(total / done, low, high, problem.evaluations, done, failures, invalid)
 
 
@@ -132,29 +143,63 @@ def _weights(mixture: Mixture, u: Floats) -> Floats:
     return np.asarray(np.exp(-0.5 * (u * u).sum(axis=0) - most) / np.exp(logs - most).sum(axis=0))
 
 
-def _learned(problem: Problem, fixed: Mixture, rng: np.random.Generator) -> Mixture:
+def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> Mixture:
     """The mixture nearest to the failures, beside the fixed one: one step of expectation and maximisation a round."""
-    mixture, parts = fixed, fixed
+    fixed = _about(points)
+    # The samples that starts were taken from know of places where no design point is.
+    parts = _covering(fixed, fixed, points.seen, explored_weights(points.seen), EXPLORED)
     count = max(LEAST, SAMPLES * problem.dimension)
     seen, known = [], []
-    for _ in range(ROUNDS):
+    for rounds in range(1, ROUNDS + 1):
+        mixture = _beside(fixed, parts)
         u = mixture.draw(rng, count)
         u = u[:, failed(problem.margins(u))]
+        weights = _weights(mixture, u)
         seen.append(u)
-        known.append(_weights(mixture, u))
-        learned = _fitted(parts, np.concatenate(seen, axis=1), np.concatenate(known))
-        if learned is not None:
-            parts = learned
-            mixture = Mixture(
-                np.concatenate([FIXED * fixed.weight, (1 - FIXED) * parts.weight]),
-                np.concatenate([fixed.centre, parts.centre]),
-                np.concatenate([fixed.root, parts.root]),
-            )
-    return mixture
+        known.append(weights)
+        failures, worth = np.concatenate(seen, axis=1), np.concatenate(known)
+        parts = _covering(fixed, _fitted(parts, failures, worth), failures, worth, rounds * count)
+        if count * float(weights @ weights) < (1.0 + GOOD) * float(weights.sum()) ** 2:
+            break
+    return _beside(fixed, parts)
 
 
-def _fitted(parts: Mixture, u: Floats, weights: Floats) -> Mixture | None:
-    """Parts with the means and covariances of the failures that are theirs; None where there are too few."""
+def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: int) -> Mixture:
+    """`parts`, and more of them where failures are that both mixtures have far too few samples of.
+
+    Parameters
+    ----------
+    u : ndarray, shape (dimension, n)
+        Failures that were seen among `drawn` samples.
+    worth : ndarray, shape (n,)
+        Their weights when they were drawn.
+    """
+    total = float(worth.sum())
+    while total > 0 and len(parts.weight) < MOST:
+        # Density of failures over that of the mixture: its mean over failures is 1 and the weights' relative variance.
+        lack = _weights(_beside(fixed, parts), u) * (drawn / total)
+        adds = lack * worth / total
+        worst = int(np.argmax(adds))
+        if adds[worst] < LACKING[0] or lack[worst] < LACKING[1]:
+            break
+        parts = Mixture(
+            np.append((1 - ADDED) * parts.weight, ADDED),
+            np.concatenate([parts.centre, u[:, worst][None]]),
+            np.concatenate([parts.root, np.eye(len(u))[None]]),
+        )
+    return parts
+
+
+def _beside(fixed: Mixture, parts: Mixture) -> Mixture:
+    return Mixture(
+        np.concatenate([FIXED * fixed.weight, (1 - FIXED) * parts.weight]),
+        np.concatenate([fixed.centre, parts.centre]),
+        np.concatenate([fixed.root, parts.root]),
+    )
+
+
+def _fitted(parts: Mixture, u: Floats, weights: Floats) -> Mixture:
+    """Parts with the means and covariances of the failures that are theirs; as they were where none failed."""
     logs = parts.logs(u)
     share = np.exp(logs - logs.max(axis=0, initial=-np.inf))
     share *= weights / share.sum(axis=0)
@@ -174,5 +219,5 @@ def _fitted(parts: Mixture, u: Floats, weights: Floats) -> Mixture | None:
         centres.append(centre)
         roots.append(np.linalg.cholesky(covariance))
     if not weight:
-        return None
+        return parts
     return Mixture(np.array(weight) / sum(weight), np.array(centres), np.array(roots))

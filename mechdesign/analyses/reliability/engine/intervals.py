@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv, ndtri, stdtrit
+from scipy.special import betaincinv, gammaincinv, stdtrit
 
 Floats = NDArray[np.float64]
 
@@ -21,17 +21,29 @@ def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple
     return float(low), float(high)
 
 
-def weighted(total: float, squares: float, samples: int) -> tuple[float, float]:
-    """Interval of the mean of positive weights, many of them zero, from their sum and sum of squares.
+def weighted(total: float, squares: float, most: float, samples: int) -> tuple[float, float]:
+    """Interval of the mean of positive weights, many of them zero, from their sum, sum of squares and the largest.
 
-    Of the logarithm, since such means are skewed: it reaches farther up than down.
+    That of a gamma law with the mean's moments; its upper end counts on one more of the largest weight, so that it is
+    exact where all weights that are not zero are equal and rare. [Fay & Feuer, Confidence intervals for directly
+    standardized rates, 1997.]
     """
     mean = total / samples
     if mean <= 0:
         return 0.0, 1.0
     variance = max(squares / samples - mean * mean, 0.0) / max(samples - 1, 1)
-    spread = float(-ndtri(0.5 * (1.0 - CONFIDENCE))) * np.sqrt(variance) / mean
-    return float(mean * np.exp(-spread)), float(min(mean * np.exp(spread), 1.0))
+    one, tail = most / samples, 0.5 * (1.0 - CONFIDENCE)
+    low = _gamma(mean, variance, tail)
+    high = _gamma(mean + one, variance + one * one, 1.0 - tail)
+    return low, min(high, 1.0)
+
+
+def _gamma(mean: float, variance: float, share: float) -> float:
+    """Quantile of a gamma law."""
+    # Below the rounding of the sums the law is its mean.
+    if variance <= 1e-20 * mean * mean:
+        return mean
+    return float(gammaincinv(mean * mean / variance, share)) * variance / mean
 
 
 def replicated(means: Floats) -> tuple[float, float]:
