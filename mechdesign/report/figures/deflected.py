@@ -141,15 +141,21 @@ def free_motion(study: Study, result: Result) -> Figure | None:
     body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
     turn = float(table["free_phi"][row]) if "free_phi" in table else 0.0
     rest = np.array([*body[1:], *body[1:2]] if len(body) > 1 else body)
-    move = complex(table["free_x"][row], table["free_y"][row]) + 1j * turn * (rest - at)
+    shift = complex(table["free_x"][row], table["free_y"][row])
+    move = shift + 1j * turn * (rest - at)
     scale = _MOVED * scene.span / max(float(np.abs(move).max()), 1e-300)
-    places = np.concatenate([[*scene.points.values()], rest + scale * move, rest - scale * move])
+    if turn:
+        # Turned about its instantaneous centre, so that it keeps its shape.
+        centre = at + 1j * shift / turn
+        ways = [centre + (rest - centre) * np.exp(1j * way * scale * turn) for way in (1, -1)]
+    else:
+        ways = [rest + way * scale * move for way in (1, -1)]
+    places = np.concatenate([[*scene.points.values()], *ways])
     figure, axes = equal_canvas(places, study.units.label("length"))
     draw_mechanism(axes, study.mechanism, configuration)
-    for way, dash in ((1, "-"), (-1, "--")):
-        line = rest + way * scale * move
+    for line, dash in zip(ways, ("-", "--"), strict=True):
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
-                  marker="o" if len(rest) == 1 else None, label="free to move" if way > 0 else None)  # fmt: skip
+                  marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
     axes.set_title(f"free motion at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
     return figure
