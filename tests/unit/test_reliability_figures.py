@@ -255,7 +255,8 @@ def test_contributions_are_ranked_with_sobol_indices_beside() -> None:
 def test_allocation_shows_given_beside_allocated() -> None:
     study = study_of(SLIDER, LISTED, "reliability.allocate={reliability: 0.999}")
     columns = {
-        "source": ["r", "l", "O"], "given": [0.3, 0.3, 0.1], "allocated": [0.2, 0.25, 0.1], "unit": ["mm"] * 3,
+        "source": ["r", "l", "O"], "kind": ["tolerance", "sigma", "clearance"], "given": [0.3, 0.3, 0.1],
+        "allocated": [0.2, 0.25, 0.1], "unit": ["mm"] * 3,
         "cost_given": [10.0, 5.0, np.nan], "cost_allocated": [15.0, 6.0, np.nan], "share": [0.5, 0.4, 0.1],
     }  # fmt: skip
     table = Table("allocation", tuple(Column(name, np.array(values)) for name, values in columns.items()))
@@ -263,7 +264,7 @@ def test_allocation_shows_given_beside_allocated() -> None:
         figure = allocation_figure(study, table)
     tolerances, costs = figure.axes
     assert [[bar.get_width() for bar in bars] for bars in tolerances.containers] == [[0.3, 0.3, 0.1], [0.2, 0.25, 0.1]]
-    assert [label.get_text() for label in tolerances.get_yticklabels()] == ["r", "l", "O"]
+    assert [label.get_text() for label in tolerances.get_yticklabels()] == ["r", "l (sigma)", "O (clearance)"]
     assert tolerances.get_xlabel() == "tolerance [mm]"
     assert costs.get_xlabel() == "cost"
     assert "0.999" in texts(figure)

@@ -18,7 +18,10 @@ _LINE = 0.36  # inches
 def allocation_figure(study: Study, table: Table) -> Figure:
     """Bars for each source: its tolerance, given and allocated, and its cost."""
     rows = np.arange(len(table))[:MOST_SOURCES]
-    names = [f"{table['source'][row]}" for row in rows]
+    kinds = [str(table["kind"][row]) for row in rows]
+    names = [
+        f"{table['source'][row]}" + f" ({kind})" * (kind != "tolerance") for row, kind in zip(rows, kinds, strict=True)
+    ]
     units = [str(table["unit"][row]) for row in rows]
     margin = 0.35 + 0.075 * max(len(name) for name in names)
     height = 0.8 + _LINE * len(rows) + 1.05
