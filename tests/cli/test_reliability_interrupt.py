@@ -1,0 +1,57 @@
+"""Ctrl-C in a simulation that would take minutes: what was drawn is a result, and memory stays bounded."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pty = pytest.importorskip("pty")
+
+ARM = Path(__file__).parents[2] / "configs" / "two_link_arm.yaml"
+
+
+def interrupted(folder, stage, *changes):
+    """Exit code and kilobytes of a command on a pseudo-terminal that is interrupted when it tells of a stage."""
+    controller, terminal = pty.openpty()
+    command = [sys.executable, "-m", "mechdesign", "reliability", str(ARM), "--out", str(folder)]
+    command += [part for change in changes for part in ("--set", change)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=terminal)
+    os.close(terminal)
+    told = b""
+    while stage not in told:
+        told += os.read(controller, 4096)
+    process.send_signal(signal.SIGINT)
+    while True:
+        # A pseudo-terminal ends by an error when nobody holds its other end.
+        try:
+            if not os.read(controller, 4096):
+                break
+        except OSError:
+            break
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    os.close(controller)
+    return process.returncode, usage.ru_maxrss
+
+
+def test_a_billion_samples_interrupted(tmp_path):
+    code, kilobytes = interrupted(tmp_path, b"samples", "reliability.samples=1000000000")
+    assert code == 130
+    assert kilobytes < 400 * 1024
+    with (tmp_path / "reliability.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["method"] == "monte_carlo"]
+    manifest = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))
+    drawn = [int(row["samples"]) for row in rows]
+    # All poses come forward together, chunk by chunk.
+    assert drawn[0] > 0
+    assert max(drawn) - min(drawn) <= 20_000
+    assert manifest["counts"]["samples"] == sum(drawn)
+    assert manifest["interrupted"].startswith(f"interrupted: {sum(drawn)} samples")
+    low, value, high = (float(rows[0][name]) for name in ("failure_low", "failure", "failure_high"))
+    assert low < value < high
+    assert not list(tmp_path.glob("*.png"))

@@ -1,0 +1,97 @@
+"""Every method at limits of every kind, and at the nodes of a workspace."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.analyses.workspace import nodes
+from mechdesign.study import Study
+from mechdesign.study.poses import PoseGroup, Poses
+from mechdesign.study.reliability_models import METHODS
+
+SLIDER_CRANK = """
+mechanism:
+  links: {ground: {O: [0, 0]}, crank: [O, A, 100], rod: [A, B, 250], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: O}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [70, 70], B: [310, 0]}
+reliability:
+  poses: [{theta: 40}]
+  rates: {theta: 2 rad/s}
+  dimensions: {crank.length: {sigma: 0.1}, rod.length: {sigma: 0.2}, theta: {sigma: 0.05}}
+  clearances: {A: {radial: 0.2, link: crank, pin: uniform}}
+  outputs: [B.x]
+  samples: 100000
+  precision: 0.05
+"""
+POLAR_ARM = """
+mechanism:
+  links: {ground: {O: [0, 0]}, arm: {from: O, to: P, telescopic: true}}
+  drives: {theta: {angle: arm}, reach: {length: arm}}
+  limits: [{drive: theta, min: 0, max: 60}, {drive: reach, min: 50, max: 100}]
+  sketch: {P: [60, 40]}
+workspace: {point: P, scan: {rays: 2}, characteristic_length: 50}
+reliability:
+  poses: workspace
+  dimensions: {theta: {sigma: 0.1}, reach: {sigma: 0.1}, ground.O.x: {sigma: 0.05}}
+  limits: {P: {radius: 0.3}}
+  samples: 2000
+  precision: {half_width: 0.02}
+"""
+# Sigmas of the errors of B.x and its rates are about 0.3, 0.3 and 0.8.
+LIMITS = {
+    "velocity": "{B.x_velocity: 0.6}",
+    "acceleration on one side": "{B.x_acceleration: {min: -1.2}}",
+    "three orders of one output": "{B.x: 0.6, B.x_velocity: 0.7, B.x_acceleration: {min: -1.5, max: 1.7}}",
+    "a circle of velocities and an angle": "{A_velocity: {radius: 0.5}, rod.angle: {max: 0.05}}",
+}
+
+
+@pytest.mark.parametrize("limits", LIMITS.values(), ids=LIMITS)
+def test_all_methods_agree_about_limits_of_rates_and_of_several_outputs(limits: str) -> None:
+    """The whole ladder against each other: their intervals overlap, and what claims none is near."""
+    methods = f"reliability.methods=[{', '.join(METHODS)}]"
+    table = mechdesign.reliability(study_of(SLIDER_CRANK, f"reliability.limits={limits}", methods), jobs=2).tables[
+        "reliability"
+    ]
+    assert table["method"].tolist() == list(METHODS)
+    low, failure, high = (
+        dict(zip(METHODS, table[name], strict=True)) for name in ("failure_low", "failure", "failure_high")
+    )
+    plain = failure["monte_carlo"]
+    assert 0.003 < plain < 0.3
+    for method in ("quasi_monte_carlo", "importance_sampling", "auto"):
+        assert low[method] <= high["monte_carlo"], method
+        assert high[method] >= low["monte_carlo"], method
+        assert low[method] < failure[method] < high[method], method
+    for method, factor in (("analytic", 1.35), ("second_order", 1.35), ("form", 2.0)):
+        # Uniform pins are no normal errors, and tangents are no limits.
+        assert 1 / factor < failure[method] / plain < factor, method
+
+
+def a_few_nodes(study: Study) -> Poses:
+    """Some of the nodes, at the region's edges too: all are more than a test needs."""
+    whole = nodes.workspace_nodes(study)
+    (group,) = whole.groups
+    rows = np.unique(np.linspace(0, whole.count - 1, 12).astype(int))
+    values = {name: value[rows] for name, value in group.values.items()}
+    return Poses((PoseGroup(group.names, values, np.arange(len(rows))),), len(rows), False, (len(rows) // 2, 2))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nodes_of_a_workspace(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = study_of(POLAR_ARM, f"reliability.methods=[{method}]")
+    few = a_few_nodes(study)
+    monkeypatch.setattr(nodes, "workspace_nodes", lambda _: few)
+    result = mechdesign.reliability(study, jobs=2)
+    table = result.tables["reliability"]
+    assert len(table) == few.count
+    assert set(table["scope"]) == {"pose"}
+    assert table["valid"].mean() > 0.5
+    assert np.isfinite(table["failure"][table["valid"]]).all()
+    # Nowhere is the arm exact, and the farther the tip the larger its error: 0.17 at a radius of 100.
+    reach = np.hypot(table["P.x"], table["P.y"])
+    assert table["failure"][np.argmax(reach)] > 2 * table["failure"][np.argmin(reach)]
