@@ -1,7 +1,8 @@
-"""A planar frame by finite elements: Euler-Bernoulli beams, and joints as Lagrange constraints.
+"""A planar frame by finite elements: beams, springs and rigid bars, and joints as constraints.
 
 Written to check the stiffness analysis; it shares nothing with it but geometry. Every node has (ux, uy, phi); bodies
-meet only where a joint says so, so two bodies hinged at a point have a node each there.
+meet only where a joint says so, so two bodies hinged at a point have a node each there. Constraints are kept exactly:
+the stiffness matrix is taken on the space of displacements that they allow.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 ELEMENTS = 3  # per beam; a uniform beam needs one, more exercise the assembly
+FREE = 1e-12  # share of the largest stiffness (lengths near one) below which a motion is free
 
 
 class Frame:
@@ -42,16 +44,24 @@ class Frame:
         for axis in (0, 1):
             self._constrain((a, axis, 1.0), (b, axis, -1.0))
 
+    def turn_together(self, a: int, b: int) -> None:
+        """Equal rotations."""
+        self._constrain((a, 2, 1.0), (b, 2, -1.0))
+
     def clamp(self, a: int, b: int) -> None:
         """Equal displacements and rotations."""
         self.hinge(a, b)
-        self._constrain((a, 2, 1.0), (b, 2, -1.0))
+        self.turn_together(a, b)
+
+    def stay(self, a: int, b: int, direction: complex) -> None:
+        """Equal displacements along a direction."""
+        u = direction / abs(direction)
+        self._constrain((a, 0, u.real), (a, 1, u.imag), (b, 0, -u.real), (b, 1, -u.imag))
 
     def slide(self, a: int, b: int, direction: complex) -> None:
         """Nodes at one place, free to move apart along a direction only."""
-        across = 1j * direction / abs(direction)
-        self._constrain((a, 0, across.real), (a, 1, across.imag), (b, 0, -across.real), (b, 1, -across.imag))
-        self._constrain((a, 2, 1.0), (b, 2, -1.0))
+        self.stay(a, b, 1j * direction)
+        self.turn_together(a, b)
 
     def rigid(self, a: int, b: int) -> None:
         """A rigid bar between two nodes."""
@@ -75,47 +85,62 @@ class Frame:
             (np.array([3 * node + axis for node, axis, _ in terms]), stiffness * np.outer(gradient, gradient))
         )
 
-    def beam(self, a: int, b: int, axial: float, bending: float) -> None:
-        """An elastic beam of stiffness EA and EI from node to node."""
+    def beam(self, a: int, b: int, axial: float, bending: float, shearing: float = np.inf) -> None:
+        """An elastic beam of stiffness EA, EI and shear stiffness (factor times GA) from node to node."""
         inner = [self.node(p) for p in np.linspace(self.places[a], self.places[b], ELEMENTS + 1)[1:-1].tolist()]
         nodes = [a, *inner, b]
         for i, j in pairwise(nodes):
             freedoms = np.array([3 * i, 3 * i + 1, 3 * i + 2, 3 * j, 3 * j + 1, 3 * j + 2])
-            self.springs.append((freedoms, _element(self.places[j] - self.places[i], axial, bending)))
+            self.springs.append((freedoms, _element(self.places[j] - self.places[i], axial, bending, shearing)))
 
-    def compliance(self, node: int) -> np.ndarray:
-        """Displacements (ux, uy, phi) of a node, a column for each unit load at it."""
-        count, held = 3 * len(self.places), len(self.constraints)
-        matrix = np.zeros((count + held, count + held))
+    def respond(self, node: int, loads: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Displacements (3 nodes, loads) under loads (3, loads) at a node, and motions (3 nodes, k) that are free.
+
+        Where a load drives a free motion, the displacements are those of the rest.
+        """
+        count = 3 * len(self.places)
+        matrix = np.zeros((count, count))
         for freedoms, stiffness in self.springs:
             matrix[np.ix_(freedoms, freedoms)] += stiffness
-        # Constraints as large as the stiffness keep the system well conditioned; the multipliers are not used.
-        size = np.abs(matrix).max()
+        rows = np.zeros((len(self.constraints), count))
         for k, row in enumerate(self.constraints):
             for freedom, factor in row.items():
-                matrix[count + k, freedom] = matrix[freedom, count + k] = size * factor
-        loads = np.zeros((count + held, 3))
-        loads[3 * node + np.arange(3), np.arange(3)] = 1.0
-        return np.linalg.solve(matrix, loads)[3 * node : 3 * node + 3]
+                rows[k, freedom] += factor
+        moves = np.eye(count)
+        if len(rows):
+            _, sizes, right = np.linalg.svd(rows)
+            moves = right[np.count_nonzero(sizes > 1e-10 * sizes[0]) :].T
+        values, vectors = np.linalg.eigh(moves.T @ matrix @ moves)
+        firm = values > FREE * values.max(initial=0.0)
+        applied = np.zeros((count, 3 if loads is None else loads.shape[1]))
+        applied[3 * node : 3 * node + 3] = np.eye(3) if loads is None else loads
+        modes = moves @ vectors
+        moved = modes[:, firm] @ ((modes[:, firm].T @ applied) / values[firm][:, None])
+        return moved, modes[:, ~firm]
+
+    def compliance(self, node: int) -> np.ndarray:
+        """Displacements (ux, uy, phi) of a node, a column for each unit load at it; nan where it moves freely."""
+        moved, free = self.respond(node)
+        here = slice(3 * node, 3 * node + 3)
+        if free.size and np.abs(free[here]).max() > 1e-7:
+            return np.full((3, 3), np.nan)
+        return moved[here]
 
 
-def _element(span: complex, axial: float, bending: float) -> np.ndarray:
-    """Stiffness matrix of one beam element in world axes."""
+def _element(span: complex, axial: float, bending: float, shearing: float) -> np.ndarray:
+    """Stiffness matrix of one beam element in world axes; with shear, Przemieniecki's (1968, Sec. 5.6)."""
     length = abs(span)
-    stretch, lift, tilt, turn = (
-        axial / length,
-        12 * bending / length**3,
-        6 * bending / length**2,
-        2 * bending / length,
-    )
+    soft = 12 * bending / (shearing * length**2)
+    stretch, lift, tilt = axial / length, 12 * bending / length**3 / (1 + soft), 6 * bending / length**2 / (1 + soft)
+    near, far = (bending / length * factor / (1 + soft) for factor in (4 + soft, 2 - soft))
     local = np.array(
         [
             [stretch, 0, 0, -stretch, 0, 0],
             [0, lift, tilt, 0, -lift, tilt],
-            [0, tilt, 2 * turn, 0, -tilt, turn],
+            [0, tilt, near, 0, -tilt, far],
             [-stretch, 0, 0, stretch, 0, 0],
             [0, -lift, -tilt, 0, lift, -tilt],
-            [0, tilt, turn, 0, -tilt, 2 * turn],
+            [0, tilt, far, 0, -tilt, near],
         ]
     )
     c, s = span.real / length, span.imag / length

@@ -13,7 +13,8 @@ from typing import Literal
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Fixed, Prismatic
+from mechdesign.mechanism.model import Description, Drive, Fixed, Prismatic
+from mechdesign.study.stiffness_models import StiffnessSection
 
 ASKED = ":asked"
 _PIN = "pin:"
@@ -21,7 +22,7 @@ _PIN = "pin:"
 
 @dataclass(frozen=True)
 class Contact:
-    """A joint between two bodies.
+    """A joint between two bodies, or a motor that holds the angle between two that no joint joins (`drive` names it).
 
     Parameters
     ----------
@@ -31,19 +32,21 @@ class Contact:
         Index of its slide in the mechanism's graph.
     reach_a, reach_b : tuple of str
         From the body's own point to the contact; a slide lies beyond the points of the body that bears its line.
-    links_a, links_b : frozenset of str
-        Links that are one body there (clamped at the point), for the drive that sits at the joint.
+    give : float
+        How many times the compliance of the joint's bearing lies here.
+    drive : str or None
+        The drive that holds or moves it.
     """
 
-    kind: Literal["hinge", "slide", "clamp"]
+    kind: Literal["hinge", "slide", "clamp", "motor"]
     a: str
     b: str
     point: str
     slide: int | None = None
     reach_a: tuple[str, ...] = ()
     reach_b: tuple[str, ...] = ()
-    links_a: frozenset[str] = frozenset()
-    links_b: frozenset[str] = frozenset()
+    give: float = 1.0
+    drive: str | None = None
 
     def other(self, body: str) -> str:
         """The body on the other side."""
@@ -53,17 +56,11 @@ class Contact:
         """From the body's own point to the contact."""
         return (self.reach_a if body == self.a else self.reach_b) or (self.point,)
 
-    def joins(self, first: str, second: str) -> bool:
-        """Whether it is a hinge between two links."""
-        if self.kind != "hinge":
-            return False
-        return (first in self.links_a and second in self.links_b) or (second in self.links_a and first in self.links_b)
-
     def through(self, pin: str, onward: Contact) -> Contact:
         """The hinge between the two bodies that this contact and `onward` join to a massless pin."""
-        near, far = self.other(pin), onward.other(pin)
-        links = [c.links_a if c.a == body else c.links_b for c, body in ((self, near), (onward, far))]
-        return replace(self, a=near, b=far, reach_a=(), reach_b=(), links_a=links[0], links_b=links[1])
+        return replace(
+            self, a=self.other(pin), b=onward.other(pin), reach_a=(), reach_b=(), give=self.give + onward.give
+        )
 
 
 @dataclass(frozen=True)
@@ -95,10 +92,11 @@ class Bodies:
         return body.startswith(_PIN)
 
 
-def build_bodies(mechanism: Mechanism, link: str | None, at: str, elastic: Mapping[str, str]) -> Bodies:
+def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> Bodies:
     """Bodies and contacts of a mechanism.
 
-    An elastic asked link is a body of its leg like any other: what is asked is its section at the point.
+    An elastic asked link is a body of its leg like any other: what is asked is its section at the point. A pin's
+    bearing gives between its two links; of more than two, between each and the pin.
 
     Raises
     ------
@@ -120,12 +118,16 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, elastic: Mappi
     contacts: list[Contact] = []
     for name, leg in description.links.items():
         if leg.telescopic and leg.ends is not None:
-            contacts.append(Contact("slide", name, rod_of(name), leg.ends[1], graph.slides.index(name)))
+            contacts.append(
+                Contact(
+                    "slide", name, rod_of(name), leg.ends[1], graph.slides.index(name), drive=_mover(description, name)
+                )
+            )
     for name, joint in description.joints.items():
         if isinstance(joint, Fixed):
             continue
         line = joint.line
-        through = line.through if line.through is not None else origin_of(line.link)
+        through = line.through if line.through is not None else _origin(mechanism, line.link)
         if isinstance(joint, Prismatic):
             other = holder(joint.slider, joint.point)
         else:
@@ -134,8 +136,9 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, elastic: Mappi
             holders[joint.point].append(other)
         reach = (through, joint.point) if through != joint.point else (through,)
         contacts.append(
-            Contact("slide", holder(line.link, through), other, joint.point, graph.slides.index(name), reach)
-        )
+            Contact("slide", holder(line.link, through), other, joint.point, graph.slides.index(name), reach,
+                    drive=_mover(description, name))
+        )  # fmt: skip
 
     clamps = [
         (holder(joint.links[0], joint.point), holder(joint.links[1], joint.point), joint.point)
@@ -143,7 +146,7 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, elastic: Mappi
         if isinstance(joint, Fixed)
     ]
     asked = ASKED
-    if link is not None and link not in elastic:
+    if link is not None and link not in section.elastic:
         asked = holder(link, at)
     else:
         names.append(ASKED)
@@ -151,9 +154,44 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, elastic: Mappi
         if link is not None:
             clamps.append((holder(link, at), ASKED, at))
     contacts += [Contact("clamp", a, b, point) for a, b, point in clamps]
-    for point, there in holders.items():
-        contacts += _hinges(point, _clusters(point, there, clamps), asked, names)
+    pins = {point: _clusters(point, there, clamps) for point, there in holders.items()}
+    for point, clusters in pins.items():
+        contacts += _hinges(description, point, clusters, asked, names, point in section.bearings)
+    held = {contact.drive for contact in contacts}
+    contacts += [
+        _motor(description, drive, pins)
+        for drive in description.drives.values()
+        if drive.kind == "angle" and drive.name not in held
+    ]
     return Bodies(tuple(names), tuple(contacts), asked, link, at)
+
+
+def _mover(description: Description, slide: str) -> str | None:
+    """The drive of a slide."""
+    drives = description.drives.values()
+    return next((drive.name for drive in drives if drive.kind != "angle" and drive.target == slide), None)
+
+
+def _turner(description: Description, first: list[str], second: list[str]) -> str | None:
+    """The drive of the angle between two clusters of bodies."""
+    one, two = (set(map(Bodies.link_of, cluster)) for cluster in (first, second))
+    for drive in description.drives.values():
+        target, reference = drive.target, drive.reference
+        across = (target in one and reference in two) or (target in two and reference in one)
+        if drive.kind == "angle" and across:
+            return drive.name
+    return None
+
+
+def _motor(description: Description, drive: Drive, pins: Mapping[str, list[list[str]]]) -> Contact:
+    """A motor between two links that no joint joins: at a pin of both, or else at their first points."""
+    links = (drive.reference, drive.target)
+    for point, clusters in pins.items():
+        near, far = (next((b for c in clusters for b in c if Bodies.link_of(b) == link), None) for link in links)
+        if near is not None and far is not None:
+            return Contact("motor", near, far, point, drive=drive.name)
+    first, second = (next(iter(description.links[link].points), origin_of(link)) for link in links)
+    return Contact("motor", drive.reference, drive.target, second, None, (first,), (second,), drive=drive.name)
 
 
 def _clusters(point: str, there: list[str], clamps: list[tuple[str, str, str]]) -> list[list[str]]:
@@ -166,21 +204,33 @@ def _clusters(point: str, there: list[str], clamps: list[tuple[str, str, str]]) 
     return clusters
 
 
-def _hinges(point: str, clusters: list[list[str]], asked: str, names: list[str]) -> list[Contact]:
+def _origin(mechanism: Mechanism, link: str) -> str:
+    """What a line through the origin of a link's frame goes through: a point of the link, where one lies there."""
+    for point, terms in mechanism.description.links[link].points.items():
+        if not any(mechanism.nominal[term] if isinstance(term, str) else term for term in terms):
+            return point
+    return origin_of(link)
+
+
+def _hinges(
+    description: Description, point: str, clusters: list[list[str]], asked: str, names: list[str], bearing: bool
+) -> list[Contact]:
     if len(clusters) < 2:
         return []
 
-    def hinge(a: list[str], b: list[str]) -> Contact:
-        links = (frozenset(map(Bodies.link_of, cluster)) for cluster in (a, b))
-        return Contact("hinge", _speaker(a, asked), _speaker(b, asked), point, None, (), (), *links)
+    def hinge(a: list[str], b: list[str], give: float = 1.0) -> Contact:
+        return Contact(
+            "hinge", _speaker(a, asked), _speaker(b, asked), point, give=give, drive=_turner(description, a, b)
+        )
 
-    for centre in (GROUND, asked):
-        hub = next((cluster for cluster in clusters if centre in cluster), None)
-        if hub is not None:
-            # What is fixed, or asked, holds each of the others by itself.
-            return [hinge(hub, cluster) for cluster in clusters if cluster is not hub]
+    fixed = next((cluster for cluster in clusters if GROUND in cluster), None)
+    hub = fixed or next((cluster for cluster in clusters if asked in cluster), None)
+    if hub is not None and (fixed or hub == [ASKED] or len(clusters) == 2 or not bearing):
+        # What is fixed, or asked, holds each of the others by itself; an asked pin lies midway between two links.
+        give = {2: 0.0, 3: 0.5}.get(len(clusters), 1.0) if hub == [ASKED] else 1.0
+        return [hinge(hub, cluster, give) for cluster in clusters if cluster is not hub]
     if len(clusters) == 2:
-        return [hinge(*clusters)]
+        return [hinge(clusters[0], clusters[1])]
     names.append(_PIN + point)
     return [hinge([_PIN + point], cluster) for cluster in clusters]
 

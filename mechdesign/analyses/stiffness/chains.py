@@ -54,9 +54,9 @@ def _bearing(
     across = [1.0 + 0j, 1j] if bearing.slide is None else [1j * _slide_direction(bearing.slide, configuration)]
     if given.radial is not None:
         for direction in across:
-            yield slide_twist(np.broadcast_to(direction, configuration.shape)), 1 / given.radial
+            yield slide_twist(np.broadcast_to(direction, configuration.shape)), bearing.give / given.radial
     if given.moment is not None:
-        yield hinge_twist(configuration.point(bearing.point) - at), 1 / given.moment
+        yield hinge_twist(configuration.point(bearing.point) - at), bearing.give / given.moment
 
 
 def _slide_direction(slide: int, configuration: Configuration) -> NDArray[np.complex128]:

@@ -113,6 +113,9 @@ def load(network: Network, twists: Twists, length: float, size: int) -> Loaded:
     shift = np.zeros((n, len(twists.edge), size))
     shift[:, soft] = strain
     shift[:, free] = statics.motion(-loops[:, :, soft] @ strain)
+    # What is not held has no answer to a load.
+    shift[held.rank < size] = np.nan
+    through[held.rank < size] = np.nan
     outer = scale[:size]
     displacements = {
         vertex: (network.signs(path)[twists.edge] * twists.twist) @ shift * scale[:, None] * outer
@@ -186,7 +189,11 @@ def _onto(matrix: Array) -> Array:
 def _least_energy(statics: _Statics, loops: Array, way: Array, compliance: Array) -> tuple[Array, Array]:
     """What elastic joints bear under unit loads, shape (n, joints, size), and the loops' wrenches."""
     stress = statics.particular
-    bears = way.swapaxes(1, 2) - loops.swapaxes(1, 2) @ stress
+    onward, around = way.swapaxes(1, 2), loops.swapaxes(1, 2)
+    bears = onward - around @ stress
+    # What loads and loops together do not load bears nothing, but for rounding: rigid is rigid exactly.
+    largest = np.abs(stress).max(axis=(1, 2), keepdims=True, initial=0.0)
+    bears[np.abs(bears) <= RIGID * (np.abs(onward) + np.abs(around).sum(axis=2, keepdims=True) * largest)] = 0.0
     if not statics.stress.any():
         return bears, stress
     weighted = statics.stress @ loops

@@ -9,14 +9,14 @@ such a path is told as such.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.mechanism.graph import GROUND, rod_of
+from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Description, Link, Term
+from mechdesign.mechanism.model import Link, Term
 from mechdesign.study.stiffness_models import StiffnessSection
 
 
@@ -55,11 +55,12 @@ class Shift:
 
 @dataclass(frozen=True)
 class Bearing:
-    """The give of a joint itself, named as in the study; across its slide, or in all directions of a pin."""
+    """The give of a joint itself, so many times; across its slide, or in all directions of a pin."""
 
     name: str
     point: str
     slide: int | None = None
+    give: float = 1.0
 
 
 Element = Hinge | Guide | Beam | Shift | Bearing
@@ -115,12 +116,11 @@ def find_legs(mechanism: Mechanism, link: str | None, at: str, section: Stiffnes
         Where what is asked does not move.
     """
     description = mechanism.description
-    bodies = build_bodies(mechanism, link, at, section.elastic)
+    bodies = build_bodies(mechanism, link, at, section)
     builder = _LegBuilder(mechanism, bodies, section)
     legs = [builder.build(path) for path in _paths(bodies)]
     order = {name: k for k, name in enumerate(description.links)}
     legs.sort(key=lambda leg: min((order[name] for name in leg.links), default=len(order)))
-    _check_drives(description, bodies, legs)
     return tuple(legs)
 
 
@@ -130,6 +130,7 @@ def _paths(bodies: Bodies) -> Iterator[tuple[list[str], list[Contact]]]:
     contacts = bodies.contacts
     for contact in contacts:
         if {contact.a, contact.b} == {GROUND, target}:
+            _no_motor([contact])
             yield [GROUND, target], [contact]
     seen: set[str] = set()
     for root in bodies.names:
@@ -142,7 +143,14 @@ def _paths(bodies: Bodies) -> Iterator[tuple[list[str], list[Contact]]]:
         ends = {end for c in mine for end in (c.a, c.b)}
         if not {GROUND, target} <= ends:
             continue
+        _no_motor(mine)
         yield _as_path(mine, target, bodies)
+
+
+def _no_motor(contacts: Iterable[Contact]) -> None:
+    for contact in contacts:
+        if contact.kind == "motor":
+            raise NotSerialError(f"drive '{contact.drive}' holds an angle between links that no joint of a leg joins")
 
 
 def _piece(root: str, contacts: Sequence[Contact], target: str) -> set[str]:
@@ -197,12 +205,12 @@ class _LegBuilder:
 
     def build(self, path: tuple[list[str], list[Contact]]) -> Leg:
         names, contacts = self._without_pins(*path)
-        drives = [drive_at(self.mechanism, contact) for contact in contacts]
+        drives = [contact.drive for contact in contacts]
         elements: list[Element] = []
-        for k, (contact, drive) in enumerate(zip(contacts, drives, strict=True)):
+        for k, contact in enumerate(contacts):
             if k:
                 elements += self._beams(names[k], contacts[k - 1], contact)
-            elements += joint_elements(self.mechanism, contact, drive, self.section)
+            elements += joint_elements(self.mechanism, contact, self.section)
         links = tuple(dict.fromkeys(filter(None, map(self.bodies.link_of, names[1:]))))
         if names[-1] != ASKED:
             links = tuple(link for link in links if link != self.bodies.link)
@@ -251,37 +259,33 @@ class _LegBuilder:
         return [*entry[:0:-1], *inner, *leave[1:]]
 
 
-def drive_at(mechanism: Mechanism, contact: Contact) -> str | None:
-    """The drive that sits at a joint."""
-    for name, drive in mechanism.description.drives.items():
-        if contact.slide is not None:
-            if drive.kind != "angle" and drive.target == mechanism.graph.slides[contact.slide]:
-                return name
-        elif drive.kind == "angle" and contact.joins(drive.target, drive.reference):
-            return name
-    return None
-
-
-def joint_elements(
-    mechanism: Mechanism, contact: Contact, drive: str | None, section: StiffnessSection
-) -> list[Element]:
-    """What gives at a joint: its freedom, unless a rigid drive holds it, and its bearing."""
+def joint_elements(mechanism: Mechanism, contact: Contact, section: StiffnessSection) -> list[Element]:
+    """What gives at a joint: its freedom, unless a rigid drive holds it, and its bearing, that of a leg at its base."""
     found: list[Element] = []
+    drive = contact.drive
     if contact.kind == "clamp":
         return found
+    if contact.kind == "motor":
+        found += [Shift(1.0 + 0j), Shift(1j)]
     if drive is None or drive in section.actuators:
         found.append(Hinge(contact.point, drive) if contact.slide is None else Guide(contact.slide, drive))
+    description = mechanism.description
     name = contact.point if contact.slide is None else mechanism.graph.slides[contact.slide]
-    if name in section.bearings:
-        found.append(Bearing(name, contact.point, contact.slide))
+    if name in section.bearings and contact.kind != "motor":
+        ends = description.links[name].ends if name in description.links else None
+        found.append(Bearing(name, contact.point if ends is None else ends[0], contact.slide, contact.give))
     return found
 
 
 def points_along(mechanism: Mechanism, link: Link) -> list[str]:
-    """Points along a link: as listed, and those on the line between the ends of a binary link where they lie."""
+    """Points along a link: as listed, and those on the line between the ends of a binary link where they lie.
+
+    Before them comes the origin of its frame, where a line goes through it.
+    """
     points = list(link.points)
     if link.ends is None:
-        return points
+        origin = origin_of(link.name)
+        return [origin, *points] if origin in mechanism.graph.nodes else points
 
     def number(term: Term) -> float:
         return mechanism.nominal[term] if isinstance(term, str) else term
@@ -292,15 +296,3 @@ def points_along(mechanism: Mechanism, link: Link) -> list[str]:
     between.sort(key=lambda name: place[name][0])
     rest = [name for name in points if name not in between and name not in link.ends]
     return [link.ends[0], *between, link.ends[1], *rest]
-
-
-def _check_drives(description: Description, bodies: Bodies, legs: list[Leg]) -> None:
-    """Every angle drive between links that carry must sit at a joint of a leg."""
-    carrying = {name for leg in legs for name in leg.links} | {GROUND, bodies.link}
-    held = {name for leg in legs for name in leg.drives}
-    for name, drive in description.drives.items():
-        if drive.kind == "angle" and name not in held and {drive.target, drive.reference} <= carrying:
-            raise NotSerialError(
-                f"drive '{name}' holds the angle of link '{drive.target}' from '{drive.reference}', and no joint of a "
-                "leg is between the two"
-            )

@@ -59,13 +59,8 @@ def joints_of(network: Network) -> list[int]:
 
 
 def points_of(network: Network) -> list[tuple[str, str, str]]:
-    """Link, point and vertex of every point whose displacement is known."""
-    return [
-        (link, point, vertex)
-        for link, points in network.points.items()
-        for point, vertex in points
-        if vertex in network.paths
-    ]
+    """Link, point and vertex of every point of the moving links."""
+    return [(link, point, vertex) for link, points in network.points.items() for point, vertex in points]
 
 
 def effects_of(
@@ -75,19 +70,17 @@ def effects_of(
     size = loaded.wrenches.shape[3]
     applied = np.array(loads)[:, :size].T
     origin = configuration.point(at)
-    forces = []
-    for k in joints_of(network):
+    effects = Effects.unknown(network, len(origin), len(loads))
+    for row, k in enumerate(joints_of(network)):
         wrench = loaded.wrenches[:, k] @ applied
         arm = (configuration.point(network.edges[k].point) - origin)[:, None]
         moment = wrench[:, 2] - (arm.real * wrench[:, 1] - arm.imag * wrench[:, 0])
-        forces.append(np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1))
-    moved, places = [], []
-    for _, point, vertex in points_of(network):
+        effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
+    for row, (_, point, vertex) in enumerate(points_of(network)):
         twist = loaded.displacements[vertex] @ applied
-        place = configuration.point(point)
-        places.append(place)
-        moved.append(twist[:, 0] + 1j * twist[:, 1] + 1j * twist[:, 2] * (place - origin)[:, None])
-    return Effects(np.stack(forces, axis=1), np.stack(moved, axis=1), np.stack(places, axis=1))
+        place = effects.places[:, row] = configuration.point(point)
+        effects.moved[:, row] = twist[:, 0] + 1j * twist[:, 1] + 1j * twist[:, 2] * (place - origin)[:, None]
+    return effects
 
 
 def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:

@@ -9,19 +9,20 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.analyses.stiffness.legs import Beam, Element, Hinge, Shift, drive_at, joint_elements, points_along
+from mechdesign.analyses.stiffness.legs import Beam, Element, joint_elements, points_along
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.study.stiffness_models import StiffnessSection
 
 Signs = NDArray[np.float64]
+Way = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class Network:
 
     edges: tuple[Edge, ...]
     asked: str
-    paths: Mapping[str, tuple[tuple[int, int], ...]]
-    loops: tuple[tuple[tuple[int, int], ...], ...]
+    paths: Mapping[str, Way]
+    loops: tuple[Way, ...]
     points: Mapping[str, tuple[tuple[str, str], ...]]
 
     def signs(self, way: Sequence[tuple[int, int]]) -> Signs:
@@ -74,7 +75,7 @@ class Network:
 
 
 def build_network(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> Network:
-    """The network of a mechanism; parts that carry nothing are left out.
+    """The network of a mechanism; parts that carry nothing have no edges and go along with what they hang on.
 
     Parameters
     ----------
@@ -88,11 +89,11 @@ def build_network(mechanism: Mechanism, link: str | None, at: str, section: Stif
     StudyError
         If the asked point does not move.
     """
-    bodies = build_bodies(mechanism, link, at, section.elastic)
+    bodies = build_bodies(mechanism, link, at, section)
     builder = _Builder(mechanism, bodies, section)
     edges = builder.edges()
-    edges = _carrying(edges, bodies.asked)
-    return _looped(tuple(edges), bodies.asked, builder.points())
+    network = _looped(tuple(_carrying(edges, bodies.asked)), bodies.asked, builder.points())
+    return replace(network, paths=_with_idle(edges, network.paths))
 
 
 @dataclass(frozen=True)
@@ -102,28 +103,19 @@ class _Builder:
     section: StiffnessSection
 
     def edges(self) -> list[Edge]:
-        """All joints and beams, and the drives that sit at no joint."""
+        """All joints and beams, and the motors that sit at no joint."""
         found: list[Edge] = []
-        taken: set[str] = set()
         for contact in self.bodies.contacts:
-            drive = drive_at(self.mechanism, contact)
-            if drive is not None:
-                taken.add(drive)
-            elements = tuple(joint_elements(self.mechanism, contact, drive, self.section))
+            elements = tuple(joint_elements(self.mechanism, contact, self.section))
             name = contact.point if contact.slide is None else self.mechanism.graph.slides[contact.slide]
+            if contact.kind == "motor":
+                name = contact.drive or ""
             found.append(
                 Edge(self._vertex(contact, contact.a, found), self._vertex(contact, contact.b, found), elements, name,
                      contact.point)
             )  # fmt: skip
         for name, section in self.section.elastic.items():
             found += self._beams(name, section)
-        for name, drive_of in self.mechanism.description.drives.items():
-            if drive_of.kind == "angle" and name not in taken:
-                held: tuple[Element, ...] = (Shift(1.0 + 0j), Shift(1j))
-                point = next(iter(self.mechanism.description.links[drive_of.target].points))
-                if name in self.section.actuators:
-                    held = (*held, Hinge(point, name))
-                found.append(Edge(self._end(drive_of.reference), self._end(drive_of.target), held, name, point))
         return found
 
     def points(self) -> dict[str, tuple[tuple[str, str], ...]]:
@@ -137,12 +129,6 @@ class _Builder:
                 here.append((link.ends[1], self._node(rod_of(name), link.ends[1])))
             found[name] = tuple(here)
         return found
-
-    def _end(self, link: str) -> str:
-        """The vertex of a link whose angle a drive holds: of an elastic one where it begins."""
-        if link == GROUND or link not in self.section.elastic:
-            return link
-        return self._node(link, next(iter(self.mechanism.description.links[link].points)))
 
     def _node(self, body: str, point: str) -> str:
         """The vertex of a body at one of its points."""
@@ -197,9 +183,22 @@ def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
         edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
 
 
+def _with_idle(edges: Sequence[Edge], paths: Mapping[str, Way]) -> dict[str, Way]:
+    """Ways to all vertices: to those that carry nothing as to what they hang on."""
+    found = dict(paths)
+    waiting = list(edges)
+    while waiting:
+        ready = [edge for edge in waiting if edge.a in found or edge.b in found]
+        for edge in ready:
+            near, far = (edge.a, edge.b) if edge.a in found else (edge.b, edge.a)
+            found.setdefault(far, found[near])
+        waiting = [edge for edge in waiting if edge not in ready]
+    return found
+
+
 def _looped(edges: tuple[Edge, ...], asked: str, points: Mapping[str, tuple[tuple[str, str], ...]]) -> Network:
     """A tree from the ground, as short ways as possible, and a loop for every other edge."""
-    paths: dict[str, tuple[tuple[int, int], ...]] = {GROUND: ()}
+    paths: dict[str, Way] = {GROUND: ()}
     queue = deque([GROUND])
     tree: set[int] = set()
     while queue:

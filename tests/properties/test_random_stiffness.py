@@ -1,0 +1,140 @@
+"""Stiffness of random mechanisms of any topology, against finite elements and against the laws of mechanics."""
+
+from __future__ import annotations
+
+from random import Random
+
+import numpy as np
+import pytest
+from helpers.frames import Structure
+from helpers.layouts import GROUND
+from helpers.platforms import platform
+from helpers.random_stiffness import Sprung, sprung
+from helpers.stiffness import ask_stiffness, matrix
+from helpers.studies import study_of
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.stiffness.analysis import ask
+from mechdesign.analyses.stiffness.force_method import load, twists_of
+from mechdesign.analyses.stiffness.serial import hold_by_legs
+from mechdesign.mechanism import Configuration
+from mechdesign.study import Study
+
+# What is rigid, or all but, beside compliances that are never below 1e-6.
+NOTHING = 1e-18
+
+
+def posed(text: str) -> tuple[Study, Configuration]:
+    study = study_of(text)
+    (solved,) = solve_poses(study, study.poses("stiffness"))
+    return study, solved.configuration
+
+
+def agree(found: np.ndarray, expected: np.ndarray, relative: float) -> None:
+    """Entries agree, each relative to the displacements (or loads) that belong to its row and column."""
+    size = np.sqrt(np.abs(np.diag(expected)))
+    tolerance = relative * np.outer(size, size) + relative**2 * np.abs(expected).max() + NOTHING
+    assert (np.abs(found - expected) <= tolerance).all(), (found, expected)
+
+
+@settings(max_examples=50)
+@given(sprung())
+def test_compliance_is_that_of_finite_elements(case: Sprung) -> None:
+    text = case.text()
+    result = ask_stiffness(text)
+    assert result.tables["stiffness"]["valid"].all()
+    agree(matrix(result, "C"), Structure(*posed(text)).compliance(), 1e-6)
+
+
+@settings(max_examples=25)
+@given(sprung())
+def test_displacements_of_all_points_are_those_of_finite_elements(case: Sprung) -> None:
+    load_case = [30.0, -20.0, 8.0 if case.link else 0.0]
+    text = case.text(loads=[load_case])
+    table = ask_stiffness(text).tables["displacements"]
+    structure = Structure(*posed(text))
+    moved, _ = structure.frame.respond(structure.asked, np.array([load_case]).T)
+    largest = np.abs(moved).max()
+    bodies = [body for body in case.layout.bodies.values() if body.name != GROUND]
+    assert len(table) == sum(len(body.points) + bool(body.to) for body in bodies)
+    for link, point, dx, dy in zip(*(table[name] for name in ("link", "point", "dx", "dy")), strict=True):
+        node = structure.nodes[link, point]
+        assert complex(dx, dy) == pytest.approx(complex(*moved[3 * node : 3 * node + 2, 0]), abs=1e-6 * largest + 1e-15)
+
+
+@settings(max_examples=25)
+@given(sprung())
+def test_stiffness_is_symmetric_positive_and_the_inverse_of_compliance(case: Sprung) -> None:
+    result = ask_stiffness(case.text())
+    stiff, soft = matrix(result, "K"), matrix(result, "C")
+    assert (np.linalg.eigvalsh(soft) >= -1e-12 * np.abs(soft).max()).all()
+    if np.isfinite(stiff).all():
+        assert (np.linalg.eigvalsh(stiff) > -1e-12 * np.abs(stiff).max()).all()
+        assert soft @ stiff @ soft == pytest.approx(soft, rel=1e-6, abs=1e-7 * np.abs(soft).max())
+    else:
+        assert np.linalg.eigvalsh(soft)[0] <= 1e-11 * np.abs(soft).max()
+
+
+@settings(max_examples=25)
+@given(sprung(), st.randoms(use_true_random=False))
+def test_names_and_order_do_not_matter(case: Sprung, rng) -> None:
+    layout = case.layout
+    names = [*layout.places, *layout.bodies, *layout.guides, *layout.clamps, *layout.drives]
+    others = [f"{name[0]}_{k}" for k, name in enumerate(names)]
+    rng.shuffle(others)
+    renamed = {name: other for name, other in zip(names, others, strict=True) if name != GROUND}
+    plain, other = (ask_stiffness(text) for text in (case.text(), case.text(rng=rng, names=renamed)))
+    assert plain.tables["stiffness"]["method"] == other.tables["stiffness"]["method"]
+    agree(matrix(other, "C"), matrix(plain, "C"), 1e-8)
+
+
+@settings(max_examples=25)
+@given(sprung(), st.floats(-3, 3), st.complex_numbers(max_magnitude=5, allow_nan=False))
+def test_a_rigid_motion_of_the_whole_turns_the_matrices(case: Sprung, angle: float, shift: complex) -> None:
+    factor = complex(np.exp(1j * angle))
+    moved = case.text(case.layout.moved(factor, shift))
+    size = 3 if case.link else 2
+    turn = np.eye(3)
+    turn[:2, :2] = [[factor.real, -factor.imag], [factor.imag, factor.real]]
+    turn = turn[:size, :size]
+    agree(matrix(ask_stiffness(moved), "C"), turn @ matrix(ask_stiffness(case.text()), "C") @ turn.T, 1e-8)
+
+
+def about(arm: complex) -> np.ndarray:
+    """T of a point `arm` away: twist there = T^-1 twist here, K there = T^T K here T  [S4]."""
+    return np.array([[1, 0, arm.imag], [0, 1, -arm.real], [0, 0, 1]])
+
+
+@settings(max_examples=25)
+@given(sprung())
+def test_another_point_of_the_same_body_is_the_same_matrix_seen_from_there(case: Sprung) -> None:
+    body = case.layout.bodies.get(case.link)
+    assume(body is not None and case.link not in case.elastic and not body.to and len(body.points) > 1)
+    here = ask_stiffness(case.text())
+    for point in body.points:
+        there = ask_stiffness(case.text(at=point))
+        transform = about(case.layout.places[point] - case.layout.places[case.at])
+        inverse = about(case.layout.places[case.at] - case.layout.places[point])
+        agree(matrix(there, "C"), inverse @ matrix(here, "C") @ inverse.T, 1e-9)
+        if np.isfinite(matrix(here, "K")).all():
+            agree(matrix(there, "K"), transform.T @ matrix(here, "K") @ transform, 1e-6)
+
+
+@settings(max_examples=100)
+@given(st.integers(0, 2**32 - 1))
+def test_on_serial_legs_reciprocal_wrenches_forces_and_finite_elements_agree(seed: int) -> None:
+    study, configuration = posed(platform(Random(seed)))
+    asked = ask(study)
+    assert asked.legs is not None
+    serial, _ = hold_by_legs(asked.legs, asked.section, configuration, asked.length, 3, False)
+    twists = twists_of(asked.network, asked.section, configuration, asked.length)
+    other = load(asked.network, twists, asked.length, 3).held
+    assume(other.margin > 1e-2)
+    assert serial.rank == other.rank == 3
+    agree(other.compliance[0], serial.compliance[0], 1e-8)
+    agree(Structure(study, configuration).compliance(), serial.compliance[0], 1e-6)
+    assert np.isnan(serial.stiffness).all() == np.isnan(other.stiffness).all()
+    if np.isfinite(serial.stiffness).all():
+        agree(other.stiffness[0], serial.stiffness[0], 1e-6)
