@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.reliability.engine.precision import Precision as Wanted
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import FirstOrder
 from mechdesign.analyses.reliability.sampling import generator
@@ -143,6 +145,15 @@ class Partial(KeyboardInterrupt):
         self.found = found
 
 
+@contextmanager
+def _keeping(found: Found, task: Task) -> Iterator[None]:
+    """On an interrupt the poses that are finished are kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Partial(_with_moments(found, task) if found.sums else found) from None
+
+
 def _summed(method: str, task: Task, sums: Sequence[Sums | None]) -> Found:
     known = {s.pose: found for s, found in zip(task.settings, sums, strict=True) if found is not None}
     found = Found(method, sums=known)
@@ -195,11 +206,12 @@ def quasi_monte_carlo(task: Task) -> Found:
         return total, quasi.estimate(broken, counts[0], total.samples - total.valid)
 
     found = Found("quasi_monte_carlo")
-    for setting, (sums, estimate) in zip(task.settings, map_chunks(work, task.settings, task.jobs), strict=True):
-        found.sums[setting.pose] = sums
-        if setting.limited:
-            found.estimates[setting.pose] = estimate
-        task.progress.update(sums.samples)
+    with _keeping(found, task):
+        for setting, (sums, estimate) in zip(task.settings, map_chunks(work, task.settings, task.jobs), strict=True):
+            found.sums[setting.pose] = sums
+            if setting.limited:
+                found.estimates[setting.pose] = estimate
+            task.progress.update(sums.samples)
     return _with_moments(found, task)
 
 
@@ -241,14 +253,18 @@ def _bounded(setting: Setting, task: Task, evaluations: int) -> Estimate:
     return replace(found, failure=value, evaluations=found.evaluations + evaluations)
 
 
+def wanted_precision(task: Task) -> Wanted:
+    """What the study asks of `auto`, or a twentieth of the probability of failure."""
+    asked = task.precision
+    return Wanted(RELATIVE, None) if asked is None else Wanted(asked.relative, asked.half_width)
+
+
 def auto(task: Task) -> Found:
     """The cheapest method that reaches the precision asked for; moments from its plain samples."""
     from mechdesign.analyses.reliability.engine import ladder
-    from mechdesign.analyses.reliability.engine.precision import Precision as Wanted
     from mechdesign.analyses.reliability.limit_states import problem_of
 
-    asked = task.precision
-    precision = Wanted(RELATIVE, None) if asked is None else Wanted(asked.relative, asked.half_width)
+    precision = wanted_precision(task)
     found = Found("auto")
 
     def work(setting: Setting) -> tuple[Sums, Estimate | None, str, dict[str, Estimate]]:
@@ -265,18 +281,21 @@ def auto(task: Task) -> Found:
             plain(min(ladder.FEW, task.most))
             return _total(drawn), None, "", {}
         rng = generator(task.seed, setting.pose, _SEARCH, 2)
-        estimate, used, rungs = ladder.climb(problem_of(setting, task.sources), precision, plain, rng, task.most)
+        # Where nothing else helps, plain samples are as many all told.
+        problem, shared = problem_of(setting, task.sources), max(ladder.FEW, task.most // task.poses)
+        estimate, used, rungs = ladder.climb(problem, precision, plain, rng, task.most, shared)
         return _total(drawn), estimate, used, rungs
 
     task.progress.start(len(task.settings), "poses")
-    for setting, (sums, estimate, used, rungs) in zip(
-        task.settings, map_chunks(work, task.settings, task.jobs), strict=True
-    ):
-        found.sums[setting.pose] = sums
-        if estimate is not None:
-            found.estimates[setting.pose], found.used[setting.pose] = estimate, used
-            found.rungs[setting.pose] = rungs
-        task.progress.update(1)
+    with _keeping(found, task):
+        for setting, (sums, estimate, used, rungs) in zip(
+            task.settings, map_chunks(work, task.settings, task.jobs), strict=True
+        ):
+            found.sums[setting.pose] = sums
+            if estimate is not None:
+                found.estimates[setting.pose], found.used[setting.pose] = estimate, used
+                found.rungs[setting.pose] = rungs
+            task.progress.update(1)
     return _with_moments(found, task)
 
 
@@ -291,9 +310,10 @@ def _each(method: str, task: Task, work: Callable[[Setting], Estimate]) -> Found
     found = Found(method)
     settings = [setting for setting in task.settings if setting.limited]
     task.progress.start(len(settings), "poses")
-    for setting, estimate in zip(settings, map_chunks(work, settings, task.jobs), strict=True):
-        found.estimates[setting.pose] = estimate
-        task.progress.update(1)
+    with _keeping(found, task):
+        for setting, estimate in zip(settings, map_chunks(work, settings, task.jobs), strict=True):
+            found.estimates[setting.pose] = estimate
+            task.progress.update(1)
     return found
 
 

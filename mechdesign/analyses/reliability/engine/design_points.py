@@ -127,6 +127,8 @@ def _descend(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[F
         size = (slope**2).sum(axis=0)
         known = np.isfinite(g) & np.isfinite(size) & (size > 0)
         active[lanes[~known]] = False
+        if not known.any():
+            continue
         lanes, g, slope, size = lanes[known], g[known], slope[:, known], size[known]
         at = u[:, lanes]
         step = slope * (((slope * at).sum(axis=0) - g) / size) - at
@@ -188,4 +190,5 @@ def explored_weights(u: Floats) -> Floats:
     """Standard normal density over that of the samples of all spreads, at `u` of shape (dimension, n): shape (n,)."""
     half, d = 0.5 * (u * u).sum(axis=0), len(u)
     logs = np.stack([half * (1 - spread**-2) - d * np.log(spread) for spread in SPREADS])
-    return np.asarray(len(SPREADS) / np.exp(logs).sum(axis=0))
+    most = logs.max(axis=0, initial=-np.inf)
+    return np.asarray(len(SPREADS) * np.exp(-most) / np.exp(logs - most).sum(axis=0))

@@ -217,7 +217,17 @@ def _fitted(parts: Mixture, u: Floats, weights: Floats) -> Mixture:
         covariance = (effective * covariance + prior * np.eye(d)) / (effective + prior)
         weight.append(mass)
         centres.append(centre)
-        roots.append(np.linalg.cholesky(covariance))
+        roots.append(np.linalg.cholesky(_without_chance(covariance, d / effective)))
     if not weight:
         return parts
     return Mixture(np.array(weight) / sum(weight), np.array(centres), np.array(roots))
+
+
+def _without_chance(covariance: Floats, ratio: float) -> Floats:
+    """Principal variances 1 where so few samples a dimension (`ratio` is one over it) may show what they do by chance.
+
+    [Marchenko & Pastur, 1967: the limits of the principal variances of standard normal samples.]
+    """
+    squares, axes = np.linalg.eigh(covariance)
+    chance = (squares > max(0.0, 1 - np.sqrt(ratio)) ** 2) & (squares < (1 + np.sqrt(ratio)) ** 2)
+    return np.asarray((axes * np.where(chance, 1.0, squares)) @ axes.T)

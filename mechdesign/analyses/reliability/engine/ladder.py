@@ -15,6 +15,8 @@ from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 
 # Plain samples that every rung is checked with, and up to how many of them need no other method.
 PILOT, FEW = 4000, 40_000
+# So many failures tell their probability well enough to plan by.
+MANY = 30
 # Two methods disagree where their intervals are farther apart than this factor.
 FACTOR = 1.5
 
@@ -25,6 +27,7 @@ def climb(
     plain: Callable[[int], Estimate],
     rng: np.random.Generator,
     most: int,
+    most_plain: int,
 ) -> tuple[Estimate, str, dict[str, Estimate]]:
     """Probability of failure to a precision.
 
@@ -32,8 +35,8 @@ def climb(
     ----------
     plain : callable
         Monte Carlo with so many samples all told; keeps what it has drawn before.
-    most : int
-        Samples that are drawn at most by any method.
+    most, most_plain : int
+        Samples that are drawn at most by any method, and by Monte Carlo.
 
     Returns
     -------
@@ -44,31 +47,34 @@ def climb(
     rungs : dict of str to Estimate
         What each method that was tried says.
     """
-    rungs = {"monte_carlo": plain(min(PILOT, most))}
+    rungs = {"monte_carlo": plain(min(PILOT, most, most_plain))}
 
-    def plainly(count: float) -> tuple[Estimate, str]:
-        rungs["monte_carlo"] = plain(int(min(most, max(count, PILOT))))
-        return rungs["monte_carlo"], "monte_carlo"
+    def plainly(count: float) -> Estimate:
+        rungs["monte_carlo"] = plain(int(min(most, most_plain, max(count, PILOT))))
+        return rungs["monte_carlo"]
+
+    def precise(estimate: Estimate) -> bool:
+        return precision.reached(estimate.failure, estimate.low, estimate.high)
+
+    def enough(estimate: Estimate) -> float:
+        # Few failures say little about how many there are; the interval's end leaves their number in doubt no longer.
+        share = estimate.failure if estimate.failures >= MANY else estimate.high
+        return 1.1 * precision.needed(share, share * (1.0 - share))
 
     found, used = rungs["monte_carlo"], "monte_carlo"
-    if not precision.reached(found.failure, found.low, found.high):
-        share = found.failure if found.failures >= 30 else 0.0
-        enough = 1.1 * precision.needed(share, share * (1.0 - share))
-        if enough <= FEW:
-            found, used = plainly(enough)
-        else:
-            points = find(problem, rng)
-            rungs["form"] = form(problem, points)
-            sampled = importance_sampling(problem, points, rng, most, precision)
-            rungs["importance_sampling"] = sampled
-            # Plain samples see every failure: what they exclude has missed some of them.
-            missed = not sampled.failures or sampled.high < rungs["monte_carlo"].low
-            precise = precision.reached(sampled.failure, sampled.low, sampled.high)
+    if not precise(found) and enough(found) <= FEW:
+        found = plainly(enough(found))
+    if not precise(found):
+        points = find(problem, rng)
+        rungs["form"] = form(problem, points)
+        sampled = importance_sampling(problem, points, rng, most, precision)
+        rungs["importance_sampling"] = sampled
+        # Plain samples see every failure: what they exclude has missed some of them.
+        missed = not sampled.failures or sampled.high < found.low
+        if missed or not precise(sampled):
+            found = plainly(enough(found) if found.failures >= MANY else np.inf)
+        if not missed and (precise(sampled) or sampled.high - sampled.low < found.high - found.low):
             found, used = sampled, "importance_sampling"
-            if missed or not precise:
-                other = plainly(enough)
-                narrower = other[0].high - other[0].low < sampled.high - sampled.low
-                found, used = other if missed or narrower else (sampled, used)
     total = problem.evaluations + rungs["monte_carlo"].evaluations
     value = found.failure if found.failures else found.high
     return replace(found, failure=value, evaluations=total), used, rungs

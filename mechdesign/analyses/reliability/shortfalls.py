@@ -1,0 +1,54 @@
+"""What methods that sample about the limits fell short of: the precision asked, and what cannot be assembled there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.reliability.methods import Found, Task, wanted_precision
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+
+def unreached(study: Study, poses: Poses, found: Sequence[Found], task: Task) -> list[str]:
+    """A sentence where `auto` ended before the precision asked, with the worst pose and what was reached there."""
+    precision = wanted_precision(task)
+    short: dict[int, float] = {}
+    for each in found:
+        for pose in each.rungs:
+            estimate = each.estimates[pose]
+            # Of no failure at all the interval's upper end is told elsewhere.
+            if estimate.failures and not precision.reached(estimate.failure, estimate.low, estimate.high):
+                half = 0.5 * (estimate.high - estimate.low)
+                short[pose] = half / estimate.failure if precision.half_width is None else half
+    if not short:
+        return []
+    pose = max(short, key=lambda each: short[each])
+    if precision.half_width is None:
+        asked, reached = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
+        asked += " of the probability of failure"
+    else:
+        asked, reached = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
+    others = f" (the worst of {len(short)} poses)" if len(short) > 1 else ""
+    return [
+        f"auto: half the interval is {reached} at {pose_in_words(study, poses, pose)}{others}, not the {asked} asked; "
+        f"it ends at {task.most} samples, which reliability.samples sets"
+    ]
+
+
+def unassembled(found: Sequence[Found]) -> list[str]:
+    """A sentence for each method whose samples about the limits meet what cannot be assembled."""
+    sentences = []
+    for each in found:
+        drawn = [
+            estimate
+            for pose, estimate in each.estimates.items()
+            if each.used.get(pose, each.method) == "importance_sampling" and estimate.invalid
+        ]
+        if drawn:
+            invalid, samples = sum(part.invalid for part in drawn), sum(part.samples for part in drawn)
+            sentences.append(
+                f"{each.method}: {invalid} of {samples} samples drawn about the limits cannot be assembled; they count "
+                "as failures"
+            )
+    return sentences
