@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.workspace.contours import joined, zero_curves
+from mechdesign.analyses.workspace.chains import joined
+from mechdesign.analyses.workspace.contours import zero_curves
 from mechdesign.results import Table
 
 FIVE_BAR = """
@@ -46,6 +48,8 @@ mechanism:
   sketch: {E: [1, 1], P: [2, 1]}
 workspace: {point: P, scan: {about: [0, 0]}, indices: []}
 """
+# Lines of a grid, on none of which a known function has a root.
+LINES = np.linspace(-1.05, 1, 40)
 PLATFORM = Path(__file__).parents[2] / "configs" / "planar_3rpr.yaml"
 
 
@@ -60,27 +64,25 @@ def each(table: Table) -> list[tuple[str, str, np.ndarray]]:
     return found
 
 
-def elbow(z: np.ndarray, base: float, side: int) -> np.ndarray:
-    k = z - base
-    cosine = (0.25**2 + np.abs(k) ** 2 - 0.4**2) / (2 * 0.25 * np.abs(k))
-    return base + 0.25 * np.exp(1j * (np.angle(k) + side * np.arccos(cosine)))
-
-
 @pytest.mark.parametrize("about", ["[0, 0]", "[0.05, 0.45]"])
 def test_forward_singularities_of_a_five_bar(about: str) -> None:
-    """Both forearms in line: with elbows out, two curves that are mirror images of themselves in x = 0."""
+    """Both forearms in line: with elbows out, both on the same side of P, so that the elbows meet at (0, +-0.2).
+
+    P is then at 0.4 from there, up to where a leg is folded or stretched: 0.15 or 0.65 from its motor.
+    """
     study = study_of(FIVE_BAR, "workspace.assembly=any", f"workspace.scan.about={about}")
     curves = each(mechdesign.workspace(study).tables["singularities"])
     forward = [z for kind, cause, z in curves if (kind, cause) == ("forward", "fore_left-fore_right in line")]
     assert len(forward) == 2
-    for z in forward:
-        one, two = z - elbow(z, -0.15, 1), z - elbow(z, 0.15, -1)
-        assert np.abs((np.conj(one) * two).imag).max() < 1e-9
-        # In order: no step is far longer than those beside it, and the curve runs from side to side of the region.
+    for z, elbows, depth in zip(sorted(forward, key=lambda z: -z.imag.max()), (0.2j, -0.2j), (0.12, 0.52), strict=True):
+        assert np.abs(z - elbows) == pytest.approx(np.full(len(z), 0.4), abs=1e-9)
+        assert sorted(z[[0, -1]], key=lambda end: end.real) == pytest.approx(
+            [-0.24 - depth * 1j, 0.24 - depth * 1j], abs=1e-8
+        )
+        # In order: no step is far longer than those beside it, and none leads back.
         steps = np.abs(np.diff(z))
         assert steps.max() < 0.1 * steps.sum()
-        assert z[0].real == pytest.approx(-z[-1].real, abs=2e-3)
-        assert z[0].imag == pytest.approx(z[-1].imag, abs=2e-3)
+        assert steps.sum() == pytest.approx(2 * 0.4 * np.arcsin(0.24 / 0.4), rel=1e-3)
 
 
 def test_they_bound_the_region_of_one_assembly() -> None:
@@ -167,19 +169,107 @@ def test_parallel_singularities_of_a_platform() -> None:
         assert np.abs(np.linalg.det(rows)).max() < 1e-9
 
 
-def test_zero_curves_of_known_functions() -> None:
-    """A circle closes and lies on its radius; two crossing lines are four branches put in order."""
-    s = np.linspace(-1.05, 1, 40)
+def zeros(function: Callable[[np.ndarray], np.ndarray]) -> list[np.ndarray]:
+    """Curves on which a function of the plane is zero, by a grid of 40 lines each way over a square."""
 
     def place(row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        return np.interp(row, np.arange(40), s) + 1j * np.interp(column, np.arange(40), s)
+        return np.interp(row, np.arange(40), LINES) + 1j * np.interp(column, np.arange(40), LINES)
 
-    grid = s[:, None] + 1j * s
-    (circle,) = joined(zero_curves(np.abs(grid) - 0.7, place, lambda z: np.abs(z) - 0.7), 1e-9)
+    found = zero_curves(function(LINES[:, None] + 1j * LINES), lambda row, column: function(place(row, column)))
+    return joined([place(*lines) for lines in found], 1e-9)
+
+
+def test_zero_curves_of_known_functions() -> None:
+    """A circle closes and lies on its radius; two crossing lines are four branches put in order."""
+    (circle,) = zeros(lambda z: np.abs(z) - 0.7)
     assert circle[0] == circle[-1]
     assert np.abs(circle) == pytest.approx(np.full(len(circle), 0.7), abs=1e-12)
     assert np.abs(np.diff(circle)).sum() == pytest.approx(2 * np.pi * 0.7, rel=2e-3)
-    lines = joined(zero_curves((grid**2).imag - 0.01, place, lambda z: (z**2).imag - 0.01), 1e-9)
+    lines = zeros(lambda z: (z**2).imag - 0.01)
     assert len(lines) == 2
     for z in lines:
         assert (z**2).imag == pytest.approx(np.full(len(z), 0.01), abs=1e-12)
+
+
+@pytest.mark.parametrize("radius", [0.02, 1e-3, 1e-5])
+@pytest.mark.parametrize("centre", [0.3234 + 0.1j, LINES[20] + 1j * LINES[7]])
+def test_a_loop_smaller_than_a_cell(radius: float, centre: complex) -> None:
+    """Lines of the grid are 0.05 apart: of a small circle they meet nothing, or one node at its centre."""
+    (loop,) = zeros(lambda z: np.abs(z - centre) ** 2 - radius**2)
+    assert loop[0] == loop[-1]
+    assert np.abs(loop - centre) == pytest.approx(np.full(len(loop), radius), rel=1e-6)
+    assert abs(np.abs(np.diff(loop)).sum() - 2 * np.pi * radius) < 0.1 * 2 * np.pi * radius
+
+
+def test_a_curve_that_is_touched_and_not_crossed() -> None:
+    """Double roots: of a circle, of a line between the grid's lines and of one on its nodes; beside a simple line."""
+    (circle,) = zeros(lambda z: (np.abs(z) - 0.7) ** 2)
+    assert circle[0] == circle[-1]
+    assert np.abs(circle) == pytest.approx(np.full(len(circle), 0.7), abs=1e-7)
+    assert np.abs(np.diff(circle)).sum() == pytest.approx(2 * np.pi * 0.7, rel=2e-3)
+    for place in (0.111, LINES[7]):
+        (line,) = zeros(lambda z, place=place: (z.real - place) ** 2)  # type: ignore[misc]
+        assert line.real == pytest.approx(np.full(len(line), place), abs=1e-7)
+        assert abs(line[-1] - line[0]) == pytest.approx(2.05, abs=1e-7)
+    found = zeros(lambda z: (z.imag - 0.011 - 0.05 * z.real) ** 2 * (z.real - 0.2))
+    assert sorted(round(abs(z[-1] - z[0]), 5) for z in found) == [2.05, round(2.05 * np.hypot(1, 0.05), 5)]
+
+
+def test_a_point_that_is_touched_and_not_crossed() -> None:
+    (point,) = zeros(lambda z: np.abs(z - 0.3234 - 0.1j) ** 2)
+    assert point == pytest.approx([0.3234 + 0.1j], abs=1e-7)
+
+
+def test_a_dip_above_zero_is_no_curve() -> None:
+    assert zeros(lambda z: (np.abs(z) - 0.7) ** 2 + 1e-6) == []
+
+
+@pytest.mark.parametrize("width", [0.02, 0.004])
+def test_two_curves_between_the_same_lines(width: float) -> None:
+    """Concentric circles much nearer to each other than the grid's lines: both whole."""
+    found = zeros(lambda z: (np.abs(z) - 0.7) ** 2 - (width / 2) ** 2)
+    assert len(found) == 2
+    for z, radius in zip(sorted(found, key=lambda z: abs(z[0])), (0.7 - width / 2, 0.7 + width / 2), strict=True):
+        assert z[0] == z[-1]
+        assert np.abs(z) == pytest.approx(np.full(len(z), radius), abs=1e-12)
+
+
+def test_curves_that_cross_at_a_small_angle() -> None:
+    """Two lines that part by a tenth: both whole but for the crossing itself, whichever branches are told as one."""
+    found = zeros(lambda z: (z.imag - 0.011 - 0.05 * z.real) * (z.imag - 0.011 + 0.05 * z.real))
+    assert len(found) == 2
+    for z in found:
+        assert np.abs(z.imag - 0.011) == pytest.approx(0.05 * np.abs(z.real), abs=1e-12)
+    lengths = [np.abs(np.diff(z)).sum() for z in found]
+    assert sum(lengths) == pytest.approx(2 * 2.05 * np.hypot(1, 0.05), rel=2e-3)
+
+
+def test_parallel_singularities_of_a_platform_are_a_conic() -> None:
+    """With the platform held the determinant of the legs' lines is quadratic: its six coefficients from six points."""
+    limits = (
+        "mechanism.limits=[{drive: l1, min: 0.4, max: 1.4}, {drive: l2, min: 0.4, max: 1.4}, {drive: l3, max: 1.6}]"
+    )
+    held = "at: {platform.angle: [-25]}, characteristic_length: 0.2"
+    section = f"workspace={{point: P, {held}, assembly: any, indices: []}}"
+    curves = each(mechdesign.workspace(mechdesign.load(PLATFORM, [limits, section])).tables["singularities"])
+    corners = np.exp(1j * np.radians(-25)) * np.array([-0.2, 0.2, 0.25 + 0.15j])
+
+    def determinant(z: np.ndarray) -> np.ndarray:
+        legs = z[:, None] + corners - np.array([-0.6, 0.6, 0.3 - 0.2j])
+        return np.linalg.det(np.stack([legs.real, legs.imag, (np.conj(corners) * legs).imag], axis=-1))
+
+    def powers(z: np.ndarray) -> np.ndarray:
+        return np.stack([z.real**2, z.real * z.imag, z.imag**2, z.real, z.imag, np.ones(len(z))], axis=-1)
+
+    six = np.array([0, 1, 1j, 1 + 1j, -1, -1j])
+    conic = np.linalg.solve(powers(six), determinant(six))
+    forward = [z for kind, _, z in curves if kind == "forward"]
+    assert forward
+    for z in forward:
+        assert np.abs(powers(z) @ conic).max() < 1e-9
+    # Each ends where a leg is at its limit: no part is missing.
+    lengths = np.abs(
+        np.concatenate([z[[0, -1]] for z in forward])[:, None] + corners - np.array([-0.6, 0.6, 0.3 - 0.2j])
+    )
+    at_limit = np.abs(lengths[:, :, None] - np.array([0.4, 1.4, 1.6])).min(axis=(1, 2))
+    assert at_limit == pytest.approx(np.zeros(len(at_limit)), abs=1e-8)

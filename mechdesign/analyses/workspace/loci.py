@@ -13,8 +13,10 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.workspace.contours import joined, zero_curves
+from mechdesign.analyses.workspace.chains import joined
+from mechdesign.analyses.workspace.contours import zero_curves
 from mechdesign.analyses.workspace.curves import Patch
+from mechdesign.analyses.workspace.ends import Ends
 from mechdesign.analyses.workspace.field import Field
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.derivatives import determinants
@@ -103,9 +105,15 @@ def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus
     for patch in patches:
         grid, place = patch.grid(about), _places(patch, about)
         for k, at_nodes in enumerate(values(grid)):
+
+            def determinant(z: Complex, k: int = k) -> Floats:
+                return np.asarray(values(z)[k])
+
             seams = _seams(at_nodes)
             curves[k] += [grid[row, first:last] for row, first, last in seams]
-            curves[k] += zero_curves(at_nodes, place, lambda z, k=k: values(z)[k])  # type: ignore[misc]
+            found = zero_curves(at_nodes, lambda row, column, d=determinant, p=place: d(p(row, column)))  # type: ignore[misc]
+            ends = Ends(field, about, patch, determinant)
+            curves[k] += [ends.extended(place(*lines), *lines) for lines in found]
     size = max(float(np.max(patch.outer)) for patch in patches)
     return [
         Locus(FORWARD, name, curve)
