@@ -56,6 +56,19 @@ def test_whole_cycle_of_three_orders(benchmark: Any) -> None:
     benchmark.extra_info.update(samples_per_second=73 * 40_000 / benchmark.stats["min"])
 
 
+def test_probability_of_the_whole_cycle(benchmark: Any) -> None:
+    """The same samples again, of mechanisms that are moved through all poses; of velocities, which are limited."""
+    limits = "reliability.limits={S.y: 0.9, S.y_velocity: 0.6}"
+    study = mechdesign.load(CONFIGS / "toggle.yaml", overrides=[limits])
+    benchmark.pedantic(lambda: mechdesign.reliability(study, jobs=2), rounds=3, warmup_rounds=1)
+    benchmark.extra_info.update(samples_per_second=2 * 73 * 40_000 / benchmark.stats["min"])
+
+
+def test_second_order_of_the_whole_cycle(benchmark: Any) -> None:
+    study = mechdesign.load(CONFIGS / "toggle.yaml", overrides=["reliability.methods=[second_order]"])
+    benchmark.pedantic(lambda: mechdesign.reliability(study, jobs=2), rounds=3, warmup_rounds=1)
+
+
 def test_whole_command_with_pictures(benchmark: Any, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mechdesign", "reliability", str(CONFIGS / "toggle.yaml"), "--quiet", "--out"]
     benchmark.pedantic(

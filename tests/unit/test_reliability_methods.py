@@ -8,6 +8,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.workspace import nodes
+from mechdesign.errors import Interrupted
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.reliability_models import METHODS
@@ -95,3 +96,33 @@ def test_nodes_of_a_workspace(method: str, monkeypatch: pytest.MonkeyPatch) -> N
     # Nowhere is the arm exact, and the farther the tip the larger its error: 0.17 at a radius of 100.
     reach = np.hypot(table["P.x"], table["P.y"])
     assert table["failure"][np.argmax(reach)] > 2 * table["failure"][np.argmin(reach)]
+
+
+@pytest.mark.parametrize("method", ["monte_carlo", "quasi_monte_carlo", "form", "importance_sampling", "auto"])
+def test_an_interrupt_keeps_the_poses_that_are_finished(method: str) -> None:
+    """Ctrl-C at the third report of progress; what had begun before is answered, the rest is nan."""
+
+    class Impatient:
+        reports = 0
+
+        def start(self, total: int, what: str) -> None:
+            pass
+
+        def update(self, n: int) -> None:
+            self.reports += 1
+            if self.reports == 3:
+                raise KeyboardInterrupt
+
+    changes = [
+        "reliability.poses=[{theta: 30}, {theta: 40}, {theta: 50}, {theta: 60}]",
+        "reliability.samples=2000",
+        "reliability.limits={B.x: 0.6}",
+        f"reliability.methods=[analytic, {method}]",
+    ]
+    with pytest.raises(Interrupted) as caught:
+        mechdesign.reliability(study_of(SLIDER_CRANK, *changes), progress=Impatient())
+    result = caught.value.result
+    table = result.tables["reliability"]
+    assert np.isfinite(table["failure"][table["method"] == "analytic"]).all()
+    assert np.isfinite(table["failure"][table["method"] == method]).tolist() == [True, True, True, False]
+    assert result.interrupted.endswith(f"analytic, {method}")
