@@ -126,8 +126,8 @@ def test_function_generator_as_made() -> None:
 
 
 def test_two_arms_bored_in_one_setting() -> None:
-    # The rod's tilt is ((dr2 - dr1)/sin + (drod - dframe)/tan)/span. A normal tolerance is three sigma about its middle;
-    # a triangular law from low to high that peaks at 0 has the variance (low^2 + high^2 - low high)/18.
+    # The rod's tilt is ((dr2 - dr1)/sin + (drod - dframe)/tan)/span. A normal tolerance is three sigma about its
+    # middle, a triangular law from low to high that peaks at 0 has the variance (low^2 + high^2 - low high)/18.
     result = mechdesign.reliability(study_named("bored_in_one_setting"))
     moments, table = result.tables["moments"], result.tables["reliability"]
     arm, wide = 0.01, math.sqrt((0.01**2 + 0.02**2 + 0.01 * 0.02) / 18)

@@ -235,6 +235,19 @@ def test_path_in_the_plane_is_drawn_over_its_poses() -> None:
     assert found["reliability"].axes[0].lines[0].get_xdata().tolist() == [1, 2, 3, 4, 5]
 
 
+def test_a_sweep_of_a_single_pose_is_drawn_as_one_that_is_listed() -> None:
+    found, _ = drawn(SLIDER, "reliability.sweep={crank: 30}", "reliability.methods=[analytic]")
+    (place,) = found["reliability"].axes[0].get_xticklabels()
+    assert place.get_text() == "crank = 30 deg"
+
+
+def test_poses_out_of_reach_leave_gaps() -> None:
+    path = "reliability.path={P: [[60, 100], [70, 110], [300, 100], [70, 90], [60, 100]]}"
+    found, _ = drawn(ARM, path, "reliability.methods=[analytic, monte_carlo]")
+    known = np.isfinite(found["reliability"].axes[0].lines[0].get_ydata())
+    assert known.tolist() == [True, True, False, True, True]
+
+
 def test_contributions_are_ranked_with_sobol_indices_beside() -> None:
     study = study_of(SLIDER, "reliability.poses=[{crank: 60}]")
     columns = {

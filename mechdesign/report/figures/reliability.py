@@ -9,7 +9,7 @@ from mechdesign.analyses.poses import pose_in_words
 from mechdesign.report.figures.densities import density_figures
 from mechdesign.report.figures.errors.allocation import allocation_figure
 from mechdesign.report.figures.errors.contributions import contributions_figure
-from mechdesign.report.figures.errors.estimates import estimate_figure
+from mechdesign.report.figures.errors.estimates import MOST_LISTED, estimate_figure
 from mechdesign.report.figures.errors.looks import LOOKS
 from mechdesign.report.figures.errors.maps import map_figures, plane
 from mechdesign.report.figures.errors.panels import along
@@ -29,7 +29,8 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
         found |= sweep_figures(study, tables["moments"], swept)
     if over is not None:
         found |= map_figures(study, result, over)
-    if "reliability" in tables and (poses.listed or swept is not None):
+    few = poses.listed or (over is None and poses.count <= MOST_LISTED)
+    if "reliability" in tables and (few or swept is not None):
         found["reliability"] = estimate_figure(study, tables["reliability"], poses, swept)
     found |= _sampled(study, result, poses)
     found["contributions"] = contributions_figure(study, tables["contributions"], poses)

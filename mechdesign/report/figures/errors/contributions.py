@@ -23,20 +23,22 @@ _SOBOL = {
     "sobol_first": ("Sobol index, alone", style.ORANGE),
     "sobol_total": ("Sobol index, with all interactions", style.GREEN),
 }
-_LINE, _BELOW, _ABOVE = 0.24, 0.62, 0.32  # inches: a source, below a panel, above it
+# Inches: a source, below a panel, above it, and the least width of its bars.
+_LINE, _BELOW, _ABOVE, _NARROWEST = 0.24, 0.62, 0.32, 1.9
 
 
 def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
     """A panel an output and order; a bar a pose where a few are listed, their average otherwise, or three indices."""
     pairs = list(dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), strict=True)))[:MOST_PANELS]
     names = list(dict.fromkeys(table["source"].tolist()))
-    columns = min(len(pairs), 3 if len(names) < 9 else 2)
+    margin = 0.3 + 0.072 * max(len(name) for name in names)
+    room = int(style.WIDTH / (margin + _NARROWEST))
+    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, room))
     lines = -(-len(pairs) // columns)
     sobol = _sobol_pose(table, poses, len(names))
     each = sobol is None and poses.listed and poses.count <= MOST_POSES
     bars = 3 if sobol is not None else poses.count if each else 1
     panel = (0.15 + min(len(names), MOST_SOURCES)) * max(_LINE, 0.1 * bars + 0.06)
-    margin = 0.3 + 0.072 * max(len(name) for name in names)
     keys = 0 if bars == 1 else 1 if bars < 3 else 2
     bottom = 0.55 + 0.2 * keys
     height = 0.75 + lines * panel + (lines - 1) * (_BELOW + _ABOVE) + bottom

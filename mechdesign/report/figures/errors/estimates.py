@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.report.figures.errors.looks import LOOKS, Look, methods, select
-from mechdesign.report.figures.errors.panels import Along, Floats, framed, legend_below, number, tick_abscissa, title
+from mechdesign.report.figures.errors.panels import (
+    Along,
+    Floats,
+    fitting,
+    framed,
+    legend_below,
+    number,
+    tick_abscissa,
+    title,
+)
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -21,6 +30,7 @@ from mechdesign.study.poses import Poses
 MOST_LISTED = 12
 # Values that are written beside their marks.
 MOST_WRITTEN = 8
+_ABOVE, _TALL = 0.7, 2.7  # inches
 # Values farther apart than this are drawn on a logarithmic scale.
 _WIDE = 8.0
 # Handles by their words; error bars are no artists.
@@ -30,21 +40,24 @@ Legend = dict[str, Any]
 def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | None) -> Figure:
     """Failure by every method, over what a sweep runs over or beside the words for each listed pose."""
     known = methods(table)
-    lines = 1 if swept is not None else min(len(poses.names), 4)
-    bottom = 0.35 + 0.15 * lines + 0.2 * (2 if len(known) > 2 else 1)
-    figure = framed(bottom + 3.6, left=0.95, right=0.15, top=0.7, bottom=bottom + 0.2)
+    figure = framed(4.5, left=0.95, right=0.15, top=_ABOVE, bottom=1.0)
     axes = figure.subplots()
     floor, unseen = _scale(axes, table), _unseen(table)
     entries: Legend = {}
     many = poses.count > MOST_LISTED
     written = swept is None and poses.count * len(known) <= MOST_WRITTEN
     place = np.arange(poses.count, dtype=float) if swept is None else swept.values
-    apart = min(0.14, 0.8 / len(known)) if swept is None else 0.0
-    for k, method in enumerate(known):
+    # Beside each other at a listed pose; over a sweep only dots are moved, a little, lines stay where they are.
+    beside = known if swept is None else [method for method in known if LOOKS[method].simulated]
+    apart = (
+        min(0.3 if written else 0.14, 0.8 / len(known)) if swept is None else 0.2 * float(np.ptp(place)) / len(place)
+    )
+    for method in known:
         rows = np.flatnonzero(select(table, method=method, scope="pose"))
         if swept is None:
             rows = rows[:MOST_LISTED]
-        at = place[: len(rows)] + (k - (len(known) - 1) / 2) * apart
+        shift = (beside.index(method) - (len(beside) - 1) / 2) * apart if method in beside else 0.0
+        at = place[: len(rows)] + shift
         look = LOOKS[method]
         if look.simulated:
             _dots(axes, table, rows, at, look, floor, entries)
@@ -72,6 +85,11 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
         axes.set_xlabel(swept.label)
         tick_abscissa(axes, swept)
         axes.margins(x=0.02)
+    lines = 1 if swept is not None else min(len(poses.names), 4)
+    bottom = 0.45 + 0.15 * lines + 0.2 * -(-len(entries) // fitting(list(entries)))
+    height = _ABOVE + _TALL + bottom
+    figure.set_figheight(height)
+    figure.subplots_adjust(bottom=bottom / height, top=1 - _ABOVE / height)
     title(figure, heading, "whiskers: 99.7 % intervals; open arrows: no failure was seen, upper end of the interval"
           if unseen.any() else "whiskers: 99.7 % intervals", left=0.95)  # fmt: skip
     legend_below(figure, list(entries.values()), list(entries))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -38,8 +37,9 @@ LOOKS = {
     "importance_sampling": Look("importance sampling", style.PURPLE, "X", ""),
     "auto": Look("auto", style.ORANGE, "*", ""),
 }
-# What is nearest to the truth, the best first.
-_TRUST = ("auto", "importance_sampling", "quasi_monte_carlo", "monte_carlo", "second_order", "form", "analytic")
+# What is nearest to the truth, the best first: of probabilities, and of moments (which auto takes from fewer samples).
+_PROBABILITIES = ("auto", "importance_sampling", "quasi_monte_carlo", "monte_carlo", "second_order", "form", "analytic")
+_MOMENTS = ("quasi_monte_carlo", "monte_carlo", "auto", "second_order", "analytic")
 
 
 def methods(table: Table) -> list[str]:
@@ -48,9 +48,14 @@ def methods(table: Table) -> list[str]:
     return [method for method in LOOKS if method in present]
 
 
-def most_trusted(known: Sequence[str]) -> str:
-    """The method whose value stands where there is room for one only."""
-    return next(method for method in _TRUST if method in known)
+def best_probability(table: Table) -> str:
+    """The method whose probabilities stand where there is room for one only."""
+    return next(method for method in _PROBABILITIES if method in methods(table))
+
+
+def best_moments(table: Table) -> str:
+    """The method whose moments stand where there is room for one only."""
+    return next(method for method in _MOMENTS if method in methods(table))
 
 
 def select(table: Table, **chosen: str) -> NDArray[np.bool_]:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.looks import LOOKS, methods, most_trusted, select
+from mechdesign.report.figures.errors.looks import LOOKS, best_moments, best_probability, select
 from mechdesign.report.figures.errors.panels import Floats, channels, coordinate_label, framed, moving_names, title
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -65,7 +65,7 @@ def plane(study: Study, poses: Poses) -> Plane | None:
 def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
     """Standard deviation of each output, and the failure probability where there are limits."""
     moments = result.tables["moments"]
-    method = most_trusted(methods(moments))
+    method = best_moments(moments)
     shown = [channel for channel in channels(moments) if channel[1] == "position"] or channels(moments)
     parts = []
     for output, order, unit in shown[:MOST_MAPS]:
@@ -75,7 +75,7 @@ def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
     found = {"deviation_map": _sheet(study, over, parts, "Standard deviation of the error", note)}
     if "reliability" in result.tables:
         table = result.tables["reliability"]
-        method = most_trusted(methods(table))
+        method = best_probability(table)
         rows = select(table, method=method, scope="pose")
         failure = table["failure"][rows].reshape(over.x.shape)
         found["failure_map"] = _sheet(

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.looks import LOOKS, methods, most_trusted, select
+from mechdesign.report.figures.errors.looks import LOOKS, best_moments, methods, select
 from mechdesign.report.figures.errors.panels import (
     BARE,
     MOST_PANELS,
@@ -34,10 +34,9 @@ def sweep_figures(study: Study, moments: Table, swept: Along) -> dict[str, Figur
     found = {"bands": _bands(study, moments, swept)}
     for name, column, what in (("means", "mean", "mean"), ("deviations", "sigma", "standard deviation")):
         found[name] = _curves(moments, swept, column, f"{what} of made mechanisms".capitalize())
-    known = methods(moments)
-    reference = most_trusted(known)
-    if LOOKS[reference].simulated and len(known) > 1:
-        found["difference"] = _difference(moments, swept, reference)
+    reference, computed = best_moments(moments), [m for m in methods(moments) if not LOOKS[m].simulated]
+    if LOOKS[reference].simulated and computed:
+        found["difference"] = _difference(moments, swept, reference, computed)
     return found
 
 
@@ -103,37 +102,34 @@ def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
     return figure
 
 
-def _difference(moments: Table, swept: Along, reference: str) -> Figure:
-    """Standard deviations of the computed methods, in per cent of the simulated ones."""
+def _difference(moments: Table, swept: Along, reference: str, computed: Sequence[str]) -> Figure:
+    """Standard deviations of the computed methods, in per cent of the simulated ones, and how far apart on average."""
     panels = _grouped(moments)
-    others = [method for method in methods(moments) if method != reference]
     figure, axes = stack(
-        len(panels),
-        f"Standard deviation less that of {LOOKS[reference].words}, in per cent of it",
-        swept.label,
-        bottom=WITH_LEGEND if len(others) > 1 else BARE,
-    )
+        len(panels), f"Standard deviation less that of {LOOKS[reference].words}, in per cent of it", swept.label,
+        note="in brackets: how far apart on average", bottom=WITH_LEGEND if len(computed) > 1 else BARE,
+    )  # fmt: skip
     tick_abscissa(axes[-1], swept)
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
         axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
         named = []
         for output, color in zip(outputs, style.PALETTE, strict=False):
             true = moments["sigma"][select(moments, output=output, order=order, unit=unit, method=reference)]
-            for method in others:
-                look, rows = LOOKS[method], select(moments, output=output, order=order, unit=unit, method=method)
+            apart = []
+            for method in computed:
+                rows = select(moments, output=output, order=order, unit=unit, method=method)
                 with np.errstate(invalid="ignore", divide="ignore"):
                     percent = 100.0 * (moments["sigma"][rows] / true - 1.0)
                 mean = np.nanmean(np.abs(percent)) if np.isfinite(percent).any() else np.nan
-                axis.plot(swept.values, percent, look.dashes or "-", marker=".", markersize=4, linewidth=1.2,
-                          color=look.color if len(outputs) == 1 else color)  # fmt: skip
-                named.append(f"{output} {look.words} {mean:.2f} %" if len(others) > 1 else f"{output} {mean:.2f} %")
-        axis.set_title(f"on average apart: {', '.join(named[:4])}", loc="right", fontsize=8.5)
+                apart.append(f"{mean:.2f} %")
+                axis.plot(swept.values, percent, LOOKS[method].dashes, marker=".", markersize=4, linewidth=1.2,
+                          color=color)  # fmt: skip
+            named.append(f"{output} ({', '.join(apart)})")
         axis.set_ylabel(f"{order} [%]")
-        if len(outputs) > 1:
-            _name_outputs(axis, outputs, style.PALETTE)
-    if len(others) > 1:
-        handles = [Line2D([], [], color=LOOKS[m].color, linestyle=LOOKS[m].dashes or "-", marker=".") for m in others]
-        legend_below(figure, handles, [LOOKS[method].words for method in others])
+        _name_outputs(axis, named, style.PALETTE)
+    if len(computed) > 1:
+        handles = [Line2D([], [], color=style.INK, linestyle=LOOKS[m].dashes, marker=".") for m in computed]
+        legend_below(figure, handles, [LOOKS[method].words for method in computed])
     return figure
 
 
