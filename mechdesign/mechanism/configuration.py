@@ -22,11 +22,12 @@ class Reason(IntEnum):
     NOT_CLOSED = 1
     OTHER_ASSEMBLY = 2
     LIMIT = 3
+    NOT_HELD = 4
 
     @property
     def text(self) -> str:
         """Words for tables and messages."""
-        return ("", "cannot be assembled", "other assembly", "limit")[self]
+        return ("", "cannot be assembled", "other assembly", "limit", "does not hold its load")[self]
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,36 @@ def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
             checker.reporter.report(("reliability", "correlation", index), "this pair is given twice")
     if section.allocate is not None:
         _allocate(checker, section, dimensions, clearances)
-    return section.model_copy(update={"dimensions": dimensions, "clearances": clearances})
+    load = _load(checker, section, dimensions)
+    return section.model_copy(update={"dimensions": dimensions, "clearances": clearances, "load": load})
+
+
+def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension]) -> tuple[float, ...] | None:
+    """The load as fx, fy, mz."""
+    path: Path = ("reliability", "load")
+    report, stiffness = checker.reporter.report, checker.parts.get("stiffness")
+    random = [name for name in LOADS if name in dimensions]
+    if checker.reporter.raw(("stiffness",)) is None:
+        missing = "a load acts at the point of the stiffness section, and the study has none"
+        if section.load is not None:
+            report(path, missing)
+        for name in random:
+            report(("reliability", "dimensions", name), missing, at_key=True)
+    pin = stiffness is not None and stiffness.link is None
+    message = "a pin carries no moment; name the 'link' of the stiffness section that is loaded"
+    if pin and "load.mz" in random:
+        report(("reliability", "dimensions", "load.mz"), message, at_key=True)
+    load = section.load
+    if load is None:
+        return None
+    if len(load) not in ((2, 3) if pin else (3,)):
+        report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
+        return (0.0, 0.0, 0.0)
+    for place, kind in enumerate(list(LOADS.values())[: len(load)]):
+        checker.kind((*path, place), kind)
+    if pin and len(load) == 3 and load[2]:
+        report((*path, 2), message)
+    return (*load, 0.0)[:3]
 
 
 def _allocate(

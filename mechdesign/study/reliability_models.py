@@ -305,6 +305,7 @@ class ReliabilitySection(PoseSection):
     rates: dict[CoordinateName, Number] = Field(default_factory=dict)
     accelerations: dict[CoordinateName, Number] = Field(default_factory=dict)
     limits: dict[CoordinateName, ErrorLimit] = Field(default_factory=dict)
+    load: tuple[Number, ...] | None = None
     methods: Annotated[
         tuple[Annotated[str, Choice(METHODS)], ...],
         BeforeValidator(one_or_many),

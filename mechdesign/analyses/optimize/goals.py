@@ -30,6 +30,7 @@ FAILED = (
     "a pose cannot be assembled",
     "a pose is reached in another assembly only",
     "a pose is outside the limits",
+    "a pose does not hold its load",
 )
 
 

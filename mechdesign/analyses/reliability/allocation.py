@@ -160,8 +160,7 @@ def _retold_linear(linear: FirstOrder, sources: Sources) -> FirstOrder:
 def _shares(model: Model, scales: Floats, k: int) -> Floats:
     """Share of each source in the variances of the limited errors at a pose, each over the square of its limit."""
     setting = model.settings[k]
-    linear = model.with_scales(scales)
-    linear = replace(linear, components=linear.components[:, :, [setting.pose]])
+    linear = model.with_scales(scales).take([setting.pose])
     share, variance = linear.share()[:, :, 0], linear.deviation()[:, 0] ** 2
     weights = np.zeros(len(variance))
     for band in setting.bands:
@@ -297,7 +296,7 @@ def _unreachable(
     if held:
         reason = f"what is held breaks the limits by itself: {', '.join(held)}"
     elif model.with_scales(tightest).shift()[:, model.settings[worst].pose].any():
-        reason = "the mean errors, which the width of a tolerance does not change, break the limits by themselves"
+        reason = "the mean errors, which the width of no tolerance changes, break the limits by themselves"
     else:
         reason = "they would have to shrink to nothing"
     return (

@@ -15,6 +15,7 @@ from mechdesign.analyses.reliability.allocation import Allocated, allocate
 from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.comparison import disagreements
 from mechdesign.analyses.reliability.cycle import with_cycle
+from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
 from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
 from mechdesign.analyses.reliability.methods import METHODS, MOST, Found, Partial, Task, analytic
 from mechdesign.analyses.reliability.question import Question, ask
@@ -67,10 +68,11 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     assert section is not None
     question = ask(study, section)
     poses = study.poses("reliability")
-    nominal = NominalPoses.solve(study, poses, question)
+    nominal, elastic, doubts = loaded(study, NominalPoses.solve(study, poses, question), question)
+    warnings += doubts
     failures, failed = judge_failures(study, poses, nominal.reason)
-    linear = first_order(study, nominal, question, sources)
-    settings = _settings(study, nominal, question, linear, poses.listed)
+    linear = first_order(study, nominal, question, sources, elastic)
+    settings = _settings(study, nominal, question, linear, elastic, poses.listed)
     task = Task(
         settings, sources, linear, len(question.channels), poses.count, study.seed if seed is None else seed,
         section.samples, section.samples if "samples" in section.model_fields_set else MOST, section.precision,
@@ -139,9 +141,9 @@ def first_order_tables(
     section = study.reliability
     assert section is not None
     question = ask(study, section)
-    nominal = NominalPoses.solve(study, poses, question)
-    linear = first_order(study, nominal, question, sources)
-    settings = _settings(study, nominal, question, linear, listed=False)
+    nominal, elastic, _ = loaded(study, NominalPoses.solve(study, poses, question), question)
+    linear = first_order(study, nominal, question, sources, elastic)
+    settings = _settings(study, nominal, question, linear, elastic, listed=False)
     task = Task(settings, sources, linear, len(question.channels), poses.count, 0, 0, 0, None, 1, NULL)
     centres, first = _in_order(study, poses, question, nominal), analytic(task)
     answer = tables.Answer(study, poses, question, nominal.reason, centres, linear, [first], first)
@@ -190,7 +192,25 @@ class NominalPoses:
         return np.isin(self.reason, (Reason.OK, Reason.LIMIT))
 
 
-def first_order(study: Study, nominal: NominalPoses, question: Question, sources: Sources) -> FirstOrder:
+def loaded(study: Study, nominal: NominalPoses, question: Question) -> tuple[NominalPoses, Elastic | None, list[str]]:
+    """Deflections at every pose where the study has a load, poses that do not hold it marked, and what is doubtful."""
+    bent, notes = elasticity(study)
+    if bent is None:
+        return nominal, None, notes
+    flexibility = np.full((len(question.channels), 3, len(nominal.reason)), np.nan)
+    for rows, configuration, _, _ in nominal.groups:
+        for begin in range(0, len(rows), _BLOCK):
+            block = np.arange(begin, min(begin + _BLOCK, len(rows)))
+            part = bent.at(configuration.take(block), question.channels)
+            flexibility[:, :, rows[block]] = part.flexibility
+    elastic = Elastic(flexibility, bent.load)
+    reason = np.where(nominal.assembled & ~elastic.held, np.int8(Reason.NOT_HELD), nominal.reason)
+    return replace(nominal, reason=reason), elastic, [*notes, *unknown(bent, question.channels)]
+
+
+def first_order(
+    study: Study, nominal: NominalPoses, question: Question, sources: Sources, elastic: Elastic | None
+) -> FirstOrder:
     """Linear error model at every pose; nan where the pose is not assembled."""
     parts: FirstOrder | None = None
     components = np.zeros((len(question.channels), 0, 0))
@@ -199,18 +219,19 @@ def first_order(study: Study, nominal: NominalPoses, question: Question, sources
             block = np.arange(begin, min(begin + _BLOCK, len(rows)))
             with np.errstate(invalid="ignore", divide="ignore"):
                 parts = linear_errors(
-                    study.mechanism, configuration.take(block), question.channels, sources, question.rates
-                )
+                    study.mechanism, configuration.take(block), question.channels, sources, question.rates,
+                    None if elastic is None else elastic.take(rows[block]),
+                )  # fmt: skip
             if not components.size:
                 components = np.full((*parts.components.shape[:2], len(nominal.reason)), np.nan)
             components[:, :, rows[block]] = parts.components
     assert parts is not None
     components[:, :, ~nominal.assembled] = np.nan
-    return replace(parts, components=components)
+    return replace(parts, components=components, offset=None if elastic is None else elastic.offset)
 
 
 def _settings(
-    study: Study, nominal: NominalPoses, question: Question, linear: FirstOrder, listed: bool
+    study: Study, nominal: NominalPoses, question: Question, linear: FirstOrder, elastic: Elastic | None, listed: bool
 ) -> list[Setting]:
     mechanism = study.mechanism
     sigma = linear.deviation()
@@ -240,6 +261,7 @@ def _settings(
                     scale,
                     bool(row == assembled[0]),
                     bool(row == assembled[0]),
+                    None if elastic is None else elastic.take([int(row)]),
                 )
             )
     return sorted(settings, key=lambda setting: setting.pose)

@@ -70,8 +70,7 @@ class Model:
     def failures(self, scales: Floats, which: Sequence[int]) -> Floats:
         """Probability of failure at some of the poses."""
         rows = [self.settings[k].pose for k in which]
-        linear = self.with_scales(scales)
-        linear = replace(linear, components=linear.components[:, :, rows])
+        linear = self.with_scales(scales).take(rows)
         covariance, mean = linear.covariance(), linear.shift()
         bands: Sequence[Band] = self.settings[0].bands
         discs: Sequence[Disc] = self.settings[0].discs

@@ -147,6 +147,7 @@ def limited_part(setting: Setting) -> Setting:
         discs=[replace(disc, x=place[disc.x], y=place[disc.y]) for disc in setting.discs],
         pair=None,
         scale=None,
+        elastic=None if setting.elastic is None else setting.elastic.only(wanted),
     )
 
 

@@ -6,16 +6,18 @@ Var(output) = sum over sources of (d output / d source)^2 Var(source)          [
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.sources import Source, Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
+from mechdesign.study.reliability_models import LOADS
 
 Floats = NDArray[np.float64]
 ORDERS = ("position", "velocity", "acceleration")
@@ -50,6 +52,8 @@ class FirstOrder:
     mean, variance : ndarray, shape (components,)
     correlation : ndarray, shape (components, components), or None
         Correlation coefficients of the components; None where they are independent.
+    offset : ndarray, shape (channels, poses), or None
+        Errors that nothing random causes: deflections.
     """
 
     sources: tuple[Source, ...]
@@ -58,6 +62,12 @@ class FirstOrder:
     mean: Floats
     variance: Floats
     correlation: Floats | None
+    offset: Floats | None = None
+
+    def take(self, poses: Sequence[int] | NDArray[np.intp]) -> FirstOrder:
+        """Some of the poses."""
+        offset = None if self.offset is None else self.offset[:, poses]
+        return replace(self, components=self.components[:, :, poses], offset=offset)
 
     def covariance(self) -> Floats:
         """Covariance of the channels, shape (poses, channels, channels) [S2, eq. 9]."""
@@ -81,8 +91,9 @@ class FirstOrder:
         return np.asarray(np.sqrt(np.einsum("czp,zy,cyp->cp", self.components, self._spread, self.components)))
 
     def shift(self) -> Floats:
-        """Mean error of each channel, shape (channels, poses): of tolerances that are not symmetric."""
-        return np.asarray(np.einsum("czp,z->cp", self.components, self.mean))
+        """Mean error of each channel, shape (channels, poses): deflections, and tolerances that are not symmetric."""
+        found = np.asarray(np.einsum("czp,z->cp", self.components, self.mean))
+        return found if self.offset is None else found + self.offset
 
     def sensitivity(self) -> Floats:
         """Per source, shape (channels, sources, poses): the derivative, of a pin sqrt(s_x^2 + s_y^2)."""
@@ -133,34 +144,52 @@ def nominal_values(
 
 
 def derivatives(
-    mechanism: Mechanism, configuration: Configuration, channels: Sequence[Channel], names: Sequence[str], rates: Rates
+    mechanism: Mechanism,
+    configuration: Configuration,
+    channels: Sequence[Channel],
+    names: Sequence[str],
+    rates: Rates,
+    elastic: Elastic | None = None,
 ) -> Floats:
-    """Derivative of each channel by places and drives, shape (channels, names, n), at a flat batch of configurations.
+    """Derivative of each channel by places, drives and loads, shape (channels, names, n).
+
+    Parameters
+    ----------
+    configuration : Configuration
+        A flat batch.
+    elastic : Elastic, optional
+        At these configurations, or at the single pose that all of them are about.
 
     Raises
     ------
     MechanismError
         For the acceleration of a measure that is an expression.
     """
-    found = np.zeros((len(channels), len(names), *configuration.shape))
-    if not names:
+    # Where loads alone vary, all mechanisms are the single nominal one.
+    found = np.zeros((len(channels), len(names), *(configuration.shape or (1,))))
+    for row, name in enumerate(names):
+        if elastic is not None and name in LOADS:
+            found[:, row] = elastic.by(name)
+    rows = [row for row, name in enumerate(names) if name not in LOADS]
+    if not rows:
         return found
+    names = [names[row] for row in rows]
     linear = mechanism.linearize(configuration)
-    position = linear.sensitivity(list(names))
+    position = linear.sensitivity(names)
     motion: Motion | None = None
     if any(channel.order for channel in channels):
         velocity = linear.velocity(rates.velocity)
         acceleration = linear.acceleration(velocity, rates.acceleration)
-        velocity_z, acceleration_z = linear.rate_sensitivity(list(names), position, velocity, acceleration)
+        velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
         assert acceleration_z is not None
         motion = Motion(velocity, acceleration, position, velocity_z, acceleration_z)
     for row, channel in zip(found, channels, strict=True):
         if motion is None or channel.order == 0:
-            row[...] = first(configuration, channel.coordinate, position)
+            row[rows] = first(configuration, channel.coordinate, position)
         elif channel.order == 1:
-            row[...] = velocity_sensitivity(configuration, channel.coordinate, motion)
+            row[rows] = velocity_sensitivity(configuration, channel.coordinate, motion)
         else:
-            row[...] = acceleration_sensitivity(configuration, channel.coordinate, motion)
+            row[rows] = acceleration_sensitivity(configuration, channel.coordinate, motion)
     return found
 
 
@@ -170,8 +199,9 @@ def linear_errors(
     channels: Sequence[Channel],
     sources: Sources,
     rates: Rates,
+    elastic: Elastic | None = None,
 ) -> FirstOrder:
-    """Linear error model at a flat batch of nominal configurations, the drives held.
+    """Linear error model at a flat batch of nominal configurations, the drives held, perhaps under a load.
 
     Raises
     ------
@@ -187,9 +217,10 @@ def linear_errors(
             slopes[row, names.index(name)] = slope
     return FirstOrder(
         linear_sources,
-        np.einsum("zn,cnp->czp", slopes, derivatives(mechanism, configuration, channels, names, rates)),
+        np.einsum("zn,cnp->czp", slopes, derivatives(mechanism, configuration, channels, names, rates, elastic)),
         np.array([k for k, _ in directions], dtype=np.intp),
         np.array([linear_sources[k].mean for k, _ in directions]),
         np.array([linear_sources[k].variance for k, _ in directions]),
         sources.correlated(),
+        None if elastic is None else elastic.offset,
     )

@@ -38,7 +38,9 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
         configuration = solve(setting, made)
         errors, valid = errors_of(setting, made, count)
         names, slopes = _slopes(sources, u)
-        by_name = derivatives(setting.plan.mechanism, configuration, setting.channels, names, setting.rates)
+        by_name = derivatives(
+            setting.plan.mechanism, configuration, setting.channels, names, setting.rates, setting.elastic
+        )
         by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes)
         found, steep = [], []
         for margin, weights in _margins(setting, errors):
@@ -72,7 +74,7 @@ def _margins(setting: Setting, errors: list[Floats]) -> list[tuple[Floats, list[
 
 
 def _slopes(sources: Sources, u: Floats) -> tuple[list[str], Floats]:
-    """Places and drives that vary, and their derivatives by the variables, shape (names, dimension, n)."""
+    """Places, drives and loads that vary, and their derivatives by the variables, shape (names, dimension, n)."""
     d, n = u.shape
     steps = _STEP * np.eye(d)[:, :, None]
     either = np.concatenate([(u + way * steps).swapaxes(0, 1).reshape(d, d * n) for way in (1, -1)], axis=1)
@@ -86,4 +88,4 @@ def _slopes(sources: Sources, u: Floats) -> tuple[list[str], Floats]:
 
 
 def _all(made: Made) -> dict[str, Floats]:
-    return {**made.places, **made.drives}
+    return {**made.places, **made.drives, **made.loads}

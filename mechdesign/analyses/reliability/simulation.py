@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
 from mechdesign.analyses.reliability.first_order import Channel, Rates, nominal_values
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
@@ -52,6 +53,8 @@ class Setting:
         Whether to follow the means and the failures.
     keep : bool
         Whether to keep the errors of the first chunks.
+    elastic : Elastic or None
+        Deflections at this pose.
     """
 
     pose: int
@@ -67,6 +70,7 @@ class Setting:
     scale: tuple[float, float] | None
     trend: bool
     keep: bool
+    elastic: Elastic | None = None
 
     @property
     def limited(self) -> bool:
@@ -231,8 +235,9 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], N
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         values = nominal_values(mechanism, solved, setting.channels, setting.rates)
     errors = []
-    for channel, value, centre in zip(setting.channels, values, setting.centres, strict=True):
-        error = np.broadcast_to(value - centre, (count,))
+    bent = None if setting.elastic is None else setting.elastic.errors(made.loads, count)
+    for k, (channel, value, centre) in enumerate(zip(setting.channels, values, setting.centres, strict=True)):
+        error = np.broadcast_to(value - centre if bent is None else value - centre + bent[k], (count,))
         if channel.order == 0 and channel.coordinate.quantity == "angle":
             error = wrap(error)
         errors.append(error)

@@ -1,0 +1,239 @@
+"""Elastic deflections among the errors: compliance times load, fixed and random, by every method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.stiffness import ARM, FIVE_BAR, matrix
+from helpers.studies import study_of
+from scipy.special import ndtr
+
+import mechdesign
+from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.results import Result
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+# S4's type I at the reference pose, by the corrected theory.
+COMPLIANCE = np.array([
+    [3.0835033763e-7, -3.2704265711e-8, 4.0775675544e-7],
+    [-3.2704265711e-8, 1.5504244485e-8, -6.5408531422e-8],
+    [4.0775675544e-7, -6.5408531422e-8, 7.8523178337e-7],
+])  # fmt: skip
+LOADED = """
+reliability:
+  dimensions: {upper.length: 1e-5, load.fx: {sigma: 20}, load.mz: 3}
+  poses: [{shoulder: 30, elbow: 50}]
+  outputs: [P, lower.angle]
+  load: [100, -50, 10]
+  samples: 100000
+  sobol: 0
+"""
+
+
+def ask(text: str, *overrides: str) -> Result:
+    return mechdesign.reliability(study_of(text, *overrides))
+
+
+def pick(result: Result, table: str, column: str, **chosen: object) -> np.ndarray:
+    found = result.tables[table]
+    rows = np.ones(len(found), dtype=bool)
+    for name, value in chosen.items():
+        rows &= found[name] == value
+    return found[column][rows]
+
+
+def test_an_output_errs_by_compliance_times_load() -> None:
+    """Mean C F of the fixed load, and sigma C sigma_F of one that varies alone."""
+    study = mechdesign.load(
+        CONFIGS / "planar_3rpr.yaml",
+        ["reliability={dimensions: {load.fy: {sigma: 30}}, load: [1000, -200, 50], outputs: [P, platform.angle], "
+         "poses: [{P.x: 0, P.y: 1, platform.angle: 0}], methods: [analytic, second_order, monte_carlo]}"],
+    )  # fmt: skip
+    result = mechdesign.reliability(study)
+    mean, sigma = COMPLIANCE @ [1000.0, -200.0, 50.0], np.abs(COMPLIANCE[:, 1]) * 30.0
+    degrees = np.array([1.0, 1.0, 180.0 / np.pi])
+    for method, rel in (("analytic", 1e-8), ("second_order", 1e-6), ("monte_carlo", 4 / np.sqrt(80_000))):
+        shift = pick(result, "moments", "mean", method=method) - pick(result, "moments", "nominal", method=method)
+        # The mean of the samples is as far off as their number lets it be; the rest is rounding of the nominal value.
+        slack = 4 * sigma / np.sqrt(40_000) if method == "monte_carlo" else 1e-8 * mean.max()
+        assert (np.abs(shift / degrees - mean) < slack).all()
+        assert pick(result, "moments", "sigma", method=method) / degrees == pytest.approx(sigma, rel=rel)
+    assert pick(result, "contributions", "sensitivity") == pytest.approx(COMPLIANCE[:, 1], rel=1e-8)
+    assert pick(result, "contributions", "share") == pytest.approx(np.ones(3))
+
+
+def test_a_random_load_is_a_source_beside_the_dimensions() -> None:
+    text = ARM + LOADED
+    result = ask(text, "reliability.methods=[analytic, second_order, monte_carlo, quasi_monte_carlo]")
+    soft = matrix(mechdesign.stiffness(study_of(text)), "C")
+    turn = np.radians(30)
+    length = np.array([np.cos(turn), np.sin(turn), 0.0]) * 1e-5 / 3
+    parts = np.stack([length, soft[:, 0] * 20, soft[:, 2] * 1.0])
+    sigma = np.sqrt((parts**2).sum(axis=0))
+    scale = np.array([1.0, 1.0, 180 / np.pi])
+    for method, rel in (("analytic", 1e-9), ("second_order", 1e-5), ("monte_carlo", 0.01), ("quasi_monte_carlo", 0.01)):
+        assert pick(result, "moments", "sigma", method=method) / scale == pytest.approx(sigma, rel=rel)
+    shares = pick(result, "contributions", "share").reshape(3, 3)
+    assert shares == pytest.approx((parts**2 / sigma**2).T, rel=1e-9)
+    shift = pick(result, "moments", "mean", method="analytic") - pick(result, "moments", "nominal", method="analytic")
+    assert shift / scale == pytest.approx(soft @ [100, -50, 10], rel=1e-9)
+
+
+def test_every_method_counts_the_deflection() -> None:
+    """The error of P.x is normal: C F on the average, its deviation C11 sigma; the limit is three of it off."""
+    text = ARM + LOADED
+    soft = matrix(mechdesign.stiffness(study_of(text)), "C")
+    mean, sigma = soft[0] @ [100, -50, 10], abs(soft[0, 0]) * 20
+    limit = float(mean + 3 * sigma)
+    result = ask(
+        text, "reliability.dimensions={load.fx: {sigma: 20}}", f"reliability.limits={{P.x: {limit!r}}}",
+        "reliability.methods=[analytic, second_order, monte_carlo, quasi_monte_carlo, form, importance_sampling, auto]",
+    )  # fmt: skip
+    exact = ndtr(-3.0) + ndtr(-(limit + mean) / sigma)
+    table = result.tables["reliability"]
+    for method, rel in (("analytic", 1e-7), ("second_order", 1e-4), ("form", 1e-4)):
+        assert table["failure"][table["method"] == method] == pytest.approx([exact], rel=rel)
+    sampled = np.isin(table["method"], ["monte_carlo", "quasi_monte_carlo", "importance_sampling", "auto"])
+    assert (table["failure_low"][sampled] <= exact).all()
+    assert (exact <= table["failure_high"][sampled]).all()
+
+
+def test_other_points_move_as_the_stiffness_model_says() -> None:
+    """The elbow's displacement is that of displacements.csv."""
+    text = ARM + LOADED
+    result = ask(text, "reliability.outputs=[E, P]", "reliability.methods=analytic")
+    table = mechdesign.stiffness(study_of(text, "stiffness.loads=[[100, -50, 10]]")).tables["displacements"]
+    shift = pick(result, "moments", "mean") - pick(result, "moments", "nominal")
+    for k, point in enumerate("EP"):
+        row = np.flatnonzero(table["point"] == point)[0]
+        assert shift[2 * k : 2 * k + 2] == pytest.approx([table["dx"][row], table["dy"][row]], rel=1e-8)
+    assert not [warning for warning in result.warnings if "deflection" in warning]
+
+
+def test_points_of_a_rigid_platform_move_about_the_loaded_one() -> None:
+    study = mechdesign.load(
+        CONFIGS / "planar_3rpr.yaml",
+        ["reliability={dimensions: {load.fy: 30}, load: [1000, -200, 50], outputs: [P, B3], methods: analytic, "
+         "poses: [{P.x: 0, P.y: 1, platform.angle: 0}]}"],
+    )  # fmt: skip
+    result = mechdesign.reliability(study)
+    shift = pick(result, "moments", "mean") - pick(result, "moments", "nominal")
+    moved = COMPLIANCE @ [1000.0, -200.0, 50.0]
+    arm = np.array([0.25, 0.15])
+    assert shift[2:] == pytest.approx(moved[:2] + moved[2] * np.array([-arm[1], arm[0]]), rel=1e-7)
+
+
+def test_outputs_without_a_known_deflection_are_named() -> None:
+    """What turns at an elastic link's foot is not the link's angle; a velocity is that of the unloaded mechanism."""
+    result = ask(ARM + LOADED, "reliability.outputs=[P, upper.angle]", "reliability.rates={shoulder: 10}")
+    (told,) = [warning for warning in result.warnings if "deflection" in warning]
+    for name in ("upper.angle", "upper.angle_velocity", "P.x_velocity", "P.y_acceleration"):
+        assert f" {name}," in told or f" {name}:" in told
+    assert " P.x," not in told
+    unloaded = ask(
+        ARM + LOADED, "reliability.outputs=[upper.angle]", "reliability.load=[0, 0, 0]",
+        "reliability.dimensions={upper.length: 1e-5, shoulder: 0.1}", "reliability.methods=analytic",
+    )  # fmt: skip
+    loaded = ask(
+        ARM + LOADED, "reliability.outputs=[upper.angle]", "reliability.dimensions={upper.length: 1e-5, shoulder: 0.1}",
+        "reliability.methods=analytic",
+    )  # fmt: skip
+    for column in ("mean", "sigma"):
+        assert pick(loaded, "moments", column) == pytest.approx(pick(unloaded, "moments", column), rel=1e-12)
+
+
+def test_one_load_of_the_stiffness_section_counts_and_of_several_one_has_to_be_named() -> None:
+    text = ARM + LOADED.replace("  load: [100, -50, 10]\n", "")
+    overrides = ["reliability.methods=analytic", "reliability.dimensions={upper.length: 1e-5}"]
+
+    def shift(*more: str) -> tuple[np.ndarray, list[str]]:
+        result = ask(text, *overrides, *more)
+        moved = pick(result, "moments", "mean") - pick(result, "moments", "nominal")
+        return moved, [warning for warning in result.warnings if "loads" in warning]
+
+    still, told = shift()
+    assert np.abs(still).max() == 0
+    assert not told
+    one, told = shift("stiffness.loads=[[100, -50, 10]]")
+    assert np.abs(one).min() > 1e-6
+    assert not told
+    both, told = shift("stiffness.loads=[[1, 0, 0], [100, -50, 10]]")
+    assert np.abs(both).max() == 0
+    assert len(told) == 1
+    chosen, told = shift("stiffness.loads=[[1, 0, 0], [100, -50, 10]]", "reliability.load=[100, -50, 10]")
+    assert chosen == pytest.approx(one)
+    assert not told
+
+
+def test_a_pin_bears_forces_only() -> None:
+    text = (
+        FIVE_BAR
+        + """
+reliability:
+  dimensions: {load.fy: {sigma: 5}}
+  poses: [{P.x: 0.05, P.y: 0.45}]
+  outputs: [P]
+  load: [0, -20]
+  samples: 20000
+"""
+    )
+    soft = matrix(mechdesign.stiffness(study_of(text)), "C")
+    result = ask(text)
+    assert pick(result, "moments", "sigma", method="analytic") == pytest.approx(np.abs(soft[:, 1]) * 5, rel=1e-9)
+    assert pick(result, "moments", "sigma", method="monte_carlo") == pytest.approx(np.abs(soft[:, 1]) * 5, rel=0.03)
+
+
+def test_a_pose_that_does_not_hold_the_load_is_not_valid() -> None:
+    """With its cranks and rods in one line the five-bar's pin is free across it."""
+    text = (
+        FIVE_BAR
+        + """
+reliability:
+  dimensions: {b1.length: 1e-4}
+  poses: [{a1: 120, a2: 60}, {a1: A1, a2: A2}]
+  outputs: [P]
+  limits: {P: {radius: 0.001}}
+  load: [0, -20]
+  samples: 1000
+"""
+    )
+    # b1 and b2 in one line: E1 and E2 0.8 apart.
+    angle = np.degrees(np.arccos((0.4 - 0.15) / 0.25))
+    text = text.replace("A1", repr(180.0 - float(angle))).replace("A2", repr(float(angle)))
+    result = ask(text)
+    table = result.tables["moments"]
+    lost = np.isnan(table["sigma"])
+    assert lost.any()
+    assert (table["valid"] == ~lost).all()
+    assert "does not hold its load" in result.failed
+    with pytest.raises(AssemblyError, match="does not hold its load"):
+        ask(text.replace("{a1: 120, a2: 60}, ", ""))
+
+
+def test_a_cycle_keeps_its_deflections() -> None:
+    text = ARM + LOADED
+    sweep = ["reliability.poses=", "reliability.sweep={shoulder: {from: 20, to: 40, step: 10}, elbow: 50}"]
+    result = ask(
+        text, *sweep, "reliability.outputs=", "reliability.limits={P.y: {max: 1}, P.x: {min: -1}}",
+        "reliability.load=[0, 0, 1e12]", "reliability.samples=500",
+    )  # fmt: skip
+    table = result.tables["reliability"]
+    assert set(table["scope"]) == {"pose", "cycle"}
+    assert (table["failure"] == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "override", "message"),
+    [
+        (ARM + LOADED, "stiffness=", "the study has none"),
+        (ARM + LOADED, "reliability.load=[1, 2]", r"a load is \[fx, fy, mz\], not 2"),
+        (FIVE_BAR + "reliability:\n  dimensions: {a1: 1}\n", "reliability.load=[0, 0, 5]", "a pin carries no moment"),
+        (FIVE_BAR + "reliability:\n  dimensions: {a1: 1}\n", "reliability.dimensions.load.mz=5", "a pin carries no"),
+        (ARM + LOADED, "reliability.load=[1 m, 0, 0]", "force"),
+    ],
+)
+def test_what_cannot_be_a_load(text: str, override: str, message: str) -> None:
+    with pytest.raises(StudyError, match=message):
+        study_of(text, override)
