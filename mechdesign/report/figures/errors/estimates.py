@@ -64,7 +64,9 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
         else:
             drawn = look.dashes if swept is not None else "None"
             marker = look.marker if swept is None else ""
-            value = np.where(table["failure"][rows] > 0, table["failure"][rows], np.nan if floor else 0.0)
+            value = table["failure"][rows]
+            if floor:
+                value = np.where(value > 0, value, np.nan)
             (line,) = axes.plot(at, value, linestyle=drawn, marker=marker, color=look.color)
             entries[look.words] = line
         for x, row in zip(at, rows, strict=True) if written else ():
