@@ -156,6 +156,13 @@ def test_auto_stops_at_its_precision() -> None:
     assert found["samples"] < 100_000
 
 
+def test_auto_tells_that_its_precision_was_not_reached() -> None:
+    changes = ["reliability.methods=[auto]", "reliability.precision=0.01", "reliability.samples=20000"]
+    result = ask(FOUR_BAR, *changes)
+    assert row(result, "auto")["samples"] == 20_000
+    assert any(note.startswith("auto: half the interval of the whole cycle is 0.00") for note in result.warnings)
+
+
 def test_without_a_failure_monte_carlo_warns_and_quasi_monte_carlo_gives_the_bound() -> None:
     changes = ["reliability.dimensions={lever.length: 0.03}", "reliability.methods=[monte_carlo, quasi_monte_carlo]"]
     result = ask(LEVER, *changes, "reliability.samples=40000")
@@ -190,4 +197,4 @@ def test_an_interrupt_gives_the_cycles_that_were_counted(monkeypatch: pytest.Mon
     # The poses had been simulated before.
     table = result.tables["reliability"]
     assert (table["samples"][table["scope"] == "pose"] == 100_000).all()
-    assert "interrupted" in result.interrupted
+    assert "40000 whole cycles" in result.interrupted

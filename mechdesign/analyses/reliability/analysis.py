@@ -14,11 +14,12 @@ from mechdesign.analyses.reliability import sobol, tables
 from mechdesign.analyses.reliability.allocation import Allocated, allocate
 from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.comparison import disagreements
-from mechdesign.analyses.reliability.cycle import with_cycle
+from mechdesign.analyses.reliability.cycle import notes, with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
 from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
 from mechdesign.analyses.reliability.methods import METHODS, MOST, Found, Partial, Task, analytic
 from mechdesign.analyses.reliability.question import Question, ask
+from mechdesign.analyses.reliability.shortfalls import unassembled, unreached
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.unseen import unseen
@@ -107,17 +108,17 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
             failures.append(
                 f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
             )
-    cycles = [each.cycle for each in found if each.cycle is not None and each.cycle.samples]
+    cycles = [each.cycle.samples for each in found if each.cycle is not None and each.cycle.samples]
     if cycles:
-        counts["cycles"] = cycles[0].samples
-        if cycles[0].invalid:
-            failures.append(
-                f"{cycles[0].invalid} of {cycles[0].samples} made mechanisms cannot be assembled at some pose of the "
-                "cycle; they count as failures"
-            )
-    failures = disagreements(study, poses, found) + unseen(study, poses, found) + failures
+        counts["cycles"] = cycles[0]
+    failures = [
+        *disagreements(study, poses, found), *unseen(study, poses, found), *unreached(study, poses, found, task),
+        *unassembled(found), *notes(found, task), *failures,
+    ]  # fmt: skip
     if interrupted:
-        interrupted += f"{counts.get('samples', 0)} samples, {', '.join(each.method for each in found)}"
+        interrupted += f"{counts.get('samples', 0)} samples, "
+        interrupted += f"{counts['cycles']} whole cycles, " if cycles else ""
+        interrupted += f"{', '.join(each.method for each in found)}"
     result = Result(
         "reliability", tables.build(answer) | allocated.tables, [*warnings, *failures, *allocated.notes], counts,
         "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.methods import RELATIVE, Found, Partial, Task
+from mechdesign.analyses.reliability.methods import Found, Partial, Task, wanted_precision
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
 from mechdesign.analyses.reliability.simulation import Setting, errors_of, keeps
 from mechdesign.analyses.reliability.sources import Sources
@@ -81,13 +81,29 @@ def bounds(estimates: Sequence[Estimate]) -> Estimate:
     return Estimate(high, low, high, 0)
 
 
+def notes(found: Sequence[Found], task: Task) -> list[str]:
+    """Sentences about made mechanisms that cannot be assembled at some pose, and where `auto` ended too early."""
+    sentences = []
+    simulated = {each.method: each.cycle for each in found if each.cycle is not None and each.cycle.samples}
+    for cycle in list(simulated.values())[:1]:
+        if cycle.invalid:
+            sentences.append(
+                f"{cycle.invalid} of {cycle.samples} made mechanisms cannot be assembled at some pose of the cycle; "
+                "they count as failures"
+            )
+    last = simulated.get("auto")
+    if last is not None and last.failures and not wanted_precision(task).reached(last.failure, last.low, last.high):
+        sentences.append(
+            f"auto: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at {last.failure:.3g}, "
+            f"not as precise as asked; it ends at {last.samples} made mechanisms, which reliability.samples sets"
+        )
+    return sentences
+
+
 def _simulated(found: Found, task: Task) -> Found:
     samples, precision = task.samples, None
     if found.method == "auto":
-        from mechdesign.analyses.reliability.engine.precision import Precision
-
-        asked = task.precision
-        precision = Precision(RELATIVE, None) if asked is None else Precision(asked.relative, asked.half_width)
+        precision = wanted_precision(task)
         samples = max(task.samples, task.most // task.poses)
     settings = [limited_part(setting) for setting in task.settings]
     size = max(_FEWEST, min(CHUNK, _WORK // len(settings)))

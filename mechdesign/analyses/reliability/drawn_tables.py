@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 
 # A histogram has about so many bins, of samples that vary no farther than so many standard deviations.
 BINS, WIDEST = 60, 6.0
+ROUNDING = 1e-12
 
 
 def build(answer: Answer) -> list[Table]:
@@ -74,8 +75,10 @@ def histogram(answer: Answer) -> Table | None:
     parts: list[tuple[int, Floats, Floats, NDArray[np.int64], Floats]] = []
     for channel, error in enumerate(errors * answer.scale[:, None]):
         mean, sigma = float(error.mean()), float(error.std(ddof=1))
-        # A coordinate that does not vary has rounding for its deviation.
-        if not sigma > 1e-12 * float(np.max(np.abs(answer.nominal[channel, row]) + np.abs(error))):
+        # What does not vary has rounding for its deviation: of the size of what it is computed from.
+        alike = [k for k, unit in enumerate(units) if unit == units[channel]]
+        size = answer.study.mechanism.size if units[channel] == answer.study.units.label("length") else 0.0
+        if not sigma > ROUNDING * max(size, float(np.abs(answer.nominal[alike, row]).max())):
             continue
         low = max(float(error.min()), mean - WIDEST * sigma)
         high = min(float(error.max()), mean + WIDEST * sigma)

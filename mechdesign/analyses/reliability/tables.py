@@ -161,7 +161,11 @@ def success(answer: Answer) -> Table:
     valid = np.where(whole, (answer.reason == 0).all(), answer.reason[rows] == 0)
     kind = "99.7 %; of counted failures Clopper-Pearson"
     columns = [
-        Column("scope", np.where(whole, "cycle", "pose"), meaning="a pose by itself, or one mechanism at all poses"),
+        Column(
+            "scope",
+            np.where(whole, "cycle", "pose"),
+            meaning="a pose by itself, or one made mechanism at all poses, the steps between unseen",
+        ),
         *(replace(c, values=np.where(whole, np.nan, c.values)) for c in answer.at(rows)),
         Column("method", np.array(names)[method], meaning="how it was computed"),
         Column("reliability", 1.0 - failure, meaning="probability that every limit is kept"),
