@@ -19,11 +19,11 @@ Ints = NDArray[np.intp]
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
 SAMPLES, STARTS = 160, 8
 EXPLORED = len(SPREADS) * SAMPLES
-HALVINGS, ITERATIONS = 10, 40
+HALVINGS, ITERATIONS = 10, 30
 # Fractions of a step that are tried where the whole of it does not improve.
 FRACTIONS = np.array([0.5, 0.25, 0.0625])
 # A point is a design point where a step is shorter than this, or nothing improves, and the margin this small.
-SHORT, ZERO = 1e-3, 1e-3
+SHORT, ZERO = 5e-3, 1e-2
 # Two points in directions nearer than this (cosine), at like distances, are one.
 ALIKE = 0.95
 MOST = 24
@@ -135,15 +135,16 @@ def _descend(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[F
         normal[:, lanes] = -slope / np.sqrt(size)
         weight = 2 * np.linalg.norm(at, axis=0) / np.sqrt(size) + 1.0
         before = 0.5 * (at**2).sum(axis=0) + weight * np.abs(g)
-        trial, merit = at + step, np.full(len(lanes), np.inf)
-        merit[:] = _merit(problem, trial, limit[lanes], scale, weight)
+        trial = at + step
+        merit = _merit(problem, trial, limit[lanes], scale, weight)
         worse = np.flatnonzero(~(merit < before))
         if worse.size:
-            shorter = at[:, worse] + FRACTIONS[:, None, None] * step[:, worse]
-            merits = np.stack([_merit(problem, each, limit[lanes[worse]], scale, weight[worse]) for each in shorter])
-            best = np.argmin(merits, axis=0)
-            merit[worse] = merits[best, np.arange(len(worse))]
-            trial[:, worse] = shorter[best, :, np.arange(len(worse))].T
+            shorter = at[:, None, worse] + FRACTIONS[:, None] * step[:, None, worse]
+            often = np.tile(worse, len(FRACTIONS))
+            merits = _merit(problem, shorter.reshape(len(at), -1), limit[lanes[often]], scale, weight[often])
+            merits = merits.reshape(len(FRACTIONS), -1)
+            best, k = np.argmin(merits, axis=0), np.arange(len(worse))
+            merit[worse], trial[:, worse] = merits[best, k], shorter[:, best, k]
         done = (np.linalg.norm(step, axis=0) < SHORT * (1 + np.linalg.norm(at, axis=0))) | ~(merit < before)
         good[lanes[done]] = np.abs(g[done]) < ZERO
         active[lanes[done]] = False
@@ -158,7 +159,7 @@ def _descend(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[F
     lanes = np.flatnonzero(active)
     if lanes.size:
         margins = problem.margins(u[:, lanes])
-        good[lanes] = np.abs(margins[limit[lanes], np.arange(len(lanes))] / scale[limit[lanes]]) < 10 * ZERO
+        good[lanes] = np.abs(margins[limit[lanes], np.arange(len(lanes))] / scale[limit[lanes]]) < ZERO
     return u[:, good], limit[good], normal[:, good]
 
 

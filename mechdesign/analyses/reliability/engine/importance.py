@@ -23,8 +23,9 @@ FAR = 4.0
 ROUNDS, SAMPLES, LEAST = 6, 40, 1600
 # Learned enough where the relative variance of a round's weights is below this.
 GOOD = 2.0
-# A part more, of this weight, where a failure adds so much to that variance and lacks so many times its samples.
-ADDED, LACKING = 0.05, (0.1, 10.0)
+# A part more, of this weight, where a failure adds so much to that variance and lacks so many times its samples; before
+# the first round where explored failures are worth so many.
+ADDED, LACKING, MANY = 0.05, (0.1, 10.0), 5
 # Share of the samples that stay with the design points, and with the least of them.
 FIXED, SMALLEST = 0.1, 0.02
 # A learned covariance is what it would be if so many samples a dimension of the standard normal law had been seen too.
@@ -32,6 +33,8 @@ PRIOR = 0.25
 # First samples of the value, by which the rest is planned; so much more than what they ask for.
 FIRST, MARGIN = 2000, 1.1
 BLOCK = 20_000
+# Beyond any density that counts, and the logarithm of such a one.
+TINY, MUCH = 1e-200, 600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +149,10 @@ def _weights(mixture: Mixture, u: Floats) -> Floats:
 def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> Mixture:
     """The mixture nearest to the failures, beside the fixed one: one step of expectation and maximisation a round."""
     fixed = _about(points)
-    # The samples that starts were taken from know of places where no design point is.
-    parts = _covering(fixed, fixed, points.seen, explored_weights(points.seen), EXPLORED)
+    parts, explored = fixed, explored_weights(points.seen)
+    # Where many of them count, the samples that starts were taken from know of places without a design point.
+    if float(explored.sum()) ** 2 > MANY * float(explored @ explored):
+        parts = _covering(fixed, parts, points.seen, explored, EXPLORED)
     count = max(LEAST, SAMPLES * problem.dimension)
     seen, known = [], []
     for rounds in range(1, ROUNDS + 1):
@@ -175,17 +180,23 @@ def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: i
         Their weights when they were drawn.
     """
     total = float(worth.sum())
-    while total > 0 and len(parts.weight) < MOST:
+    if not total > 0:
+        return parts
+    half = 0.5 * (u * u).sum(axis=0)
+    held, own = (np.exp(np.minimum(each.logs(u) + half, MUCH)).sum(axis=0) for each in (fixed, parts))
+    while len(parts.weight) < MOST:
         # Density of failures over that of the mixture: its mean over failures is 1 and the weights' relative variance.
-        lack = _weights(_beside(fixed, parts), u) * (drawn / total)
+        lack = drawn / (total * np.maximum(FIXED * held + (1 - FIXED) * own, TINY))
         adds = lack * worth / total
         worst = int(np.argmax(adds))
         if adds[worst] < LACKING[0] or lack[worst] < LACKING[1]:
             break
+        part = Mixture(np.array([ADDED]), u[:, worst][None], np.eye(len(u))[None])
+        own = (1 - ADDED) * own + np.exp(np.minimum(part.logs(u)[0] + half, MUCH))
         parts = Mixture(
-            np.append((1 - ADDED) * parts.weight, ADDED),
-            np.concatenate([parts.centre, u[:, worst][None]]),
-            np.concatenate([parts.root, np.eye(len(u))[None]]),
+            np.append((1 - ADDED) * parts.weight, part.weight),
+            np.concatenate([parts.centre, part.centre]),
+            np.concatenate([parts.root, part.root]),
         )
     return parts
 
