@@ -190,12 +190,37 @@ def test_density_has_the_circle_of_the_limit() -> None:
     assert axes[1].get_title() == "simulation (auto)"
 
 
+def test_open_and_far_limits_of_a_density() -> None:
+    found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]",
+                     "reliability.limits={P.x: {max: 0.2}, P.y: 9}")  # fmt: skip
+    (axes, _) = found["density_contours"].axes
+    assert [line.get_xdata().tolist() for line in axes.lines[:1]] == [[0.2, 0.2]]
+    assert max(abs(y) for y in axes.get_ylim()) < 1
+    assert "limits lie outside" in texts(found["density_contours"])
+
+
 def test_density_of_velocities_has_their_limits() -> None:
     found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
                      "reliability.limits={P.x_velocity: 0.3, P.y_velocity: {min: -0.2, max: 0.3}}")  # fmt: skip
-    box = found["density_contours"].axes[0].patches[0]
-    assert (box.get_y(), box.get_height()) == pytest.approx((-0.2, 0.5))
+    ends = [line.get_xydata().tolist() for line in found["density_contours"].axes[0].lines]
+    assert ends == [[[-0.3, -0.2], [-0.3, 0.3]], [[0.3, -0.2], [0.3, 0.3]], [[-0.3, -0.2], [0.3, -0.2]],
+                    [[-0.3, 0.3], [0.3, 0.3]]]  # fmt: skip
     assert found["density_contours"].axes[0].get_xlabel() == "P.x velocity error [mm/s]"
+
+
+def test_density_of_one_sided_tolerances_lies_about_their_mean() -> None:
+    found, result = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]",
+                          "reliability.dimensions={'*.length': {tolerance: [0, 0.6]}}")  # fmt: skip
+    table, moments = result.tables["density"], result.tables["moments"]
+    for name, mean in zip(("P.x", "P.y"), moments["mean"] - moments["nominal"], strict=True):
+        assert abs(mean) > 0.1
+        for column in ("normal", "simulated"):
+            weights = table[column] / table[column].sum()
+            assert weights @ table[f"{name}_error"] == pytest.approx(mean, abs=0.01)
+    cell = np.prod([np.diff(np.unique(table[axis])).mean() for axis in "xy"])
+    assert table["simulated"].sum() * cell == pytest.approx(1.0, abs=0.02)
+    left, right = found["density_contours"].axes[0].get_xlim()
+    assert left < -0.25 < table["P.x_error"].max() < right
 
 
 def test_workspace_has_maps() -> None:

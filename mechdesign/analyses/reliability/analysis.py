@@ -235,7 +235,7 @@ def _settings(
     study: Study, nominal: NominalPoses, question: Question, linear: FirstOrder, elastic: Elastic | None, listed: bool
 ) -> list[Setting]:
     mechanism = study.mechanism
-    sigma = linear.deviation()
+    mean, sigma = linear.shift(), linear.deviation()
     assembled = np.flatnonzero(nominal.assembled)
     settings = []
     for rows, configuration, drives, given in nominal.groups:
@@ -245,8 +245,8 @@ def _settings(
             pose = configuration.take(k)
             scale = None
             if question.pair is not None and listed and row in assembled[:_DENSITIES]:
-                one, two = (float(sigma[channel, row]) for channel in question.pair)
-                scale = (one, two) if one > 0 and two > 0 else None
+                one, two = ((float(mean[channel, row]), float(sigma[channel, row])) for channel in question.pair)
+                scale = (one, two) if one[1] > 0 and two[1] > 0 else None
             settings.append(
                 Setting(
                     int(row),

@@ -28,14 +28,14 @@ def build(answer: Answer) -> list[Table]:
 
 
 def density(answer: Answer) -> Table | None:
-    """Density of the two outputs over +-3 standard deviations: bivariate normal beside the simulated one [S2]."""
+    """Density of the two outputs within 3 standard deviations: bivariate normal beside the simulated one [S2]."""
     pair, linear = answer.question.pair, answer.linear
     if pair is None:
         return None
     centres = (np.arange(CELLS) + 0.5) * (2 * REACH / CELLS) - REACH
     x, y = (grid.ravel() for grid in np.meshgrid(centres, centres, indexing="ij"))
-    rows, normal, simulated, scales = [], [], [], []
-    covariance = linear.covariance()
+    rows, normal, simulated, scales, means = [], [], [], [], []
+    covariance, shift = linear.covariance(), linear.shift()
     for row, sums in sorted(answer.sums.items()):
         if not len(sums.density):
             continue
@@ -48,17 +48,26 @@ def density(answer: Answer) -> Table | None:
         normal.append(np.exp(exponent) / (2 * np.pi * np.sqrt(rest)))
         simulated.append(sums.density / (sums.counted * (2 * REACH / CELLS) ** 2))
         scales.append(np.sqrt(np.diagonal(block)) * answer.scale[list(pair)])
+        means.append(shift[list(pair), row] * answer.scale[list(pair)])
     if not rows:
         return None
-    cells, sigma = CELLS * CELLS, np.array(scales)
+    cells, sigma, mean = CELLS * CELLS, np.array(scales), np.array(means)
     output, _, unit = answer.labels
     names = [output[k] for k in pair]
     columns = [
         *answer.at(np.repeat(np.array(rows, dtype=np.intp), cells)),
-        Column(f"{names[0]}_error", np.outer(sigma[:, 0], x).ravel(), unit[pair[0]], "centre of the cell"),
-        Column(f"{names[1]}_error", np.outer(sigma[:, 1], y).ravel(), unit[pair[1]], "centre of the cell"),
-        Column("x", np.tile(x, len(rows)), meaning=f"error of {names[0]} in standard deviations of the first order"),
-        Column("y", np.tile(y, len(rows)), meaning=f"error of {names[1]} in standard deviations of the first order"),
+        Column(
+            f"{names[0]}_error", (mean[:, :1] + np.outer(sigma[:, 0], x)).ravel(), unit[pair[0]], "centre of the cell"
+        ),
+        Column(
+            f"{names[1]}_error", (mean[:, 1:] + np.outer(sigma[:, 1], y)).ravel(), unit[pair[1]], "centre of the cell"
+        ),
+        Column(
+            "x", np.tile(x, len(rows)), meaning=f"error of {names[0]} about its mean, in deviations of the first order"
+        ),
+        Column(
+            "y", np.tile(y, len(rows)), meaning=f"error of {names[1]} about its mean, in deviations of the first order"
+        ),
         Column("normal", np.concatenate(normal), meaning="bivariate normal density, standardised"),
         Column("simulated", np.concatenate(simulated), meaning="density of the samples, standardised"),
     ]

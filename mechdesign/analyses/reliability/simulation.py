@@ -47,8 +47,8 @@ class Setting:
         Nominal values of the channels.
     pair : (int, int) or None
         Channels whose covariance is wanted.
-    scale : (float, float) or None
-        Standard deviations for the density of the pair; None where no density is wanted.
+    scale : two of (float, float) or None
+        Means and standard deviations for the density of the pair; None where no density is wanted.
     trend : bool
         Whether to follow the means and the failures.
     keep : bool
@@ -67,7 +67,7 @@ class Setting:
     bands: Sequence[Band]
     discs: Sequence[Disc]
     pair: tuple[int, int] | None
-    scale: tuple[float, float] | None
+    scale: tuple[tuple[float, float], tuple[float, float]] | None
     trend: bool
     keep: bool
     elastic: Elastic | None = None
@@ -261,11 +261,11 @@ def keeps(setting: Setting, errors: Sequence[Floats]) -> NDArray[np.bool_] | Non
     return kept
 
 
-def _count_cells(x: Floats, y: Floats, scale: tuple[float, float]) -> NDArray[np.int64]:
+def _count_cells(x: Floats, y: Floats, scale: tuple[tuple[float, float], tuple[float, float]]) -> NDArray[np.int64]:
     cells = []
     inside = np.ones(len(x), dtype=bool)
-    for value, sigma in zip((x, y), scale, strict=True):
-        cell = np.floor((value / sigma + REACH) * (CELLS / (2 * REACH)))
+    for value, (mean, sigma) in zip((x, y), scale, strict=True):
+        cell = np.floor(((value - mean) / sigma + REACH) * (CELLS / (2 * REACH)))
         inside &= (cell >= 0) & (cell < CELLS)
         cells.append(cell)
     index = cells[0][inside] * CELLS + cells[1][inside]

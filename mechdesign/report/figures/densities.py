@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
 from mechdesign.report.figures import style
@@ -16,10 +16,13 @@ from mechdesign.results import Table
 from mechdesign.study import Study
 
 Floats = NDArray[np.float64]
+Bands = tuple[tuple[float, float], tuple[float, float]]
 # Two bands, or the radius of a circle.
-Limits = tuple[tuple[float, float], tuple[float, float]] | float | None
+Limits = Bands | float | None
 
 _LEFT = 0.88  # inches
+# Limits farther out than this, in widths of the density, are told and not shown.
+_FAR = 0.8
 _LEVELS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8)
 
 
@@ -80,36 +83,56 @@ def _contours(
     figure.subplots_adjust(left=_LEFT / style.WIDTH, right=0.98, bottom=0.11, top=0.82, wspace=0.06)
     peak = densities[0].max()
     # The same unit and about the same spread: a picture true to scale.
-    alike = labels[0].rpartition("[")[2] == labels[1].rpartition("[")[2] and 0.4 < x.max() / y.max() < 2.5
-    step = (x[1, 0] - x[0, 0], y[0, 1] - y[0, 0])
-    reach = (x.max() + step[0] / 2, y.max() + step[1] / 2)
+    alike = labels[0].rpartition("[")[2] == labels[1].rpartition("[")[2] and 0.4 < np.ptp(x) / np.ptp(y) < 2.5
+    bands = _bands(limits)
+    view = (_view(x, bands[0]), _view(y, bands[1]))
+    hidden = any(np.isfinite(end) and not low < end < high for band, (low, high) in zip(bands, view, strict=True)
+                 for end in band)  # fmt: skip
     for axes, density, name in zip(figure.subplots(1, 2, sharex=True, sharey=True), densities, titles, strict=True):
         levels = [level * peak for level in _LEVELS]
         axes.contourf(x, y, density, levels=[*levels, peak * 1.5], cmap=style.COLORMAP, alpha=0.35)
         axes.contour(x, y, density, levels=levels, cmap=style.COLORMAP, linewidths=1.2)
-        _draw_limits(axes, limits, reach)
-        axes.set(title=name, xlabel=labels[0])
-        axes.update_datalim([(-reach[0], -reach[1]), reach])
+        _draw_limits(axes, limits, view)
+        axes.set(title=name, xlabel=labels[0], xlim=view[0], ylim=view[1])
         axes.locator_params(nbins=6)
         if alike:
             axes.set_aspect("equal")
     figure.axes[0].set_ylabel(labels[1])
     levels_text = ", ".join(f"{level:g}" for level in _LEVELS)
-    drawn = "; dashed: limits" if limits is not None else ""
+    drawn = "" if limits is None else "; limits lie outside" if hidden else "; dashed: limits"
     note = f"lines at {levels_text} of the normal density's peak{drawn}"
     title(figure, f"Density of two errors at {pose}", note, left=_LEFT)
     return figure
 
 
-def _draw_limits(axes: Axes, limits: Limits, reach: tuple[float, float]) -> None:
-    look: dict[str, Any] = {"fill": False, "edgecolor": style.VERMILION, "linestyle": "--", "linewidth": 1.6}
+def _bands(limits: Limits) -> Bands:
+    if limits is None:
+        return (-np.inf, np.inf), (-np.inf, np.inf)
+    return ((-limits, limits), (-limits, limits)) if isinstance(limits, float) else limits
+
+
+def _view(values: Floats, band: tuple[float, float]) -> tuple[float, float]:
+    """What is shown of an axis: all that has a density, and limits that are not too far."""
+    low, high = float(values.min()), float(values.max())
+    span = high - low
+    near = [end for end in band if low - _FAR * span < end < high + _FAR * span]
+    ends = [low, high, *near]
+    return min(ends) - 0.05 * span, max(ends) + 0.05 * span
+
+
+def _draw_limits(axes: Axes, limits: Limits, view: Bands) -> None:
+    look: dict[str, Any] = {"color": style.VERMILION, "linestyle": "--", "linewidth": 1.6}
     if isinstance(limits, float):
-        axes.add_patch(Circle((0.0, 0.0), limits, **look))
-    elif limits is not None:
-        (left, right), (low, high) = (
-            (max(band[0], -2 * size), min(band[1], 2 * size)) for band, size in zip(limits, reach, strict=True)
-        )
-        axes.add_patch(Rectangle((left, low), right - left, high - low, **look))
+        axes.add_patch(Circle((0.0, 0.0), limits, fill=False, **look))
+        return
+    across, up = _bands(limits)
+    # An open side has no line, and the others run on to the edge.
+    for end in across:
+        if np.isfinite(end):
+            axes.plot([end, end], np.clip(up, *view[1]), **look)
+    for end in up:
+        if np.isfinite(end):
+            axes.plot(np.clip(across, *view[0]), [end, end], **look)
 
 
 def _surfaces(
