@@ -7,9 +7,11 @@ from importlib import import_module
 
 from mechdesign.results import Result
 from mechdesign.study import Study
+from mechdesign.study.reliability_models import Precision
 
 # Enough designs that one of them may well be feasible.
 DESIGNS, SAMPLES = 10, 2
+LOOSE = Precision.model_construct(relative=100.0, half_width=None)
 # Commands whose answer costs much more than a look at it.
 LONG = ("optimize", "reliability")
 
@@ -34,7 +36,8 @@ def look(study: Study, command: str) -> Result:
 def _quick(study: Study) -> Study:
     reliability, optimize = study.reliability, study.optimize
     if reliability is not None:
-        reliability = reliability.model_copy(update={"samples": SAMPLES})
+        few = {"samples": SAMPLES, "precision": LOOSE, "sobol": reliability.sobol and SAMPLES}
+        reliability = reliability.model_copy(update=few)
     if optimize is not None:
         method = "search" if optimize.method == "grid" else optimize.method
         optimize = optimize.model_copy(update={"method": method, "evaluations": DESIGNS, "subject_to": ()})

@@ -279,3 +279,15 @@ def test_correlated_tolerances() -> None:
 def test_what_cannot_be_asked(overrides: list[str], message: str) -> None:
     with pytest.raises(StudyError, match=message):
         study_of(CHAIN, *overrides)
+
+
+def test_an_optimisation_asks_for_no_tolerances_unless_their_cost_is_a_goal() -> None:
+    """The variable changes no error: all designs have the cost, and the failures, of the study itself."""
+    text = CHAIN + "optimize:\n  variables: {c: {from: 10, to: 30, number: 3}}\n  minimize: GOAL\n"
+    cost = mechdesign.optimize(study_of(text.replace("GOAL", "reliability.cost_allocated")))
+    table = mechdesign.reliability(study_of(CHAIN)).tables["allocation"]
+    assert cost.tables["optimum"]["reliability.cost_allocated"] == pytest.approx(
+        table["cost_allocated"].max(), rel=1e-3
+    )
+    out_of_reach = study_of(text.replace("GOAL", "reliability.failure"), "reliability.limits.B.x=1e-5")
+    assert mechdesign.optimize(out_of_reach).tables["optimum"]["reliability.failure"][0] > 0.9

@@ -237,3 +237,35 @@ def test_a_cycle_keeps_its_deflections() -> None:
 def test_what_cannot_be_a_load(text: str, override: str, message: str) -> None:
     with pytest.raises(StudyError, match=message):
         study_of(text, override)
+
+
+def test_a_map_over_the_workspace_counts_the_deflection() -> None:
+    """The indices of the workspace say what the question itself says at its nodes."""
+    from mechdesign.analyses.workspace.indices import prepare
+    from mechdesign.analyses.workspace.region import questions
+
+    text = (
+        FIVE_BAR.replace("  poses: [{P.x: 0.05, P.y: 0.45}]\n", "")
+        + """
+workspace: {point: P, scan: {about: [0, 0.45], rays: 12}}
+reliability:
+  dimensions: {load.fy: {sigma: 5}, b1.length: 1e-4}
+  poses: workspace
+  outputs: [P]
+  limits: {P.y: 2e-3}
+  load: [0, -20]
+  methods: analytic
+"""
+    )
+    study = study_of(text)
+    poses = study.poses("reliability")
+    place = poses.values["P.x"] + 1j * poses.values["P.y"]
+    found = questions(study)[0].field.local(place, {})
+    sigma, chance = (np.asarray(index.values(found)) for index in prepare(study, ["sigma_position", "reliability"]))
+    result = mechdesign.reliability(study)
+    x, y = (pick(result, "moments", "sigma", output=f"P.{axis}") for axis in "xy")
+    assert sigma == pytest.approx(np.hypot(x, y), rel=1e-6)
+    told = result.tables["reliability"]
+    expected = told["reliability"][told["scope"] == "pose"]
+    assert chance == pytest.approx(expected, abs=1e-8)
+    assert expected.min() < 0.99

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -217,6 +217,17 @@ class Evaluator:
             for k in rows[left].tolist():
                 batch.left.setdefault(k, {}).setdefault(command, []).extend(goals)
 
+    def _needed(self, study: Study) -> Study:
+        """The study without what no goal asks and costs much more than the goals: tolerances, Sobol' indices."""
+        section, columns = study.reliability, [each.column for each in self.goals]
+        if section is None:
+            return study
+        if "cost_allocated" not in columns:
+            section = section.model_copy(update={"allocate": None})
+        if not any(column.startswith("sobol_") for column in columns):
+            section = section.model_copy(update={"sobol": 0})
+        return replace(study, reliability=section)
+
     def _one(self, batch: _Batch, k: int) -> str:
         """Ask what is left of one design; returns why it is infeasible."""
         row = np.array([k])
@@ -228,6 +239,7 @@ class Evaluator:
                 if batch.reasons[k]:
                     return str(batch.reasons[k])
             left = batch.left.get(k, {})
+            other = self._needed(other)
             for command in dict.fromkeys((*self._alone, *left)):
                 result = ask(other, command)
                 if result.failed:

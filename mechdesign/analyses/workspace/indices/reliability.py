@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr
 
+from mechdesign.analyses.reliability.deflection import Elasticity, elasticity
 from mechdesign.analyses.reliability.error_limits import Band
 from mechdesign.analyses.reliability.first_order import linear_errors
 from mechdesign.analyses.reliability.probability import failure_probability
@@ -40,12 +41,19 @@ def prepare(study: Study) -> Evaluate:
     if not question.limited:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
         raise StudyError((Problem(message, "reliability.limits", str(study.path or "")),))
-    return assembled_only(partial(evaluate, study.mechanism, question, sources))
+    return assembled_only(partial(evaluate, study.mechanism, question, sources, elasticity(study)[0]))
 
 
-def evaluate(mechanism: Mechanism, question: Question, sources: Sources, configuration: Configuration) -> Floats:
+def evaluate(
+    mechanism: Mechanism,
+    question: Question,
+    sources: Sources,
+    bent: Elasticity | None,
+    configuration: Configuration,
+) -> Floats:
     """Probability that all limits hold, the drives held [S2, eqs. 10, 11]."""
-    linear = linear_errors(mechanism, configuration, question.channels, sources, question.rates)
+    elastic = None if bent is None else bent.at(configuration, question.channels)
+    linear = linear_errors(mechanism, configuration, question.channels, sources, question.rates, elastic)
     covariance, mean = linear.covariance(), linear.shift()
     if len(question.bands) == 2 and not question.discs and not mean.any():
         return _rectangle(question.bands[0], question.bands[1], covariance)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign.analyses.reliability.deflection import Elasticity, elasticity
 from mechdesign.analyses.reliability.first_order import Channel, Rates, linear_errors
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
@@ -25,14 +26,19 @@ def prepare(study: Study) -> Evaluate:
     assert study.workspace is not None
     mechanism, point = study.mechanism, study.workspace.point
     channels = tuple(Channel(mechanism.coordinate(f"{point}.{axis}"), 0) for axis in "xy")
-    return assembled_only(partial(evaluate, mechanism, channels, find_sources(study)[0]))
+    return assembled_only(partial(evaluate, mechanism, channels, find_sources(study)[0], elasticity(study)[0]))
 
 
 def evaluate(
-    mechanism: Mechanism, channels: tuple[Channel, ...], sources: Sources, configuration: Configuration
+    mechanism: Mechanism,
+    channels: tuple[Channel, ...],
+    sources: Sources,
+    bent: Elasticity | None,
+    configuration: Configuration,
 ) -> Floats:
     """sqrt(var x + var y), the drives held [S2, eq. 9]."""
-    linear = linear_errors(mechanism, configuration, channels, sources, STILL)
+    elastic = None if bent is None else bent.at(configuration, channels)
+    linear = linear_errors(mechanism, configuration, channels, sources, STILL, elastic)
     return np.asarray(np.sqrt((linear.deviation() ** 2).sum(axis=0)))
 
 
