@@ -80,7 +80,7 @@ def _contours(
     limits: Limits,
 ) -> Figure:
     figure = style.new_figure(style.WIDTH, 4.7, layout=None)
-    figure.subplots_adjust(left=_LEFT / style.WIDTH, right=0.98, bottom=0.11, top=0.82, wspace=0.06)
+    figure.subplots_adjust(left=_LEFT / style.WIDTH, right=0.98, bottom=0.11, top=0.82, wspace=0.1)
     peak = densities[0].max()
     # The same unit and about the same spread: a picture true to scale.
     alike = labels[0].rpartition("[")[2] == labels[1].rpartition("[")[2] and 0.4 < np.ptp(x) / np.ptp(y) < 2.5
