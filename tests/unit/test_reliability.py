@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -249,6 +251,18 @@ def test_a_listed_pose_that_fails_is_named_and_the_others_are_computed(tmp_path:
     assert np.isnan(result.tables["reliability"]["reliability"]).tolist() == [False, False, True, True]
     with pytest.raises(AssemblyError, match=r"B\.x = 500 mm"):
         ask(tmp_path, SLIDER_CRANK.replace("{theta: 60}", "{B.x: 500}"), "dimensions: {a: 0.3}")
+
+
+def test_moments_along_a_sweep_import_no_scipy(tmp_path: Path) -> None:
+    """It takes as long to import as a thousand samples at every pose of a cycle take to draw."""
+    file = tmp_path / "study.yaml"
+    swept = SLIDER_CRANK.replace("poses: [{theta: 60}]", "sweep: {theta: {from: 0, to: 60, step: 30}}")
+    file.write_text(swept + "  dimensions: {a: 0.3}\n")
+    code = (
+        f"import sys, mechdesign; mechdesign.reliability(mechdesign.load({str(file)!r})); print('scipy' in sys.modules)"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert said.strip() == "False"
 
 
 def test_nothing_varies(tmp_path: Path) -> None:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.error_limits import Band, Disc
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.probability import failure_probability
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.tolerances import Tolerance, moments
@@ -69,6 +68,9 @@ class Model:
 
     def failures(self, scales: Floats, which: Sequence[int]) -> Floats:
         """Probability of failure at some of the poses."""
+        # SciPy takes a quarter of a second to import, and a study without limits does not need it.
+        from mechdesign.analyses.reliability.probability import failure_probability
+
         rows = [self.settings[k].pose for k in which]
         linear = self.with_scales(scales).take(rows)
         covariance, mean = linear.covariance(), linear.shift()

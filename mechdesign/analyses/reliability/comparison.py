@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Sequence
 
 from mechdesign.analyses.poses import pose_in_words
-from mechdesign.analyses.reliability.engine.ladder import FACTOR, disagree
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.methods import Found
 from mechdesign.study import Study
@@ -15,6 +14,11 @@ from mechdesign.study.poses import Poses
 
 def disagreements(study: Study, poses: Poses, found: Sequence[Found]) -> list[str]:
     """One sentence for each two methods that are apart by more than a factor beyond their intervals: the worst pose."""
+    if not any(each.estimates for each in found):
+        return []
+    # What compares probabilities imports SciPy, which takes a quarter of a second; moments do without.
+    from mechdesign.analyses.reliability.engine.ladder import FACTOR, disagree
+
     worst: dict[tuple[str, str], tuple[float, int, Estimate, Estimate]] = {}
     count: dict[tuple[str, str], int] = {}
     for pose in range(poses.count):
