@@ -231,3 +231,28 @@ def test_feeder_with_the_cheapest_tolerances() -> None:
     again = result.tables["confirmation"]
     assert (again["low"] < 1).all()
     assert (again["high"] > 0.999).all()
+
+
+def test_arm_under_an_unknown_parcel() -> None:
+    # Deflections J K^-1 J' F of the soft gears, and the slopes of an arm's tip by its lengths and angles.
+    result = mechdesign.reliability(study_named("loaded_arm"))
+    moments, table = result.tables["moments"], result.tables["reliability"]
+    for place in (600 + 100j, 450 + 300j):
+        elbow = meet(0j, 400.0, place, 300.0, 1)
+        slopes = np.array([1j * place, 1j * (place - elbow)])
+        jacobian = np.stack([slopes.real, slopes.imag])
+        soft = jacobian @ np.diag([1 / 4e7, 1 / 2e7]) @ jacobian.T
+        parts = [
+            *(np.array([u.real, u.imag]) * 0.1 / 3 for u in (elbow / 400, (place - elbow) / 300)),
+            *(jacobian.T * math.radians(0.01) / 3),
+            soft[:, 1] * 12,
+        ]
+        own = rows(moments, **{"P.x": place.real, "method": "analytic"})
+        assert (moments["mean"] - moments["nominal"])[own] == pytest.approx(soft[:, 1] * -60, rel=1e-6)
+        covariance = sum(np.outer(part, part) for part in parts)
+        assert moments["sigma"][own] == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-6)
+        drawn = np.random.default_rng(5).multivariate_normal(soft[:, 1] * -60, covariance, 400_000)
+        share = float((np.hypot(*drawn.T) > 1.2).mean())
+        for method in ("analytic", "monte_carlo", "auto"):
+            failure = table["failure"][rows(table, **{"P.x": place.real, "method": method})][0]
+            assert failure == pytest.approx(share, rel=0.1, abs=1e-5)
