@@ -236,7 +236,10 @@ class Precision(Model):
 
 
 class Cost(Model):
-    """What a tolerance T costs: a/T^exponent."""
+    """What a tolerance T costs: a/T^exponent.
+
+    T is as the study gives it, in its units: half the width of the tolerance, sigma, or the mean radial clearance.
+    """
 
     a: Positive = 1.0
     exponent: Positive = 1.0
@@ -252,7 +255,11 @@ class Cost(Model):
 
 
 class Allocate(Model):
-    """The cheapest tolerances that reach a reliability."""
+    """The cheapest tolerances that reach a reliability at every pose, each by itself (not over a cycle).
+
+    All dimensions are allocated, random loads and clearances (radius and its tolerance together) where `cost` names
+    them; what it does not name costs 1/T.
+    """
 
     reliability: Annotated[float, Reader("none", 0.0, True)]
     cost: dict[str, Cost] = Field(default_factory=dict)

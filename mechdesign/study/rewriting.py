@@ -86,15 +86,18 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
     # Names of units in full are what the loader makes of the text.
     if "units" in written:
         wanted["units"] = written["units"]
-    now, new = dict(_leaves(written, ())), dict(_leaves(wanted, ()))
-    if now.keys() != new.keys():
-        return None
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError:
         return None
     edits = []
-    for keys in [keys for keys in new if new[keys] != now[keys]]:
+    for keys, entries in _replaced(written, wanted, ()):
+        edit = _entries(_node(root, keys[:-1]), str(keys[-1]), entries)
+        if edit is None:
+            return None
+        edits.append(edit)
+    now, new = dict(_leaves(written, ())), dict(_leaves(wanted, ()))
+    for keys in [keys for keys in new if keys in now and new[keys] != now[keys]]:
         node = _node(root, keys)
         if not isinstance(node, yaml.ScalarNode):
             return None
@@ -108,6 +111,35 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         return text if document.read(text.encode(), "").data == wanted else None
     except StudyError:
         return None
+
+
+def _replaced(old: Any, new: Any, keys: Keys) -> Iterator[tuple[Keys, dict[str, Any]]]:
+    """Keys in whose place several others stand, and those with their values, where mappings differ in just that."""
+    if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
+        return
+    gone = [key for key in old if key not in new]
+    if len(gone) == 1:
+        yield (*keys, gone[0]), {key: value for key, value in new.items() if key not in old}
+    for key in old:
+        if key in new:
+            yield from _replaced(old[key], new[key], (*keys, key))
+
+
+def _entries(node: yaml.Node | None, key: str, entries: Mapping[str, Any]) -> tuple[int, int, str] | None:
+    """The edit that writes entries of a mapping in the place of one; None where that is more than a line."""
+    if not isinstance(node, yaml.MappingNode):
+        return None
+    name, value = next(pair for pair in node.value if pair[0].value == key)
+    if not (isinstance(value, yaml.ScalarNode) or value.flow_style):
+        return None
+    between = ", " if node.flow_style else "\n" + " " * name.start_mark.column
+    written = [
+        yaml.safe_dump({each: own}, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10**6).strip()[
+            1:-1
+        ]
+        for each, own in entries.items()
+    ]
+    return name.start_mark.index, value.end_mark.index, between.join(written)
 
 
 def _node(node: yaml.Node | None, keys: Keys) -> yaml.Node | None:

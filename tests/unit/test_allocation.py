@@ -245,6 +245,51 @@ def test_a_wildcard_is_written_out_unless_its_places_stay_alike(angle: str, name
     assert not result.failed
 
 
+@pytest.mark.parametrize(
+    ("written", "after"),
+    [
+        ('"*.length": 0.03     # all\n', "    upper.length: {upper}\n    fore.length: {fore}     # all\n"),
+        ('"*.length": {tolerance: 0.03, distribution: uniform}  # all\n',
+         "    upper.length: {{tolerance: {upper}, distribution: uniform}}\n"
+         "    fore.length: {{tolerance: {fore}, distribution: uniform}}  # all\n"),
+    ],
+)  # fmt: skip
+def test_a_wildcard_is_written_out_in_its_place(tmp_path: Path, written: str, after: str) -> None:
+    text = WILD.replace(
+        '  dimensions: {"*.length": 0.03}\n', f"  dimensions:   # varying\n    {written}    upper: 0.01\n"
+    )
+    (tmp_path / "wild.yaml").write_text(text.replace("ANGLE", "60"))
+    result = mechdesign.reliability(mechdesign.load(tmp_path / "wild.yaml"))
+    found = allocated(result)
+    sizes = {"upper": found["upper.length"], "fore": found["fore.length"]}
+    new = result.files["allocated.yaml"]
+    assert "  dimensions:   # varying\n" + after.format(**sizes) + f"    upper: {found['upper']}\n" in new
+    flow = WILD.replace("ANGLE", "60").replace("0.03}", "0.03, upper: 0.01}  # varying")
+    (tmp_path / "flow.yaml").write_text(flow)
+    result = mechdesign.reliability(mechdesign.load(tmp_path / "flow.yaml"))
+    found = allocated(result)
+    said = f"upper.length: {found['upper.length']}, fore.length: {found['fore.length']}, upper: {found['upper']}"
+    assert f"  dimensions: {{{said}}}  # varying\n" in result.files["allocated.yaml"]
+
+
+def test_a_random_load_is_no_tolerance() -> None:
+    """It is held, unless a cost names it; the fixed one takes a part of what the limit leaves."""
+    text = (
+        LEVER.replace("theta: 0}", "theta: 90}")
+        + """\
+  dimensions: {lever.length: 0.2, theta: 0.05, load.fx: {sigma: 1}}
+stiffness: {link: lever, at: P, actuators: {theta: 1e6}}
+"""
+    )
+    result = ask(text, "reliability.load=[10, 0, 0]")
+    table = result.tables["allocation"]
+    assert np.isnan(table["cost_given"]).tolist() == [False, False, True]
+    # C11 = 100^2/1e6: the load moves P.x by 0.1 on the average, and by sigma 0.01.
+    assert result.tables["confirmation"]["met"].all()
+    angle = np.radians(allocated(result)["theta"]) * 100 / 3
+    assert np.hypot(angle, 0.01) == pytest.approx((0.3 - 0.1) / -ndtri(0.01), rel=1e-4)
+
+
 def test_a_diameter_stays_a_diameter() -> None:
     text = LEVER.replace("theta: 0}", "theta: 90}") + (
         "  clearances: {O: {diametral: 0.8, tolerance: [-0.1, 0.3], link: lever}}\n"

@@ -41,6 +41,8 @@ _PRECISION = 0.1
 _ACTIVE = 0.99
 # A share of the variance that is none.
 _NOTHING = 1e-12
+# A limit of 0 weighs as much as this one.
+_NARROW = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,9 +166,9 @@ def _shares(model: Model, scales: Floats, k: int) -> Floats:
     share, variance = linear.share()[:, :, 0], linear.deviation()[:, 0] ** 2
     weights = np.zeros(len(variance))
     for band in setting.bands:
-        weights[band.output] += 1.0 / min(abs(end) if end else np.inf for end in (band.low, band.high)) ** 2
+        weights[band.output] += 1.0 / max(min(abs(band.low), abs(band.high)), _NARROW) ** 2
     for disc in setting.discs:
-        weights[[disc.x, disc.y]] += 1.0 / disc.radius**2 if disc.radius else 0.0
+        weights[[disc.x, disc.y]] += 1.0 / max(disc.radius, _NARROW) ** 2
     parts = np.nansum(share * (weights * variance)[:, None], axis=0)
     return np.asarray(parts / parts.sum()) if parts.sum() > 0 else np.full(len(parts), np.nan)
 

@@ -54,7 +54,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     -------
     Result
         Tables ``moments``, ``reliability`` (where there are limits), ``contributions``, ``density`` and
-        ``convergence``.
+        ``convergence``; where tolerances are allocated ``allocation`` and ``confirmation``, and the study
+        ``allocated.yaml`` that has them.
 
     Raises
     ------
