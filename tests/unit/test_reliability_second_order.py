@@ -207,6 +207,31 @@ def test_velocities_and_every_source_against_simulation() -> None:
     assert table["sigma"][second] == pytest.approx(sigma, rel=0.008)
 
 
+def test_a_small_link_in_a_large_mechanism() -> None:
+    """A finger of 0.1 on an arm of 10 m, tilted by an offset of its tip: y = sqrt(r^2 - x^2) bends within itself."""
+    text = """
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [10000, 0.06]}
+    arm: [O, A, 10000]
+    finger: [A, B, 0.1]
+    slider: {B: [0, 0]}
+  joints: {guide: {prismatic: [ground, slider], through: G}}
+  drives: {theta: {angle: arm}}
+  sketch: {A: [10000, 0], B: [10000.08, 0.06]}
+reliability:
+  poses: [{theta: 0}]
+  outputs: [B.x]
+  dimensions: {ground.G.y: {sigma: 0.003}}
+  methods: [second_order]
+"""
+    shift = -0.5 * 0.1**2 / 0.08**3 * 0.003**2
+    result = ask(text)
+    found = moment(result, "second_order", "mean") - moment(result, "second_order", "nominal")
+    # Of a place of 10,000 so small a shift has about four digits.
+    assert found == pytest.approx(shift, rel=0.02)
+
+
 def test_without_neighbours_there_is_no_second_order() -> None:
     """Exactly at the fold, the crank upright and as long as the rod, a shorter rod cannot be assembled."""
     changes = ["mechanism.links.rod=[A, B, 100]", "reliability.poses=[{theta: 90}, {theta: 60}]"]

@@ -19,9 +19,10 @@ from mechdesign.parallel import map_chunks
 
 Floats = NDArray[np.float64]
 
-# Steps of the differences, as a part of the mechanism's size or in radians: the fourth root of rounding, at which a
-# second derivative has about seven digits.
-_STEP = 1e-4
+# Longest and shortest steps of the differences, as a part of the mechanism's size or in radians, and between them as a
+# part of the standard deviation: the longest is the fourth root of rounding, at which a second derivative has about
+# seven digits; what is made finely is often small itself, so that a shorter step is needed, and fewer digits count.
+_LONGEST, _SHORTEST, _PART = 1e-4, 1e-6, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,8 @@ class Quadratic:
 
 def moments(task: Task) -> tuple[Floats, Floats]:
     """Mean errors, shape (channels, poses), and their covariances, shape (poses, channels, channels)."""
-    law, steps = cumulants(task.sources), step_sizes(task.sources)
+    law = cumulants(task.sources)
+    steps = step_sizes(task.sources, np.sqrt(np.diagonal(law.covariance)))
     mean = np.full((task.channels, task.poses), np.nan)
     covariance = np.full((task.poses, task.channels, task.channels), np.nan)
 
@@ -95,25 +97,22 @@ def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
     return Quadratic(value[:, 0], (ahead - back) / (2.0 * steps), hessian)
 
 
-def step_sizes(sources: Sources) -> Floats:
-    """Step of each component that moves the mechanism little: by a small part of its size, or a small angle."""
+def step_sizes(sources: Sources, sigma: Floats) -> Floats:
+    """Step of each component, from its standard deviation and from how far it moves the mechanism."""
     mechanism = sources.study.mechanism
     length = mechanism.size or 1.0
-    steps = []
-    for scalar, source in zip(sources.scalars, sources.first_order, strict=False):
-        if scalar.kind == "load":
-            # Deflections are linear in the loads.
-            steps.append(np.sqrt(source.variance) or 1.0)
-            continue
-        reach = []
-        for name, slope in source.directions[0].items():
-            quantity = (
-                mechanism.quantity(name) if scalar.kind == "drive" else mechanism.description.places[name].quantity
-            )
+    scale = []
+    for scalar, source, deviation in zip(sources.scalars, sources.first_order, sigma, strict=False):
+        # Deflections are linear in the loads, whatever the step.
+        reach = [deviation or 1.0] if scalar.kind == "load" else []
+        for name, slope in source.directions[0].items() if scalar.kind != "load" else ():
+            drive = scalar.kind == "drive"
+            quantity = mechanism.quantity(name) if drive else mechanism.description.places[name].quantity
             if slope:
                 reach.append((1.0 if quantity == "angle" else length) / abs(slope))
-        steps.append(_STEP * min(reach, default=1.0))
-    return np.array([*steps, *[_STEP * length] * (2 * len(sources.pins))])
+        scale.append(min(reach, default=1.0))
+    scale += [length] * (2 * len(sources.pins))
+    return np.clip(_PART * sigma, _SHORTEST * np.array(scale), _LONGEST * np.array(scale))
 
 
 def _drawn(sources: Sources, z: Floats) -> Drawn:
