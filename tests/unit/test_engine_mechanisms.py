@@ -1,0 +1,121 @@
+"""Methods about the limits at mechanisms of every kind, against plain simulation of the same ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.analyses.reliability.engine.ladder import disagree
+from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.results import Result
+
+PLATFORM = """
+mechanism:
+  links:
+    ground: {A1: [-60, 0], A2: [60, 0], A3: [30, -20]}
+    platform: {B1: [-20, 0], B2: [20, 0], B3: [25, 15]}
+    leg_1: {from: A1, to: B1, telescopic: true}
+    leg_2: {from: A2, to: B2, telescopic: true}
+    leg_3: {from: A3, to: B3, telescopic: true}
+  drives: {l1: {length: leg_1}, l2: {length: leg_2}, l3: {length: leg_3}}
+  sketch: {B1: [-20, 100], B2: [20, 100], B3: [25, 115]}
+reliability:
+  poses: [{B1.x: -20, B1.y: 100, platform.angle: 0}]
+  rates: {l1: 10, l2: 5}
+  outputs: [B1, platform.angle]
+"""
+ARM = """
+mechanism:
+  parameters: {r1: 10, r2: 8}
+  links: {ground: {O: [0, 0]}, upper_arm: [O, E, r1], forearm: [E, P, r2]}
+  drives: {theta1: {angle: upper_arm}, theta2: {angle: forearm}}
+  sketch: {E: [8.7, 5], P: [12.7, 11.9]}
+reliability:
+  poses: [{theta1: 30, theta2: 60}]
+  outputs: [P]
+"""
+# Study, dimensions, what else varies, limits.
+STUDIES = {
+    "newton_group": (PLATFORM, "{l1: 0.03, l2: 0.03, ground.A2.x: 0.06, platform.B3.y: 0.06}", "",
+                     "{B1: {radius: 0.13}, platform.angle: 0.2}"),
+    "newton_group_acceleration": (PLATFORM, "{l1: 0.3, ground.A2.x: 0.6, platform.B3.y: 0.6}", "",
+                                  "{platform.angle_velocity: 0.6, B1.x_acceleration: {max: 0.6}}"),
+    "distributions": (ARM, """
+    r1: {tolerance: [-0.01, 0.04], distribution: triangular}
+    r2: {sigma: 0.01, distribution: lognormal}
+    theta1: {tolerance: 0.1, distribution: uniform}
+    theta2: {tolerance: 0.1, distribution: truncated_normal}
+    ground.O.y: {tolerance: [0, 0.02]}""", "", "{P.x: 0.04, P.y: {min: -0.03, max: 0.05}}"),
+    "correlation": (ARM, "{r1: 0.03, r2: {tolerance: 0.03, distribution: uniform}, theta1: 0.05}",
+                    "correlation: [[r1, r2, 0.8], [r1, theta1, -0.3]]", "{P: {radius: 0.055}}"),
+    "contact": (ARM, "{r1: 0.03}", "clearances: {O: {radial: 0.03, link: upper_arm, pin: contact}, "
+                "E: {radial: 0.03, tolerance: 0.01, link: forearm, pin: contact}}", "{P: {radius: 0.07}}"),
+}  # fmt: skip
+
+
+def ask(name: str, *changes: str, jobs: int = 1) -> Result:
+    text, dimensions, more, limits = STUDIES[name]
+    text += f"  dimensions: {dimensions}\n  limits: {limits}\n" + (f"  {more}\n" if more else "")
+    return mechdesign.reliability(study_of(text, *changes), seed=2, jobs=jobs)
+
+
+def estimates(result: Result) -> dict[str, Estimate]:
+    table = result.tables["reliability"]
+    columns = (table[name].tolist() for name in ("failure", "failure_low", "failure_high", "evaluations"))
+    return dict(zip(table["method"].tolist(), (Estimate(*row) for row in zip(*columns, strict=True)), strict=True))
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_methods_agree(name: str) -> None:
+    methods = "reliability.methods=[monte_carlo, quasi_monte_carlo, form, importance_sampling, auto]"
+    found = estimates(ask(name, methods, "reliability.samples=60000", "reliability.precision=0.1"))
+    plain = found["monte_carlo"]
+    assert 1e-4 < plain.failure < 0.05
+    for method in ("quasi_monte_carlo", "importance_sampling", "auto"):
+        assert disagree(found[method], plain) == 1.0
+    width = found["importance_sampling"].high - found["importance_sampling"].low
+    assert width < 0.5 * (plain.high - plain.low)
+    assert found["auto"].high - found["auto"].low <= 0.2 * found["auto"].failure
+    # The tangents are near, except of pins on their rims: those fail by their direction alone, from the mean on.
+    assert 0.8 < found["form"].failure / plain.failure < (15 if name == "contact" else 1.25)
+
+
+@pytest.mark.parametrize("name", ["newton_group", "contact"])
+def test_the_number_of_threads_and_a_second_run_change_nothing(name: str) -> None:
+    changes = ("reliability.methods=[form, importance_sampling, auto]", "reliability.samples=4000")
+    first, again, threads = (ask(name, *changes, jobs=jobs) for jobs in (1, 1, 2))
+    for key, table in first.tables.items():
+        for column in table.columns:
+            assert column.values.tobytes() == again.tables[key][column.name].tobytes()
+            assert column.values.tobytes() == threads.tables[key][column.name].tobytes()
+
+
+def test_auto_along_a_sweep_of_73_poses() -> None:
+    sweep = ["reliability.poses=null", "reliability.sweep={theta1: {from: 0, to: 360, step: 5}, theta2: 60}"]
+    result = ask("correlation", "reliability.methods=[auto, quasi_monte_carlo]", "reliability.precision=0.2", *sweep)
+    table = result.tables["reliability"]
+    poses = table["scope"] == "pose"
+    auto, quasi = (poses & (table["method"] == name) for name in ("auto", "quasi_monte_carlo"))
+    assert auto.sum() == quasi.sum() == 73
+    assert (table["failure_high"] - table["failure_low"] <= 0.4 * table["failure"])[auto].all()
+    apart = (table["failure_low"][auto] > table["failure_high"][quasi]) | (
+        table["failure_high"][auto] < table["failure_low"][quasi]
+    )
+    # Of 146 intervals 0.3 % do not cover.
+    assert apart.sum() <= 3
+    assert table["evaluations"][auto].max() < 60_000
+    assert set(table["used"][auto].tolist()) <= {"monte_carlo", "importance_sampling"}
+
+
+def test_no_failure_within_reach_is_a_bound() -> None:
+    """Uniform links of the arm reach 0.06 together at the most."""
+    dimensions = "{r1: {tolerance: 0.03, distribution: uniform}, r2: {tolerance: 0.03, distribution: uniform}}"
+    text = ARM + f"  dimensions: {dimensions}\n  limits: {{P: {{radius: 0.0601}}}}\n  samples: 30000\n"
+    result = mechdesign.reliability(study_of(text, "reliability.methods=[importance_sampling, auto]"))
+    for found in estimates(result).values():
+        assert found.low == 0.0
+        assert found.failure == found.high == pytest.approx(1 - 0.0015 ** (1 / 30_000), rel=1e-9)
+    assert sum("no failure in 30000 samples" in text for text in result.warnings) == 2
+    assert np.isfinite(result.tables["reliability"]["failure"]).all()
