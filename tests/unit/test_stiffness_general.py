@@ -145,7 +145,7 @@ def test_the_force_method_gives_what_serial_legs_give(text: str) -> None:
     assert asked.legs is not None
     (solved,) = solve_poses(study, study.poses("stiffness"))
     twists = twists_of(asked.network, asked.section, solved.configuration, asked.length)
-    held = load(asked.network, twists, asked.length, asked.size).held
+    held = load(twists, asked.size).held
     result = ask_stiffness(text)
     for letter, found in (("K", held.stiffness[0]), ("C", held.compliance[0])):
         expected = matrix(result, letter)

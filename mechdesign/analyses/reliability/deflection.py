@@ -128,7 +128,7 @@ class Elasticity:
 
         asked = self.asked
         twists = twists_of(asked.network, asked.section, configuration, asked.length)
-        moved = load(asked.network, twists, asked.length, asked.size).displacements
+        moved = load(twists, asked.size).displacements
         origin = configuration.point(asked.section.at)
         graph = self.mechanism.graph
         nodes: list[Value] = [0.0] * len(graph.nodes)

@@ -26,7 +26,7 @@ from mechdesign.analyses.stiffness.tables import (
     stiffness_table,
 )
 from mechdesign.errors import Problem, StudyError
-from mechdesign.mechanism import Configuration, Reason
+from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
@@ -209,8 +209,13 @@ def ask(study: Study) -> Asked:
     with suppress(NotSerialError):
         legs = find_legs(mechanism, link, section.at, section)
     network = build_network(mechanism, section.link, section.at, section)
-    length = section.characteristic_length or mechanism.size or 1.0
-    return Asked(section, legs, network, 2 if section.link is None else 3, condensed, length)
+    return Asked(section, legs, network, 2 if section.link is None else 3, condensed, _spread(mechanism, network))
+
+
+def _spread(mechanism: Mechanism, network: Network) -> float:
+    """How far the joints that carry lie apart in the sketch; whatever else is far away does not count."""
+    places = [complex(mechanism.sketch_configuration.point(edge.point)) for edge in network.edges]
+    return max((abs(place - places[0]) for place in places), default=0.0) or mechanism.size or 1.0
 
 
 def hold(asked: Asked, configuration: Configuration) -> tuple[Held, list[Springs]]:
@@ -233,7 +238,7 @@ def evaluate(asked: Asked, configuration: Configuration) -> tuple[Held, list[Spr
 
 def _loaded(asked: Asked, configuration: Configuration) -> Loaded:
     twists = twists_of(asked.network, asked.section, configuration, asked.length)
-    return load(asked.network, twists, asked.length, asked.size)
+    return load(twists, asked.size)
 
 
 def _cautions(

@@ -14,9 +14,8 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.study.stiffness_models import Profile, StiffnessSection
 
 
-def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration) -> Chain:
-    """A leg's joints and elastic elements in each pose, seen from the asked point."""
-    at = configuration.point(section.at)
+def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]) -> Chain:
+    """A leg's joints and elastic elements in each pose, seen from places `at`."""
     found = list(freedoms(leg.elements, section, configuration, at))
     return Chain(
         [twist for twist, compliance in found if compliance is None],

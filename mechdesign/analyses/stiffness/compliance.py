@@ -13,7 +13,7 @@ the system on that space. [S4, eqs. 17-22]
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,28 @@ class Held:
     rank: NDArray[np.intp]
     free: Array
     margin: Array
+
+    def seen_from(self, arm: NDArray[np.complex128]) -> Held:
+        """The same body asked at points that are `arm` (n,) away; a pin is asked where it is.
+
+        Nothing is inverted, so that a point may be far away: C' = M C M^T, K' = M^-T K M^-1  [S4].
+        """
+        if self.compliance.shape[1] == 2:
+            return self
+        there, back = moved_to(arm), moved_to(-arm)
+        return replace(
+            self,
+            stiffness=back.swapaxes(1, 2) @ self.stiffness @ back,
+            compliance=there @ self.compliance @ there.swapaxes(1, 2),
+            free=(there @ self.free[:, :, None])[:, :, 0],
+        )
+
+
+def moved_to(arm: NDArray[np.complex128]) -> Array:
+    """M, shape (n, 3, 3), that takes a body's twist to that at a point `arm` away; its inverse is that of `-arm`."""
+    found = np.tile(np.eye(3), (len(arm), 1, 1))
+    found[:, 0, 2], found[:, 1, 2] = -arm.imag, arm.real
+    return found
 
 
 def hold(wrenches: Sequence[Array], compliances: Sequence[Array], length: float, size: int = 3) -> Held:

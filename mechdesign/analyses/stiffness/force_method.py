@@ -15,12 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.stiffness.chains import freedoms
-from mechdesign.analyses.stiffness.compliance import Held
+from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import RANK, RIGID, Array
 from mechdesign.mechanism import Configuration
@@ -31,46 +32,94 @@ SELF_STRESS = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
+class Twists:
+    """Freedoms of a network in n poses, with rotations scaled to lengths.
+
+    Parameters
+    ----------
+    network : Network
+    twist : ndarray, shape (n, 3, freedoms)
+        Seen from the middle of the joints; of a pin, from the pin.
+    compliance : ndarray, shape (n, freedoms)
+        0 of free joints, which `free` marks.
+    edge : ndarray of int, shape (freedoms,)
+    arm : complex ndarray, shape (n,)
+        From where the twists are seen to the asked point.
+    length : float
+        What turns rotations into lengths.
+    """
+
+    network: Network
+    twist: Array
+    compliance: Array
+    free: NDArray[np.bool_]
+    edge: NDArray[np.intp]
+    arm: NDArray[np.complex128]
+    length: float
+
+
+@dataclass(frozen=True, eq=False)
 class Loaded:
     """A body held by a network in n poses, and what unit loads at it do. Loads and displacements are plain, not scaled.
 
     Parameters
     ----------
     held : Held
-    wrenches : ndarray, shape (n, edges, 3, size)
-        Wrench that each edge bears, about the asked point, a column for each unit load.
-    displacements : mapping of str to ndarray, shape (n, 3, size)
-        Twist of each vertex about the asked point, a column for each unit load; nan where the body is not held.
+    twists : Twists
+    stress : ndarray, shape (n, 3 loops, size)
+        Wrenches of the loops under scaled unit loads.
+    shift : ndarray, shape (n, freedoms, size)
+        Displacements in all freedoms.
     """
 
     held: Held
-    wrenches: Array
-    displacements: dict[str, Array]
+    twists: Twists
+    stress: Array
+    shift: Array
 
+    @cached_property
+    def wrenches(self) -> Array:
+        """Wrench that each edge bears about the asked point, a column for each unit load, shape (n, edges, 3, size)."""
+        network, size = self.twists.network, self.stress.shape[2]
+        around, onward = _ways(network)
+        stress = self.stress.reshape(len(self.stress), len(around), 3, size)
+        # The load's where the edge is on its way, less the loops'.
+        through = onward[:, None, None] * np.eye(3)[:, :size] - np.einsum("le,nlis->neis", around, stress)
+        scale = np.array([1.0, 1.0, 1.0 / self.twists.length])
+        plain = through / scale[:, None] * scale[:size]
+        back = moved_to(-self.twists.arm).swapaxes(1, 2)
+        return np.asarray(back[:, None] @ plain @ self._loads[:, None])
 
-@dataclass(frozen=True, eq=False)
-class Twists:
-    """Freedoms of a network in n poses, with rotations scaled to lengths.
+    @cached_property
+    def displacements(self) -> dict[str, Array]:
+        """Twist of each vertex about the asked point, a column for each unit load, shape (n, 3, size)."""
+        twists, size = self.twists, self.stress.shape[2]
+        scale = np.array([1.0, 1.0, 1.0 / twists.length])
+        there = moved_to(twists.arm)
+        return {
+            vertex: there
+            @ ((twists.network.signs(path)[twists.edge] * twists.twist) @ self.shift * scale[:, None] * scale[:size])
+            @ self._loads
+            for vertex, path in twists.network.paths.items()
+        }
 
-    Parameters
-    ----------
-    twist : ndarray, shape (n, 3, freedoms)
-    compliance : ndarray, shape (n, freedoms)
-        0 of free joints, which `free` marks.
-    edge : ndarray of int, shape (freedoms,)
-    """
-
-    twist: Array
-    compliance: Array
-    free: NDArray[np.bool_]
-    edge: NDArray[np.intp]
+    @property
+    def _loads(self) -> Array:
+        """Loads at the asked point as loads where the twists are seen from, shape (n, size, size)."""
+        size = self.stress.shape[2]
+        return moved_to(self.twists.arm).swapaxes(1, 2)[:, :size, :size]
 
 
 def twists_of(network: Network, section: StiffnessSection, configuration: Configuration, length: float) -> Twists:
-    """Freedoms of all edges, seen from the asked point."""
+    """Freedoms of all edges, seen from the middle of the joints: a point far away would hide what is near."""
     at, n = configuration.point(section.at), configuration.shape[0]
+    joints = dict.fromkeys(edge.point for edge in network.edges)
+    middle = np.zeros(n, dtype=complex)
+    for point in joints:
+        middle = middle + configuration.point(point) / len(joints)
+    origin = at if section.link is None or not joints else middle
     found = [(k, *each) for k, edge in enumerate(network.edges)
-             for each in freedoms(edge.elements, section, configuration, at)]  # fmt: skip
+             for each in freedoms(edge.elements, section, configuration, origin)]  # fmt: skip
     twist = np.zeros((n, 3, len(found)))
     compliance = np.zeros((n, len(found)))
     for j, (_, each, soft) in enumerate(found):
@@ -79,49 +128,43 @@ def twists_of(network: Network, section: StiffnessSection, configuration: Config
             compliance[:, j] = soft
     twist[:, 2] *= length
     return Twists(
-        twist, compliance, np.array([soft is None for *_, soft in found], dtype=bool),
-        np.array([k for k, *_ in found], dtype=np.intp),
+        network, twist, compliance, np.array([soft is None for *_, soft in found], dtype=bool),
+        np.array([k for k, *_ in found], dtype=np.intp), at - origin, length,
     )  # fmt: skip
 
 
-def load(network: Network, twists: Twists, length: float, size: int) -> Loaded:
-    """Stiffness, compliance, joint wrenches and displacements of all vertices.
+def load(twists: Twists, size: int) -> Loaded:
+    """Stiffness and compliance, and what bears and moves under unit loads.
 
     Parameters
     ----------
     size : int
         3 for a body, 2 for a pin, which bears no moment.
     """
-    n = len(twists.twist)
-    around = np.array([network.signs(loop) for loop in network.loops]).reshape(-1, len(network.edges))
-    onward = network.signs(network.paths[network.asked])
-    loops = (around[:, twists.edge][:, None] * twists.twist[:, None]).reshape(n, -1, len(twists.edge))
-    way = onward[twists.edge] * twists.twist[:, :size]
-    free, soft = twists.free, ~twists.free
-    compliance = twists.compliance[:, soft]
-    statics = _Statics.of(loops[:, :, free], way[:, :, free])
-    bears, stress = _least_energy(statics, loops[:, :, soft], way[:, :, soft], compliance)
+    n, (around, onward) = len(twists.twist), _ways(twists.network)
+
+    def of(chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
+        edge, twist = twists.edge[chosen], twists.twist[:, :, chosen]
+        loops = around[:, edge][:, None] * twist[:, None]
+        return loops.reshape(n, 3 * len(around), len(edge)), onward[edge] * twist[:, :size]
+
+    compliance = twists.compliance[:, ~twists.free]
+    statics = _Statics.of(*of(twists.free))
+    loops, way = of(~twists.free)
+    bears, stress = _least_energy(statics, loops, way, compliance)
     strain = compliance[:, :, None] * bears
     total = bears.swapaxes(1, 2) @ strain
-    held = _held((total + total.swapaxes(1, 2)) / 2, statics, length, size)
-    scale = np.array([1.0, 1.0, 1.0 / length])
-    # Wrenches through edges: the load's where it is on the way, less the loops'.
-    loads = np.eye(3)[:, :size]
-    through = onward[:, None, None] * loads - np.einsum(
-        "le,nlis->neis", around, stress.reshape(n, len(around), 3, size)
-    )
     shift = np.zeros((n, len(twists.edge), size))
-    shift[:, soft] = strain
-    shift[:, free] = statics.motion(-loops[:, :, soft] @ strain)
-    # What is not held has no answer to a load.
-    shift[held.rank < size] = np.nan
-    through[held.rank < size] = np.nan
-    outer = scale[:size]
-    displacements = {
-        vertex: (network.signs(path)[twists.edge] * twists.twist) @ shift * scale[:, None] * outer
-        for vertex, path in network.paths.items()
-    }
-    return Loaded(held, through / scale[:, None] * outer, displacements)
+    shift[:, ~twists.free] = strain
+    shift[:, twists.free] = -statics.inverse @ (loops @ strain)
+    held = _held((total + total.swapaxes(1, 2)) / 2, statics, twists.length, size)
+    return Loaded(held.seen_from(twists.arm), twists, stress, shift)
+
+
+def _ways(network: Network) -> tuple[Array, Array]:
+    """Signs of the edges around each loop, shape (loops, edges), and on the way to the asked body, shape (edges,)."""
+    loops = np.array([network.signs(loop) for loop in network.loops]).reshape(-1, len(network.edges))
+    return loops, network.signs(network.paths[network.asked])
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,43 +174,65 @@ class _Statics:
     Parameters
     ----------
     inverse : ndarray, shape (n, freedoms, loops)
-        Pseudo-inverse of the loops' matrix.
+        Pseudo-inverse of the loops' matrix: motions of the free joints that close gaps in the loops.
     particular : ndarray, shape (n, loops, size)
         Loop wrenches of each unit load.
-    stress : ndarray, shape (n, loops, loops)
-        Projector onto the states of self-stress.
-    lost : ndarray, shape (n, size, size)
-        Projector onto the asked body's free displacements.
+    stress : ndarray, shape (n, loops, loops), or None
+        Projector onto the states of self-stress; None where there are none in any pose.
+    lost : ndarray, shape (n, size, size), or None
+        Projector onto the asked body's free displacements; None likewise.
     margin : ndarray, shape (n,)
-        Smallest singular value that is not lost.
+        Smallest singular value (of unit columns) that is not lost; infinite where not needed.
     """
 
     inverse: Array
     particular: Array
-    stress: Array
-    lost: Array
+    stress: Array | None
+    lost: Array | None
     margin: Array
 
     @staticmethod
     def of(loops: Array, way: Array) -> _Statics:
+        """Square and regular matrices are inverted; the others go through singular values."""
         norm = np.sqrt((loops**2).sum(axis=1) + (way**2).sum(axis=1))
         norm = np.where(norm > 0, norm, 1.0)[:, None]
         unit, along = loops / norm, way / norm
-        left, values, right = np.linalg.svd(unit)
-        keep = values > RANK
-        smallest = np.where(keep, values, np.inf).min(axis=1, initial=np.inf)
-        upright, count = right.swapaxes(1, 2), values.shape[1]
-        inverses = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
-        inverse = (upright[:, :, :count] * inverses[:, None]) @ left[:, :, :count].swapaxes(1, 2)
-        stress, idle = (_unkept(vectors, keep) for vectors in (left, upright))
+        n, rows, columns = unit.shape
+        inverse, regular = np.zeros((n, columns, rows)), np.zeros(n, dtype=bool)
+        if rows == columns:
+            inverse, regular = _inverses(unit)
+        margin, stress, lost = np.full(n, np.inf), None, None
+        rest = np.flatnonzero(~regular)
+        if len(rest):
+            left, values, right = np.linalg.svd(unit[rest])
+            keep = values > RANK
+            margin[rest] = np.where(keep, values, np.inf).min(axis=1, initial=np.inf)
+            upright, count = right.swapaxes(1, 2), values.shape[1]
+            inverses = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
+            inverse[rest] = (upright[:, :, :count] * inverses[:, None]) @ left[:, :, :count].swapaxes(1, 2)
+            stresses, idle = (_unkept(vectors, keep) for vectors in (left, upright))
+            if stresses.any():
+                stress = np.zeros((n, rows, rows))
+                stress[rest] = stresses
+            if idle.any():
+                lost = np.zeros((n, way.shape[1], way.shape[1]))
+                lost[rest] = _onto(along[rest] @ idle @ along[rest].swapaxes(1, 2))
         return _Statics(
-            inverse / norm.swapaxes(1, 2), inverse.swapaxes(1, 2) @ along.swapaxes(1, 2), stress,
-            _onto(along @ idle @ along.swapaxes(1, 2)), smallest,
-        )  # fmt: skip
+            inverse / norm.swapaxes(1, 2), inverse.swapaxes(1, 2) @ along.swapaxes(1, 2), stress, lost, margin
+        )
 
-    def motion(self, gaps: Array) -> Array:
-        """Displacements of the free joints that close gaps in the loops, shape (n, freedoms, size)."""
-        return np.asarray(self.inverse @ gaps)
+
+def _inverses(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Inverses, and where the smallest singular value is certainly above `REGULAR`."""
+    n, size, _ = matrix.shape
+    inverse, regular = np.zeros((n, size, size)), np.ones(n, dtype=bool)
+    try:
+        inverse[:] = np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        # Some pose is exactly singular; the answers of the others are not to hang on the company they are in.
+        regular = np.linalg.det(matrix) != 0
+        inverse[regular] = np.linalg.inv(matrix[regular])
+    return inverse, regular & ((inverse**2).sum(axis=(1, 2)) < 1 / REGULAR**2)
 
 
 def _unkept(vectors: Array, keep: NDArray[np.bool_]) -> Array:
@@ -194,7 +259,7 @@ def _least_energy(statics: _Statics, loops: Array, way: Array, compliance: Array
     # What loads and loops together do not load bears nothing, but for rounding: rigid is rigid exactly.
     largest = np.abs(stress).max(axis=(1, 2), keepdims=True, initial=0.0)
     bears[np.abs(bears) <= RIGID * (np.abs(onward) + np.abs(around).sum(axis=2, keepdims=True) * largest)] = 0.0
-    if not statics.stress.any():
+    if statics.stress is None:
         return bears, stress
     weighted = statics.stress @ loops
     energy = (weighted * compliance[:, None]) @ weighted.swapaxes(1, 2)
@@ -208,11 +273,12 @@ def _least_energy(statics: _Statics, loops: Array, way: Array, compliance: Array
 def _held(compliance: Array, statics: _Statics, length: float, size: int) -> Held:
     """Compliance where the body is held, stiffness where it is not rigid, and what is free, unscaled."""
     n = len(compliance)
-    freedom = np.rint(np.trace(statics.lost, axis1=1, axis2=2)).astype(np.intp)
+    lost = statics.lost if statics.lost is not None else np.zeros((n, size, size))
+    freedom = np.rint(np.trace(lost, axis1=1, axis2=2)).astype(np.intp)
     stiffness = np.full(compliance.shape, np.nan)
     twist = np.full((n, size), np.nan)
     # Of the displacements that are not free: an orthonormal basis.
-    _, axes = np.linalg.eigh(statics.lost)
+    _, axes = np.linalg.eigh(lost)
     for count, rows in _by(freedom):
         basis = axes[rows][:, :, : size - count]
         inner = basis.swapaxes(1, 2) @ compliance[rows] @ basis

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.analyses.stiffness.legs import Beam, Element, joint_elements, points_along
+from mechdesign.analyses.stiffness.legs import Beam, Element, Hinge, joint_elements, points_along
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.study.stiffness_models import StiffnessSection
@@ -92,7 +92,8 @@ def build_network(mechanism: Mechanism, link: str | None, at: str, section: Stif
     bodies = build_bodies(mechanism, link, at, section)
     builder = _Builder(mechanism, bodies, section)
     edges = builder.edges()
-    network = _looped(tuple(_carrying(edges, bodies.asked)), bodies.asked, builder.points())
+    carrying = _pinned(_carrying(edges, bodies.asked), bodies)
+    network = _looped(tuple(carrying), bodies.asked, builder.points())
     return replace(network, paths=_with_idle(edges, network.paths))
 
 
@@ -153,11 +154,13 @@ class _Builder:
             inner = contact.slide is not None and contact.other(body) == link
             return f"{body}@{described.ends[0 if inner else 1]}"
         reach = contact.reach(body)
-        for tail, head in pairwise(reach):
-            found.append(
-                Edge(f"{body}@{tail}", f"{body}@{head}", (Beam(tail, head, self.section.elastic[link]),), link, head)
-            )
-        return f"{body}@{reach[-1]}"
+        vertex = f"{body}@{reach[0]}"
+        if len(reach) == 2:
+            # Of two slides on one line, each has a beam of its own.
+            tail, head = reach
+            vertex, root = f"{body}@{self.mechanism.graph.slides[contact.slide or 0]}", vertex
+            found.append(Edge(root, vertex, (Beam(tail, head, self.section.elastic[link]),), link, head))
+        return vertex
 
     def _beams(self, name: str, section: str) -> list[Edge]:
         link = self.mechanism.description.links[name]
@@ -181,6 +184,18 @@ def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
         if not loose:
             return edges
         edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
+
+
+def _pinned(edges: list[Edge], bodies: Bodies) -> list[Edge]:
+    """Massless pins turn with the first link that they join, so that no motion of theirs is open."""
+    found, seen = list[Edge](), set[str]()
+    for edge in edges:
+        pins = {end for end in (edge.a, edge.b) if bodies.is_pin(end) or (end == ASKED and bodies.link is None)}
+        if pins - seen:
+            edge = replace(edge, elements=tuple(each for each in edge.elements if not isinstance(each, Hinge)))
+        seen |= pins
+        found.append(edge)
+    return found
 
 
 def _with_idle(edges: Sequence[Edge], paths: Mapping[str, Way]) -> dict[str, Way]:

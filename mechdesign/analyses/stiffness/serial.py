@@ -37,7 +37,10 @@ def hold_by_legs(
         The pin is a point of one link only: the link turns freely under forces at it.
     """
     n = configuration.shape[0]
-    chains = [chain_of(leg, section, configuration) for leg in legs]
+    at = configuration.point(section.at)
+    # A body is looked at from the middle of its joints: a point far away would hide what is near.
+    middle = at if size == 2 and not condensed else _middle(legs, configuration, at)
+    chains = [chain_of(leg, section, configuration, middle) for leg in legs]
     ranks = [np.broadcast_to(joint_rank(chain.passive, length), (n,)) for chain in chains]
     body = 3 if condensed else size
     if not chains:
@@ -53,11 +56,19 @@ def hold_by_legs(
         ]
         blocks = [constraint_compliance(w, chain) for w, chain in zip(wrenches, here, strict=True)]
         parts.append((rows, hold(wrenches, blocks, length, body)))
-        at = configuration.point(section.at)[rows]
         for k, (w, chain) in enumerate(zip(wrenches, here, strict=True)):
             for spring in equivalent_springs(w, chain, length):
-                springs.append(Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + at, spring.angle))
-    return _restrict(_join(parts, n), condensed), springs
+                springs.append(
+                    Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + middle[rows], spring.angle)
+                )
+    return _restrict(_join(parts, n).seen_from(at - middle), condensed), springs
+
+
+def _middle(legs: Sequence[Leg], configuration: Configuration, at: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """The middle of all first and last joints of legs; the asked point where there are none."""
+    points = list(dict.fromkeys(point for leg in legs for point in (leg.base, leg.tip)))
+    places = np.stack([configuration.point(point) for point in points] or [at])
+    return np.asarray(places.mean(axis=0))
 
 
 def _signatures(ranks: NDArray[np.intp]) -> list[tuple[list[int], NDArray[np.intp]]]:

@@ -81,7 +81,7 @@ def _shapes(asked: Asked, configuration: Configuration, scene: Scene) -> list[tu
     """
     network, at = asked.network, scene.points[asked.section.at]
     twists = twists_of(network, asked.section, configuration, asked.length)
-    moved = {name: d[0] for name, d in load(network, twists, asked.length, asked.size).displacements.items()}
+    moved = {name: d[0] for name, d in load(twists, asked.size).displacements.items()}
 
     def shift(vertex: str, place: complex) -> Complexes:
         dx, dy, turn = moved[vertex]
