@@ -9,25 +9,22 @@ with joint limits, Robotics and Autonomous Systems 17 (1996).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.workspace.across import Across
 from mechdesign.analyses.workspace.curves import SLACK
-from mechdesign.analyses.workspace.extremes import Starts, improved
+from mechdesign.analyses.workspace.extremes import Starts, extended
 from mechdesign.analyses.workspace.field import Field, Places
 from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, trace
 from mechdesign.analyses.workspace.slices import VALUE, Lanes, Misses, Sliced, Stretches, as_intervals, merged
-from mechdesign.analyses.workspace.summits import summits
 
 Complex = NDArray[np.complex128]
 # Values of the range that are looked at everywhere, and rounds in which others are put between.
 VALUES, ROUNDS = 25, 6
-# An extreme may lie so many times as far beyond its sample as the samples beside it fall short.
-ROOM = 1.5
 # Rays are told apart to this angle (radians).
 QUANTUM = 2.0**-28
 
@@ -67,6 +64,13 @@ class Endings(Field):
         ]
         return (*single, *single, *single, *pairs)
 
+    def label(self, one: Ints, two: Ints) -> Ints:
+        """Labels of pairs of margins of which the two after the last are the ends of the range."""
+        count = len(self.sliced.labels)
+        low, high = np.minimum(one, two), np.maximum(one, two)
+        single = np.where(high == low, low, low + (1 + high - count) * count)
+        return np.asarray(np.where((high < count) & (high > low), (3 + low) * count + high, single))
+
     @property
     def singular(self) -> NDArray[np.bool_]:
         """No square roots are looked for."""
@@ -102,13 +106,9 @@ class RangedDesigns(Designs):
 
         lanes = Lanes(np.repeat(np.arange(rays), VALUES), np.tile(values, rays))
         parts, misses = slices(lanes)
-        for _ in range(ROUNDS):
-            # Between values where something seems to end and another to begin, and where nothing is quite met.
-            broken = parts.broken(lanes)
-            ray, value = lanes.ray[broken], 0.5 * (lanes.value[broken] + lanes.value[lanes.beside[1, broken]])
-            if not field.every:
-                hidden = misses.hidden(lanes)
-                ray, value = np.concatenate([ray, hidden[0]]), np.concatenate([value, hidden[1]])
+        for _ in range(0 if field.every else ROUNDS):
+            # Between values where nothing is quite met.
+            ray, value = misses.hidden(lanes)
             if not len(ray):
                 break
             count = len(lanes.ray)
@@ -116,38 +116,28 @@ class RangedDesigns(Designs):
             lanes = Lanes(np.concatenate([lanes.ray, ray]), np.concatenate([lanes.value, value]))
             more = slices(fresh)
             parts, misses = parts.joined(more[0], count), misses.joined(more[1], count)
-        peak, rise = parts.peaks(lanes)
-        _, whole, _, part = merged(lanes.ray[parts.lane], parts.ends)
-        side, which = np.nonzero(peak & (np.abs(whole[:, part] - parts.ends) <= ROOM * rise))
-        owner = lanes.ray[parts.lane[which]]
-        turn = np.exp(1j * theta[owner])
-        ends, labels, value = parts.ends.copy(), parts.labels.copy(), np.tile(lanes.value[parts.lane], (2, 1))
-        start = Starts(
-            ends[side, which], value[side, which], labels[side, which],
-            np.stack([parts.named_beside(lanes, side, which, step) for step in range(2)]),
-            np.where(side, 1.0, -1.0), reach[owner],
-            field.low, field.high, (field.high - field.low) / (VALUES - 1),
-        )  # fmt: skip
-
-        def margins(at: Ints, radius: Floats, value: Floats) -> Floats:
-            return field.sliced.margins(self.about + radius * turn[at], {VALUE: value})
-
-        def end(at: Ints, value: Floats) -> Floats:
-            """Ends nearest to where they were at the samples, outwards positive, shape (1, n); nan where none is."""
-            there = slices(Lanes(owner[at], value))[0]
-            found, nearest = np.full(len(at), np.nan), np.full(len(at), np.inf)
-            for j, some in there.near(np.arange(len(at))):
-                gap = np.where(some, np.abs(there.ends[side[at], j] - start.radius[at]), np.inf)
-                found = np.where(gap < nearest, start.outwards[at] * there.ends[side[at], j], found)
-                nearest = np.minimum(gap, nearest)
-            return found[None]
-
-        radius, at, label, failed = improved(margins, start, len(field.sliced.labels), field.every)
-        if len(failed):
-            radius[failed], at[failed] = _climbed(end, start, failed)
-        ends[side, which], labels[side, which], value[side, which] = radius, label, at
-        ray, ends, source, _ = merged(lanes.ray[parts.lane], ends)
+        ray, ends, source = merged(lanes.ray[parts.lane], parts.ends)
         sides = np.array([[0], [1]])
+        labels, value = parts.labels[sides, source], lanes.value[parts.lane[source]]
+        # Each end may go on as far as the next stretch.
+        same = ray[1:] == ray[:-1]
+        limit = np.stack([np.zeros(len(ray)), reach[ray]])
+        limit[0, 1:][same], limit[1, :-1][same] = ends[1, :-1][same], ends[0, 1:][same]
+        side, which = np.nonzero(labels >= 0)
+        owner, count = ray[which], len(field.sliced.labels)
+        at_end = np.where(value == field.low, count, np.where(value == field.high, count + 1, -1))
+        start = Starts(
+            ends[side, which], value[side, which], (ends[1] - ends[0])[which],
+            np.stack([labels, at_end])[:, side, which], limit[side, which],
+            np.where(side, 1.0, -1.0), reach[owner], (field.high - field.low) / (VALUES - 1),
+        )  # fmt: skip
+        across = Across(field.sliced, theta[owner], self.about, field.low, field.high, field.every, labels[side, which])
+        radius, at, pair = extended(across.margins, across.cut, start, field.every)
+        ends[side, which], value[side, which] = radius, at
+        known = (pair >= 0).all(axis=0)
+        labels[side[known], which[known]] = field.label(*pair[:, known])
+        labels[side[~known & (radius == 0)], which[~known & (radius == 0)]] = -1
+        ray, ends, source = merged(ray, ends)
         return as_intervals(ray, ends, labels[sides, source], value[sides, source], reach, field.every)
 
     def deciding(self, theta: Floats, radius: Floats, reach: float, samples: int) -> Floats:
@@ -160,13 +150,3 @@ class RangedDesigns(Designs):
         value = np.full(len(theta), np.nan)
         value[owner] = values.ravel()[order[first]]
         return value
-
-
-def _climbed(end: Callable[[Ints, Floats], Floats], start: Starts, lanes: Ints) -> tuple[Floats, Floats]:
-    """Radius and value of extremes that Newton's method did not find, by the ends themselves."""
-    value = start.value[lanes]
-    a, c = np.maximum(value - start.step, start.low), np.minimum(value + start.step, start.high)
-    at, height = summits(
-        lambda which, x: end(lanes[which], x), (a, value, c), (end(lanes, a), end(lanes, value), end(lanes, c))
-    )
-    return start.outwards[lanes] * height, at

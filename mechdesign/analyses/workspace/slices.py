@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -117,58 +116,6 @@ class Stretches:
             np.concatenate([self.labels, other.labels], axis=1),
         )  # fmt: skip
 
-    def near(self, lanes: Ints) -> Iterator[tuple[Ints, NDArray[np.bool_]]]:
-        """One after the other the stretches of `lanes` (one a stretch, or -1), and whether there is such a one."""
-        order = np.argsort(self.lane, kind="stable")
-        sorted_lanes = self.lane[order]
-        begin, stop = np.searchsorted(sorted_lanes, lanes), np.searchsorted(sorted_lanes, lanes, side="right")
-        for k in range(int(np.max(stop - begin, initial=0))):
-            yield order[np.minimum(begin + k, len(order) - 1)], begin + k < stop
-
-    def meets(self, lanes: Lanes, side: int) -> NDArray[np.bool_]:
-        """Whether stretches overlap one of the lane beside theirs."""
-        found = np.zeros(len(self.lane), dtype=bool)
-        for at, some in self.near(lanes.beside[side, self.lane]):
-            found |= some & (self.ends[0, at] <= self.ends[1]) & (self.ends[1, at] >= self.ends[0])
-        return found
-
-    def broken(self, lanes: Lanes) -> Ints:
-        """Lanes of which a stretch meets nothing in the next lane, and the other way round."""
-        alone = [np.zeros(len(lanes.ray), dtype=bool) for _ in range(2)]
-        for side in range(2):
-            alone[side][self.lane[~self.meets(lanes, side)]] = True
-        after = lanes.beside[1]
-        return np.flatnonzero(alone[1] & (after >= 0) & alone[0][after])
-
-    def peaks(self, lanes: Lanes) -> tuple[NDArray[np.bool_], Floats]:
-        """Ends farther out than those of the stretches beside them, that overlap: both ends; and by how much at most.
-
-        Shapes (2, n).
-        """
-        n = len(self.lane)
-        peak, rise = np.ones((2, n), dtype=bool), np.zeros((2, n))
-        seen = np.zeros(n, dtype=bool)
-        for step in range(2):
-            for at, some in self.near(lanes.beside[step, self.lane]):
-                meets = some & (self.ends[0, at] <= self.ends[1]) & (self.ends[1, at] >= self.ends[0])
-                seen |= meets
-                for side, sign in ((0, -1), (1, 1)):
-                    ahead = sign * (self.ends[side] - self.ends[side, at])
-                    # Of equal ones the first.
-                    peak[side] &= ~meets | (ahead > 0) | ((ahead == 0) & (step == 1))
-                    rise[side] = np.where(meets, np.maximum(rise[side], ahead), rise[side])
-        rise = np.where(seen, rise, self.ends[1] - self.ends[0])
-        return peak & (self.labels >= 0), rise
-
-    def named_beside(self, lanes: Lanes, side: Ints, which: Ints, step: int) -> Ints:
-        """Labels of the ends nearest to those of stretches `which` in the lane beside theirs; -1 where none."""
-        label, nearest = np.full(len(which), -1), np.full(len(which), np.inf)
-        here = self.ends[side, which]
-        for at, some in self.near(lanes.beside[step, self.lane[which]]):
-            gap = np.where(some, np.abs(self.ends[side, at] - here), np.inf)
-            label, nearest = np.where(gap < nearest, self.labels[side, at], label), np.minimum(gap, nearest)
-        return label
-
 
 @dataclass(frozen=True, eq=False)
 class Misses:
@@ -226,7 +173,7 @@ class Misses:
         return lanes.ray[self.lane[use[some]]], (value + ahead)[some]
 
 
-def merged(ray: Ints, ends: Floats) -> tuple[Ints, Floats, Ints, Ints]:
+def merged(ray: Ints, ends: Floats) -> tuple[Ints, Floats, Ints]:
     """Stretches of rays with those that overlap made one.
 
     Returns
@@ -235,8 +182,6 @@ def merged(ray: Ints, ends: Floats) -> tuple[Ints, Floats, Ints, Ints]:
         Of what results; ends of shape (2, m).
     source : ndarray of int, shape (2, m)
         The stretches that reach farthest, whose ends these are.
-    part : ndarray of int, shape (n,)
-        Which of them each stretch is part of.
     """
     order = np.lexsort((ends[0], ray))
     owner, low, high = ray[order], ends[0, order], ends[1, order]
@@ -251,9 +196,7 @@ def merged(ray: Ints, ends: Floats) -> tuple[Ints, Floats, Ints, Ints]:
     last = np.zeros(len(begin), dtype=np.intp)
     at_top = np.flatnonzero(high == top[group])
     last[group[at_top]] = at_top
-    part = np.empty(len(ray), dtype=np.intp)
-    part[order] = group
-    return owner[begin], np.stack([low[begin], high[last]]), order[np.stack([begin, last])], part
+    return owner[begin], np.stack([low[begin], high[last]]), order[np.stack([begin, last])]
 
 
 def as_intervals(
