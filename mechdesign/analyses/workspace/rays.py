@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.roots import bracketed_roots
-from mechdesign.analyses.workspace.dips import hidden_places, sign_changes
+from mechdesign.analyses.workspace.dips import Brackets, hidden_places, sign_changes
 from mechdesign.analyses.workspace.field import Field, Places
 
 Floats = NDArray[np.float64]
@@ -196,16 +196,33 @@ def _others(
     lanes = np.flatnonzero(cut)
     brackets = sign_changes(radii[:, lanes], values[:, :, lanes], _within(dips, lanes))
     margin, lane = brackets.function, brackets.lane
+    # Where another margin is negative all over a bracket nothing ends there: its middle will do.
+    radius = 0.5 * (brackets.low[0] + brackets.high[0])
+    asked = np.flatnonzero(~_idle(brackets, radii[:, lanes], positive[:, :, lanes], _within(dips, lanes)))
 
     def evaluate(which: Ints, radius: Floats) -> Floats:
+        which = asked[which]
         return margin_at(margin[which], lanes[lane[which]], radius)
 
-    tolerance = ROUNDING * found.outer[lanes[lane]]
-    radius = bracketed_roots(evaluate, *brackets.low, *brackets.high, *brackets.third, tolerance)
+    low, high, third = ((x[asked], f[asked]) for x, f in (brackets.low, brackets.high, brackets.third))
+    radius[asked] = bracketed_roots(evaluate, *low, *high, *third, ROUNDING * found.outer[lanes[lane[asked]]])
     turn = np.where(brackets.high[1] > 0, 1, -1)
     start = (~positive[:, 0][:, lanes]).sum(axis=0)
     part = _intervals(rows[margin], lane, turn, radius, start, found.outer[lanes], 0.0)
     return _replace(found, lanes, part)
+
+
+def _idle(
+    brackets: Brackets, x: Floats, positive: NDArray[np.bool_], dips: tuple[Ints, Ints, Floats, Floats]
+) -> NDArray[np.bool_]:
+    """Brackets over which another margin is negative, at the samples beside them and without a hidden place between."""
+    negative = ~(positive[:, 1:] | positive[:, :-1])
+    function, lane, place, _ = dips
+    negative[function, (x[:, lane] < place).sum(axis=0) - 1, lane] = False
+    cell = (x[:, brackets.lane] <= brackets.low[0]).sum(axis=0) - 1
+    others = negative[:, cell, brackets.lane]
+    others[brackets.function, np.arange(len(cell))] = False
+    return np.asarray(others.any(axis=0))
 
 
 def _within(dips: tuple[Ints, Ints, Floats, Floats], lanes: Ints) -> tuple[Ints, Ints, Floats, Floats]:
