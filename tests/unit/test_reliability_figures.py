@@ -60,7 +60,7 @@ CORNER = "reliability.poses=[{q1: 30, q2: 90}]"
 
 
 def drawn(text: str, *overrides: str):
-    study = study_of(text, *overrides)
+    study = study_of(text, "reliability.sobol=0", *overrides)
     result = mechdesign.reliability(study)
     with style.context():
         found = figures(study, result)
@@ -139,6 +139,13 @@ def test_sweep_has_bands_with_limits_and_the_cycle() -> None:
     assert {"whole cycle, bounds by first order", "whole cycle, Monte Carlo"} <= set(legend(found["reliability"]))
 
 
+def test_a_far_limit_does_not_squeeze_the_bands() -> None:
+    found, _ = drawn(SLIDER, SWEPT, "reliability.methods=[analytic]", "reliability.limits.B.x={max: 9}")
+    (axes,) = found["bands"].axes
+    assert axes.get_ylim()[1] < 2
+    assert axes.get_title(loc="right") == "limit +9 mm, outside"
+
+
 def test_velocities_have_panels_and_limits_of_their_own() -> None:
     found, _ = drawn(SLIDER, SWEPT, "reliability.methods=[analytic, monte_carlo]", "reliability.rates={crank: 60}",
                      "reliability.limits={B.x_velocity: {max: 0.3}}")  # fmt: skip
@@ -196,7 +203,13 @@ def test_open_and_far_limits_of_a_density() -> None:
     (axes, _) = found["density_contours"].axes
     assert [line.get_xdata().tolist() for line in axes.lines[:1]] == [[0.2, 0.2]]
     assert max(abs(y) for y in axes.get_ylim()) < 1
-    assert "limits lie outside" in texts(found["density_contours"])
+    assert "dashed: limits, others lie outside" in texts(found["density_contours"])
+
+
+@pytest.mark.parametrize(("radius", "words"), [(0.3, "dashed: limits"), (9.0, "limits lie outside")])
+def test_circle_of_a_density_is_told(radius: float, words: str) -> None:
+    found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]", f"reliability.limits.P.radius={radius}")
+    assert texts(found["density_contours"]).endswith(f"; {words}")
 
 
 def test_density_of_velocities_has_their_limits() -> None:

@@ -86,8 +86,6 @@ def _contours(
     alike = labels[0].rpartition("[")[2] == labels[1].rpartition("[")[2] and 0.4 < np.ptp(x) / np.ptp(y) < 2.5
     bands = _bands(limits)
     view = (_view(x, bands[0]), _view(y, bands[1]))
-    hidden = any(np.isfinite(end) and not low < end < high for band, (low, high) in zip(bands, view, strict=True)
-                 for end in band)  # fmt: skip
     for axes, density, name in zip(figure.subplots(1, 2, sharex=True, sharey=True), densities, titles, strict=True):
         levels = [level * peak for level in _LEVELS]
         axes.contourf(x, y, density, levels=[*levels, peak * 1.5], cmap=style.COLORMAP, alpha=0.35)
@@ -99,7 +97,7 @@ def _contours(
             axes.set_aspect("equal")
     figure.axes[0].set_ylabel(labels[1])
     levels_text = ", ".join(f"{level:g}" for level in _LEVELS)
-    drawn = "" if limits is None else "; limits lie outside" if hidden else "; dashed: limits"
+    drawn = "" if limits is None else f"; {_limits_in_words(limits, view)}"
     note = f"lines at {levels_text} of the normal density's peak{drawn}"
     title(figure, f"Density of two errors at {pose}", note, left=_LEFT)
     return figure
@@ -118,6 +116,20 @@ def _view(values: Floats, band: tuple[float, float]) -> tuple[float, float]:
     near = [end for end in band if low - _FAR * span < end < high + _FAR * span]
     ends = [low, high, *near]
     return min(ends) - 0.05 * span, max(ends) + 0.05 * span
+
+
+def _limits_in_words(limits: Limits, view: Bands) -> str:
+    """Whether limits are seen: all of them, some, or none."""
+    if isinstance(limits, float):
+        corners = np.abs(np.add.outer(np.array(view[0]), 1j * np.array(view[1])))
+        across, up = (max(low, -high, 0.0) for low, high in view)
+        seen = [bool(np.hypot(across, up) < limits < corners.max())]
+    else:
+        seen = [low < end < high for band, (low, high) in zip(_bands(limits), view, strict=True)
+                for end in band if np.isfinite(end)]  # fmt: skip
+    return (
+        "dashed: limits" if all(seen) else "dashed: limits, others lie outside" if any(seen) else "limits lie outside"
+    )
 
 
 def _draw_limits(axes: Axes, limits: Limits, view: Bands) -> None:

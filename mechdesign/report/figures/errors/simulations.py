@@ -23,8 +23,8 @@ from mechdesign.report.figures.errors.panels import (
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-# A limit farther out than this, in reaches of the histogram, is told and not drawn.
-_FAR = 1.8
+# A limit farther out than this, in widths of the histogram, is told and not drawn.
+_FAR = 0.6
 # Above that many samples their axis is logarithmic.
 _MANY = 400_000
 _DASHED = (0, (5, 2))
@@ -72,17 +72,18 @@ def _histogram(axis: Axes, table: Table, rows: np.ndarray, entries: dict[str, An
 
 def _limits(study: Study, axis: Axes, output: str, order: str, unit: str, entries: dict[str, Any]) -> None:
     limits = [limit for limit in error_limits(study, output, order) or () if np.isfinite(limit)]
-    left, right = axis.get_xlim()
-    reach = max(abs(left), abs(right))
-    for limit in limits:
-        if abs(limit) <= _FAR * reach:
-            entries["limit of the error"] = axis.axvline(limit, color=style.VERMILION, linestyle=_DASHED)
-            left, right = min(left, limit - 0.05 * reach), max(right, limit + 0.05 * reach)
-    far = [f"{limit:+g}" for limit in limits if abs(limit) > _FAR * reach]
+    low, high = axis.get_xlim()
+    span = high - low
+    near = [limit for limit in limits if low - _FAR * span < limit < high + _FAR * span]
+    for limit in near:
+        entries["limit of the error"] = axis.axvline(limit, color=style.VERMILION, linestyle=_DASHED)
+    ends = [low, high, *(limit + side for limit in near for side in (-0.03 * span, 0.03 * span))]
+    axis.set_xlim(min(ends), max(ends))
+    far = [f"{limit:+g}" for limit in limits if limit not in near]
     if far:
-        axis.text(0.99, 0.97, f"limit {', '.join(far)} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
+        axis.set_ylim(0.0, 1.15 * axis.get_ylim()[1])
+        axis.text(0.99, 0.98, f"limit {', '.join(far)} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
                   fontsize=8, color=style.VERMILION)  # fmt: skip
-    axis.set_xlim(left, right)
 
 
 def convergence_figure(table: Table, moments: Table, pose: int, where: str, method: str) -> Figure:

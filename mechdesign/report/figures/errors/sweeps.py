@@ -27,6 +27,8 @@ from mechdesign.results import Table
 from mechdesign.study import Study
 
 MOST_OUTPUTS = 7
+# A limit so many times as far out as all errors is told and not drawn.
+_FAR = 3.0
 
 
 def sweep_figures(study: Study, moments: Table, swept: Along) -> dict[str, Figure]:
@@ -66,11 +68,15 @@ def _bands(study: Study, moments: Table, swept: Along) -> Figure:
                 (line,) = axis.plot(swept.values, value, linestyle=drawn, color=look.color, linewidth=1.2,
                                     marker=look.marker if look.simulated else "", markersize=2.8)  # fmt: skip
             entries[look.words] = line
-        limits = error_limits(study, output, order)
-        for limit in limits or ():
-            if np.isfinite(limit):
+        limits = [limit for limit in error_limits(study, output, order) or () if np.isfinite(limit)]
+        far = [limit for limit in limits if abs(limit) > _FAR * np.abs(axis.get_ylim()).max()]
+        for limit in limits:
+            if limit not in far:
                 line = axis.axhline(limit, color=style.VERMILION, linestyle=(0, (5, 2)), linewidth=1.4)
                 entries["limit of the error"] = line
+        if far:
+            told = f"limit {', '.join(f'{limit:+g}' for limit in far)} {unit}, outside"
+            axis.set_title(told, loc="right", fontsize=8, color=style.VERMILION)
         axis.set_ylabel(style.axis_label("error", unit))
         axis.set_title(output if order == "position" else f"{output} {order}", loc="left", fontsize=9.5)
     legend_below(figure, list(entries.values()), list(entries))
