@@ -1,9 +1,9 @@
 """Zero curves of a function on a grid: where its lines are crossed or touched is found, then put in order.
 
 A line may also be crossed twice between two nodes, and a small loop crosses none: both are looked for where the
-magnitude of the function has a dip. Cells with a side crossed twice are divided, and those about a node where a curve
-turns back; a small loop is found by rays about its dip. Two long curves so near to each other that too many cells would
-have to be divided are told as one between them.
+magnitude of the function has a dip. Cells with a side crossed twice are divided, as those in which curves may cross and
+those about a node where a curve turns back; a small loop is found by rays about its dip. Two long curves so near to
+each other that too many cells would have to be divided are told as one between them.
 """
 
 from __future__ import annotations
@@ -125,7 +125,8 @@ def _level(grids: _Grids, last: bool) -> tuple[Floats, Ints, tuple[Ints, ...], l
     # Sides of each cell, shape (kinds, grids, rows, columns, 4); of the outermost cells nothing is asked.
     _, _, m, n = sides[0].shape
     cells = np.stack([sides[d][:, :, 1 + r : m - 2 + r, 1 + c : n - 2 + c] for r, c, d in SIDES], axis=-1)
-    doubtful = np.asarray((cells[twice] >= 0).any(axis=-1) | _turning(sides[DOWN][crossed], sides[RIGHT][crossed]))
+    doubtful = np.asarray((cells[twice] >= 0).any(axis=-1) | (cells[crossed] >= 0).all(axis=-1))
+    doubtful |= _turning(sides[DOWN][crossed], sides[RIGHT][crossed])
     many = np.count_nonzero(doubtful) > MOST
     if many:
         cells[touched] = np.maximum(cells[touched], cells[twice])
