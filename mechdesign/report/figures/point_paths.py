@@ -57,9 +57,9 @@ def _path(study: Study, path: Table) -> Figure:
     drawn = None
     for rows in _pieces(path):
         ends = np.column_stack([path["x"][rows], path["y"][rows]])
-        axes.plot(*ends.T, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=1.4)
+        axes.plot(*ends.T, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=3.25)
         drawn = LineCollection(list(np.stack([ends[:-1], ends[1:]], axis=1)), array=ratio[rows][:-1], norm=norm,
-                               cmap=style.COLORMAP, linewidths=4, capstyle="round", zorder=1.5)  # fmt: skip
+                               cmap=style.COLORMAP, linewidths=4, capstyle="round", zorder=3.26)  # fmt: skip
         axes.add_collection(drawn)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=z)
     assert drawn is not None
