@@ -1,4 +1,4 @@
-"""Samples a second of plain Monte Carlo, beside hand-tuned C where a compiler and its source are at hand."""
+"""Samples a second of plain Monte Carlo, beside hand-tuned C where there is a compiler; what rare failures cost."""
 
 from __future__ import annotations
 
@@ -48,6 +48,67 @@ def test_arm(benchmark: Any) -> None:
     study = arm(ARM_SAMPLES)
     benchmark.pedantic(lambda: mechdesign.reliability(study, jobs=2), rounds=5, warmup_rounds=1)
     benchmark.extra_info.update(samples_per_second=ARM_SAMPLES / benchmark.stats["min"])
+
+
+def limited(limit: float, precision: float) -> Any:
+    changes = [
+        f"reliability.limits={{P.x: {limit}, P.y: {limit}}}",
+        "reliability.poses=[{theta1: 30, theta2: 60}]",
+        "reliability.methods=[auto]",
+        f"reliability.precision={precision}",
+        "reliability.samples=2000000",
+    ]
+    return mechdesign.load(CONFIGS / "two_link_arm.yaml", overrides=changes)
+
+
+def spent(result: Any) -> dict[str, float]:
+    """Evaluations, and the coefficient of variation: half of an interval at 99.7 % is 2.97 of them."""
+    table = result.tables["reliability"]
+    width = table["failure_high"][0] - table["failure_low"][0]
+    return {
+        "evaluations": int(table["evaluations"][0]),
+        "coefficient_of_variation": float(width / (2 * 2.97 * table["failure"][0])),
+    }
+
+
+# Exact failure probabilities of the arm; what plain Monte Carlo needs follows from them.
+@pytest.mark.parametrize(("limit", "exact", "precision"), [
+    (0.10, 1.6566e-9, 0.148), (0.10, 1.6566e-9, 0.05), (0.05, 6.5387526e-3, 0.01),
+])  # fmt: skip
+def test_auto(benchmark: Any, limit: float, exact: float, precision: float) -> None:
+    study = limited(limit, precision)
+    benchmark.pedantic(lambda: mechdesign.reliability(study), rounds=5, warmup_rounds=1)
+    plain = (2.97 / precision) ** 2 * (1 - exact) / exact
+    found = [spent(mechdesign.reliability(study, seed=seed)) for seed in range(20)]
+    most = max(each["evaluations"] for each in found)
+    benchmark.extra_info.update(
+        evaluations=sum(each["evaluations"] for each in found) / len(found),
+        most_evaluations=most,
+        largest_coefficient_of_variation=max(each["coefficient_of_variation"] for each in found),
+        of_plain_samples=most / plain,
+    )
+
+
+def test_one_in_a_billion_after_start(benchmark: Any) -> None:
+    """The first answer of a process, once the package and the study are there: with what is imported on the way."""
+    study = (
+        f"mechdesign.load({str(CONFIGS / 'two_link_arm.yaml')!r}, overrides=["
+        "'reliability.limits={P.x: 0.1, P.y: 0.1}', 'reliability.poses=[{theta1: 30, theta2: 60}]', "
+        "'reliability.methods=[auto]', 'reliability.precision=0.148'])"
+    )
+    code = (
+        f"import time, mechdesign; study = {study}; begin = time.perf_counter(), time.process_time(); "
+        "mechdesign.reliability(study); print(time.perf_counter() - begin[0], time.process_time() - begin[1])"
+    )
+    seconds = []
+
+    def ask() -> None:
+        said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        seconds.append([float(part) for part in said.split()])
+
+    benchmark.pedantic(ask, rounds=5)
+    elapsed, processor = (min(column) for column in zip(*seconds, strict=True))
+    benchmark.extra_info.update(seconds_after_start=elapsed, processor_seconds_after_start=processor)
 
 
 def test_whole_cycle_of_three_orders(benchmark: Any) -> None:

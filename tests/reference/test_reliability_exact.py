@@ -83,8 +83,11 @@ def test_one_in_a_billion_for_less_than_25000_evaluations() -> None:
 
 
 def test_auto_to_one_per_cent_for_less_than_a_tenth_of_plain_samples() -> None:
-    table = arm(0.05, "auto", "reliability.precision=0.01").tables["reliability"]
+    result = arm(0.05, "auto", "reliability.precision=0.01", "reliability.samples=2000000")
+    table = result.tables["reliability"]
     assert covers(table, ARM[0.05]).all()
+    assert table["failure_high"][0] - table["failure_low"][0] <= 0.02 * table["failure"][0]
+    assert result.warnings == []
     assert table["used"].tolist() == ["importance_sampling"]
     assert table["evaluations"][0] < 0.1 * 2.97**2 / 0.01**2 * (1 - ARM[0.05]) / ARM[0.05]
 
