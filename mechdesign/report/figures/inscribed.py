@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
+from matplotlib.patheffects import withStroke
 
 from mechdesign.report.figures import style
 from mechdesign.report.figures.regions import Region, fill, keys, loci, outline, sheet
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 CIRCLE = ("circle_x", "circle_y", "circle_radius")
 RECTANGLE = ("rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height")
 MOST = 6
+_HALO = [withStroke(linewidth=2.2, foreground="white")]
 
 
 def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> Figure | None:
@@ -44,7 +46,7 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
                 axes.add_patch(Circle((x, y), radius, edgecolor=style.BLUE, facecolor="none", linewidth=1.6, zorder=4))
                 axes.plot(x, y, "+", color=style.BLUE, zorder=4)
                 axes.annotate(f"r = {radius:.4g} {unit}".strip(), (x, y), (4, 4), textcoords="offset points",
-                              color=style.BLUE, fontsize=size, zorder=5)  # fmt: skip
+                              color=style.BLUE, fontsize=size, zorder=5, path_effects=_HALO)  # fmt: skip
         if RECTANGLE[0] in table:
             x, y, width, height = (float(table[name][region.row]) for name in RECTANGLE)
             if np.isfinite(width):
@@ -52,6 +54,6 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
                 axes.add_patch(Rectangle(corner, width, height, edgecolor=style.GREEN, facecolor="none", linewidth=1.6,
                                          zorder=4))  # fmt: skip
                 axes.annotate(f"{width:.4g} x {height:.4g} {unit}".strip(), corner, (4, 4), textcoords="offset points",
-                              color=style.GREEN, fontsize=size, zorder=5)  # fmt: skip
+                              color=style.GREEN, fontsize=size, zorder=5, path_effects=_HALO)  # fmt: skip
     page.legend(keys(fates, kinds))
     return page.figure
