@@ -108,18 +108,18 @@ def hold(wrenches: Sequence[Array], compliances: Sequence[Array], length: float,
 
 
 def _inverse(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Inverse (size, size, n) of the square wrench matrix and where it is regular."""
+    """Inverse (size, size, n) of the square wrench matrix where it is regular, and where that is."""
     norms = np.sqrt((matrix**2).sum(axis=0)).prod(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        if len(matrix) == 2:
-            (a, b), (c, d) = matrix
-            determinant = a * d - b * c
-            adjugate = np.stack([np.stack([d, -b]), np.stack([-c, a])])
-        else:
-            x, y, z = matrix[:, 0], matrix[:, 1], matrix[:, 2]
-            adjugate = np.stack([screw_product(y, z), screw_product(z, x), screw_product(x, y)])
-            determinant = (x * adjugate[0]).sum(axis=0)
-        return adjugate / determinant, np.abs(determinant) > REGULAR * norms
+    if len(matrix) == 2:
+        (a, b), (c, d) = matrix
+        determinant = a * d - b * c
+        adjugate = np.stack([np.stack([d, -b]), np.stack([-c, a])])
+    else:
+        x, y, z = matrix[:, 0], matrix[:, 1], matrix[:, 2]
+        adjugate = np.stack([screw_product(y, z), screw_product(z, x), screw_product(x, y)])
+        determinant = (x * adjugate[0]).sum(axis=0)
+    regular = np.abs(determinant) > REGULAR * norms
+    return adjugate / np.where(regular, determinant, 1.0), regular
 
 
 def _exact(inverse: Array, compliances: Sequence[Array]) -> Array:
