@@ -128,7 +128,7 @@ def allocate(study: Study, poses: Poses, task: Task) -> Allocated:
         failed = ""
     elif not failed:
         failed = _missed(study, poses, model, last, reliability, method)
-    heading = f"Tolerances of {study.name}, the cheapest for a reliability of {reliability:g}"
+    heading = f"Tolerances of {study.name}, the cheapest for a reliability of {reliability:.15g}"
     text, beside = rewritten(study, retold(study, found, last.scales), heading)
     tables = (_allocation(model, last), _confirmation(study, poses, model, last, reliability, method))
     return Allocated(
@@ -227,7 +227,7 @@ def _notes(
     estimate = last.simulated[worst]
     notes = [
         f"allocated: the tolerances cost {after:.6g} in place of {before:.6g}; asked is a reliability of "
-        f"{reliability:g}, and at {pose_in_words(study, poses, model.settings[worst].pose)}, the worst pose, it is "
+        f"{reliability:.15g}, and at {pose_in_words(study, poses, model.settings[worst].pose)}, the worst pose, it is "
         f"{_plain(last.analytic[worst])} by the analytic model and {_plain(estimate.failure)} ("
         f"{_plain(estimate.high)} to {_plain(estimate.low)}) by {method}"
     ]
@@ -272,7 +272,7 @@ def _missed(study: Study, poses: Poses, model: Model, last: _Round, reliability:
     worst = int(np.argmax([estimate.failure for estimate in last.simulated]))
     estimate = last.simulated[worst]
     return (
-        f"allocate: the reliability asked, {reliability:g}, is not confirmed at "
+        f"allocate: the reliability asked, {reliability:.15g}, is not confirmed at "
         f"{pose_in_words(study, poses, model.settings[worst].pose)}: with tolerances for which the analytic model says "
         f"{_plain(last.analytic[worst])}, {method} finds {_plain(estimate.failure)} ({_plain(estimate.high)} to "
         f"{_plain(estimate.low)})"

@@ -114,21 +114,20 @@ class Elasticity:
         flexibility[:, :, np.setdiff1d(np.arange(configuration.shape[0]), assembled)] = np.nan
         if len(assembled):
             part = configuration.take(assembled)
-            rates = self._rates(part)
+            rates, held = self._rates(part)
             for k in known:
-                moved = first(part, channels[k].coordinate, rates)
-                flexibility[k, : self.asked.size, assembled] = np.broadcast_to(
-                    moved, (self.asked.size, len(assembled))
-                ).T
+                moved = np.broadcast_to(first(part, channels[k].coordinate, rates), (self.asked.size, len(assembled)))
+                flexibility[k, : self.asked.size, assembled] = np.where(held, moved, np.nan).T
         return Elastic(flexibility, self.load)
 
-    def _rates(self, configuration: Configuration) -> Rates:
-        """What moves by unit loads, which are the leading axis."""
+    def _rates(self, configuration: Configuration) -> tuple[Rates, NDArray[np.bool_]]:
+        """What moves by unit loads, which are the leading axis, and which poses hold them."""
         from mechdesign.analyses.stiffness.force_method import load, twists_of
 
         asked = self.asked
         twists = twists_of(asked.network, asked.section, configuration, asked.length)
-        moved = load(twists, asked.size).displacements
+        loaded = load(twists, asked.size)
+        moved, held = loaded.displacements, np.asarray(np.isfinite(loaded.held.compliance).all(axis=(1, 2)))
         origin = configuration.point(asked.section.at)
         graph = self.mechanism.graph
         nodes: list[Value] = [0.0] * len(graph.nodes)
@@ -137,7 +136,7 @@ class Elasticity:
                 dx, dy, turn = np.moveaxis(moved[vertex], 0, -1)
                 nodes[node] = dx + 1j * dy + 1j * turn * (configuration.nodes[node] - origin)
         turned = {body: moved[vertex][:, 2].T for body, vertex in self.bodies.items() if vertex}
-        return Rates(nodes, [0.0] * graph.classes, [0.0] * len(graph.slides), turned)
+        return Rates(nodes, [0.0] * graph.classes, [0.0] * len(graph.slides), turned), held
 
 
 def elasticity(study: Study) -> tuple[Elasticity | None, list[str]]:
@@ -157,7 +156,7 @@ def elasticity(study: Study) -> tuple[Elasticity | None, list[str]]:
     if len(loads) > 1:
         notes.append(
             f"the stiffness section has {len(loads)} loads, and errors are those of the unloaded mechanism; name one, "
-            "for example reliability.load: [0, -20, 0]"
+            f"for example reliability.load: [{', '.join(f'{part:g}' for part in loads[0])}]"
         )
     load = np.array(loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))
     if not load.any() and not set(LOADS).intersection(section.dimensions):

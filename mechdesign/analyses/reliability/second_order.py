@@ -103,7 +103,6 @@ def step_sizes(sources: Sources, sigma: Floats) -> Floats:
     length = mechanism.size or 1.0
     scale = []
     for scalar, source, deviation in zip(sources.scalars, sources.first_order, sigma, strict=False):
-        # Deflections are linear in the loads, whatever the step.
         reach = [deviation or 1.0] if scalar.kind == "load" else []
         for name, slope in source.directions[0].items() if scalar.kind != "load" else ():
             drive = scalar.kind == "drive"
@@ -112,7 +111,11 @@ def step_sizes(sources: Sources, sigma: Floats) -> Floats:
                 reach.append((1.0 if quantity == "angle" else length) / abs(slope))
         scale.append(min(reach, default=1.0))
     scale += [length] * (2 * len(sources.pins))
-    return np.clip(_PART * sigma, _SHORTEST * np.array(scale), _LONGEST * np.array(scale))
+    steps = np.clip(_PART * sigma, _SHORTEST * np.array(scale), _LONGEST * np.array(scale))
+    # Deflections are linear in the loads, and the longest step leaves the least rounding.
+    loads = [k for k, scalar in enumerate(sources.scalars) if scalar.kind == "load"]
+    steps[loads] = np.array(scale)[loads]
+    return steps
 
 
 def _drawn(sources: Sources, z: Floats) -> Drawn:
