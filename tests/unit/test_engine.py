@@ -91,6 +91,13 @@ def test_form_of_a_series_system_is_the_union_of_its_tangents() -> None:
     assert tangents(CASES["four_branches_in_one"].problem) == pytest.approx(tangent, rel=0.01)
 
 
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("name", ["ends_near", "ends_far"])
+def test_form_knows_where_margins_end(name: str, seed: int) -> None:
+    """Without a slope: the tangent is that of a point found by a walk, a little too near or too far."""
+    assert tangents(CASES[name].problem, seed) == pytest.approx(CASES[name].exact, rel=0.35)
+
+
 @pytest.mark.parametrize("seed", range(40))
 @pytest.mark.parametrize(("name", "distances"), [
     ("four_branches_in_one", [3.0, 3.0, 3.5, 3.5]), ("parabola", PARABOLA), ("band_30", [5.0, 5.0]),

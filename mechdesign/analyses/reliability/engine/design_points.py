@@ -20,6 +20,8 @@ SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
 SAMPLES, STARTS = 160, 8
 EXPLORED = len(SPREADS) * SAMPLES
 HALVINGS, ITERATIONS = 10, 30
+# Rounds in which ends of the margins come nearer, by so many points at least about each, of this spread.
+WALKS, AROUND, NEAR = 3, 60, 0.5
 # Fractions of a step that are tried where the whole of it does not improve.
 FRACTIONS = np.array([0.5, 0.25, 0.0625])
 # A point is a design point where a step is shorter than this, or nothing improves, and the margin this small.
@@ -68,11 +70,11 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     scale = np.abs(problem.margins(np.zeros((d, 1))))[:, 0]
     scale = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
     found = _descend(problem, np.concatenate([limits, limit[limit >= 0]]), starts, scale)
-    # Where margins end there is no slope: the end's normal is taken to be the ray's.
+    ends = _nearer(problem, ends, rng)
     length = np.linalg.norm(ends, axis=0)
     points = _distinct(
         np.concatenate([found[0], ends], axis=1),
-        np.concatenate([found[1], np.full(len(length), -1, dtype=np.intp)]),
+        np.concatenate([found[1], np.full(ends.shape[1], -1)]),
         np.concatenate([found[2], ends / np.where(length > 0, length, 1.0)], axis=1),
     )
     return replace(points, seen=u[:, failed(margins)])
@@ -87,7 +89,11 @@ def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]
     broken = [(margin < 0) & ~nowhere for margin in margins]
     chosen = [_apart(u[:, beyond]) for beyond in (*broken, nowhere)]
     limit = np.repeat([*range(len(margins)), -1], [part.shape[1] for part in chosen])
-    far = np.concatenate(chosen, axis=1)
+    return limit, _edges(problem, limit, np.concatenate(chosen, axis=1))
+
+
+def _edges(problem: Problem, limit: Ints, far: Floats) -> Floats:
+    """Where limits (-1: where margins end) are on the rays to points beyond them, shape (dimension, points)."""
     low, high = np.zeros(len(limit)), np.ones(len(limit))
     for _ in range(HALVINGS if len(limit) else 0):
         middle = 0.5 * (low + high)
@@ -95,7 +101,29 @@ def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]
         ended = np.isnan(found).any(axis=0)
         out = np.where(limit < 0, ended, ended | (found[limit, np.arange(len(limit))] < 0))
         high, low = np.where(out, middle, high), np.where(out, low, middle)
-    return limit, np.asarray(high * far)
+    return np.asarray(high * far)
+
+
+def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
+    """Ends of the margins nearer to the mean, shape (dimension, ends).
+
+    Where margins end there is no slope: the direction that tells apart the points about an end that have margins and
+    that have none stands for it.
+    """
+    d, count = ends.shape
+    about = max(AROUND, 4 * d)
+    for _ in range(WALKS if count else 0):
+        shift = rng.standard_normal((d, count, about))
+        found = problem.margins((ends[:, :, None] + NEAR * shift).reshape(d, -1))
+        gone = np.isnan(found).any(axis=0).reshape(count, about)
+        steep = np.einsum("dca,ca->dc", shift, gone - gone.mean(axis=1, keepdims=True))
+        size = (steep * steep).sum(axis=0)
+        # A little farther than where the tangent plane is nearest.
+        far = 1.25 * steep * (steep * ends).sum(axis=0) / np.where(size > 0, size, 1.0)
+        beyond = np.isnan(problem.margins(far)).any(axis=0)
+        near = _edges(problem, np.full(count, -1), far)
+        ends = np.where(beyond & ((near * near).sum(axis=0) < (ends * ends).sum(axis=0)), near, ends)
+    return ends
 
 
 def _apart(u: Floats) -> Floats:
