@@ -114,7 +114,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         counts["cycles"] = cycles[0]
     failures = [
         *disagreements(study, poses, found), *unseen(study, poses, found), *unreached(study, poses, found, task),
-        *unassembled(found), *notes(found, task), *failures,
+        *unassembled(found), *notes(found, task), *sobol.doubts(study, poses, task, indices), *failures,
     ]  # fmt: skip
     if interrupted:
         interrupted += f"{counts.get('samples', 0)} samples, "

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.first_order import FirstOrder
 from mechdesign.analyses.reliability.methods import Task
 from mechdesign.analyses.reliability.pins import PIN_LAWS
@@ -25,6 +26,8 @@ from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Drawn, Sources
 from mechdesign.parallel import map_chunks
 from mechdesign.results import Column
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
 from mechdesign.study.reliability_models import SAMPLING, ReliabilitySection
 
 Floats = NDArray[np.float64]
@@ -202,6 +205,24 @@ def uncorrelated(sources: Sources) -> set[str]:
         return set(sources.owners)
     lonely = np.count_nonzero(sources.correlation.coefficients, axis=0) == 1
     return {s.name for s, own in zip(sources.scalars, lonely, strict=True) if own} | {p.name for p in sources.pins}
+
+
+def doubts(study: Study, poses: Poses, task: Task, found: Mapping[int, Indices]) -> list[str]:
+    """Which sources have no indices, and where made mechanisms are left out of them."""
+    if not found:
+        return []
+    notes = []
+    bound = [s.name for s in task.sources.scalars if s.name not in uncorrelated(task.sources)]
+    if bound:
+        notes.append(f"Sobol' indices are of what varies by itself: {', '.join(bound)} are correlated and have none")
+    lost = {pose: indices for pose, indices in found.items() if indices.invalid}
+    if lost:
+        pose, indices = max(lost.items(), key=lambda item: item[1].invalid)
+        notes.append(
+            f"Sobol' indices: {indices.invalid} of {indices.samples} points are left out at "
+            f"{pose_in_words(study, poses, pose)}, since a mechanism there cannot be assembled"
+        )
+    return notes
 
 
 def _beside(setting: Setting, sources: Sources, linear: FirstOrder) -> Callable[[Floats], Floats]:
