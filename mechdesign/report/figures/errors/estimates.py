@@ -30,7 +30,7 @@ from mechdesign.study.poses import Poses
 MOST_LISTED = 12
 # Values that are written beside their marks.
 MOST_WRITTEN = 8
-_ABOVE, _TALL = 0.7, 2.7  # inches
+_LEFT, _ABOVE, _TALL = 0.95, 0.7, 2.7  # inches
 # Values farther apart than this are drawn on a logarithmic scale.
 _WIDE = 8.0
 # Handles by their words; error bars are no artists.
@@ -40,62 +40,74 @@ Legend = dict[str, Any]
 def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | None) -> Figure:
     """Failure by every method, over what a sweep runs over or beside the words for each listed pose."""
     known = methods(table)
-    figure = framed(4.5, left=0.95, right=0.15, top=_ABOVE, bottom=1.0)
+    figure = framed(4.5, left=_LEFT, right=0.15, top=_ABOVE, bottom=1.0)
     axes = figure.subplots()
-    floor, unseen = _scale(axes, table), _unseen(table)
+    axes.set_ylabel("failure probability")
+    floor = _scale(axes, table)
     entries: Legend = {}
-    many = poses.count > MOST_LISTED
-    written = swept is None and poses.count * len(known) <= MOST_WRITTEN
-    place = np.arange(poses.count, dtype=float) if swept is None else swept.values
-    # Beside each other at a listed pose; over a sweep only dots are moved, a little, lines stay where they are.
-    beside = known if swept is None else [method for method in known if LOOKS[method].simulated]
-    apart = (
-        min(0.3 if written else 0.14, 0.8 / len(known)) if swept is None else 0.2 * float(np.ptp(place)) / len(place)
-    )
-    for method in known:
-        rows = np.flatnonzero(select(table, method=method, scope="pose"))
-        if swept is None:
-            rows = rows[:MOST_LISTED]
-        shift = (beside.index(method) - (len(beside) - 1) / 2) * apart if method in beside else 0.0
-        at = place[: len(rows)] + shift
-        look = LOOKS[method]
-        if look.simulated:
-            _dots(axes, table, rows, at, look, floor, entries)
-        else:
-            drawn = look.dashes if swept is not None else "None"
-            marker = look.marker if swept is None else ""
-            value = table["failure"][rows]
-            if floor:
-                value = np.where(value > 0, value, np.nan)
-            (line,) = axes.plot(at, value, linestyle=drawn, marker=marker, color=look.color)
-            entries[look.words] = line
-        for x, row in zip(at, rows, strict=True) if written else ():
-            height = float(table["failure_high" if unseen[row] else "failure"][row])
-            axes.annotate(f"< {number(height)}" if unseen[row] else number(height), (x, height), xytext=(8, 0),
-                          textcoords="offset points", va="center", fontsize=8)  # fmt: skip
+    if swept is None:
+        _listed(study, axes, table, poses, floor, entries)
+    else:
+        _swept(axes, table, swept, floor, entries)
     for method in known:
         _cycle(axes, table, method, entries)
-    axes.set_ylabel("failure probability")
     heading = "Probability that an error leaves its limits"
-    if swept is None:
-        count = min(poses.count, MOST_LISTED)
-        words = [pose_in_words(study, poses, row).replace(", ", "\n") for row in range(count)]
-        axes.set_xticks(place[:count], words, fontsize=8 if count <= 8 else 6.5)
-        axes.set_xlim(-0.6, count - 0.4)
-        heading += f" (first {count} of {poses.count} poses)" if many else ""
-    else:
-        axes.set_xlabel(swept.label)
-        tick_abscissa(axes, swept)
-        axes.margins(x=0.02)
+    if swept is None and poses.count > MOST_LISTED:
+        heading += f" (first {MOST_LISTED} of {poses.count} poses)"
     lines = 1 if swept is not None else min(len(poses.names), 4)
     bottom = 0.45 + 0.15 * lines + 0.2 * -(-len(entries) // fitting(list(entries)))
     height = _ABOVE + _TALL + bottom
     figure.set_figheight(height)
     figure.subplots_adjust(bottom=bottom / height, top=1 - _ABOVE / height)
-    title(figure, heading, "whiskers: 99.7 % intervals; open arrows: no failure was seen, upper end of the interval"
-          if unseen.any() else "whiskers: 99.7 % intervals", left=0.95)  # fmt: skip
+    notes = ["whiskers: 99.7 % intervals"] * any(LOOKS[method].simulated for method in known)
+    notes += ["open arrows: no failure was seen, upper end of the interval"] * bool(_unseen(table).any())
+    title(figure, heading, "; ".join(notes), left=_LEFT)
     legend_below(figure, list(entries.values()), list(entries))
     return figure
+
+
+def _listed(study: Study, axes: Axes, table: Table, poses: Poses, floor: float, entries: Legend) -> None:
+    """Methods beside each other at each pose, with their values where there is room to write them."""
+    known, unseen = methods(table), _unseen(table)
+    count = min(poses.count, MOST_LISTED)
+    written = count * len(known) <= MOST_WRITTEN
+    apart = min(0.3 if written else 0.14, 0.8 / len(known))
+    for k, method in enumerate(known):
+        rows = np.flatnonzero(select(table, method=method, scope="pose"))[:count]
+        at = np.arange(count, dtype=np.float64) + (k - (len(known) - 1) / 2) * apart
+        look = LOOKS[method]
+        if look.simulated:
+            _dots(axes, table, rows, at, look, floor, entries)
+        else:
+            # What is 0 stands on the floor of a logarithmic axis.
+            value = np.maximum(table["failure"][rows], floor)
+            (entries[look.words],) = axes.plot(at, value, look.marker, color=look.color, clip_on=False)
+        for x, row in zip(at, rows, strict=True) if written else ():
+            height = float(table["failure_high" if unseen[row] else "failure"][row])
+            axes.annotate(f"< {number(height)}" if unseen[row] else number(height), (x, max(height, floor)),
+                          xytext=(8, 0), textcoords="offset points", va="center", fontsize=8)  # fmt: skip
+    words = [pose_in_words(study, poses, row).replace(", ", "\n") for row in range(count)]
+    axes.set_xticks(np.arange(count), words, fontsize=8 if count <= 8 else 6.5)
+    axes.set_xlim(-0.6, count - 0.4)
+
+
+def _swept(axes: Axes, table: Table, swept: Along, floor: float, entries: Legend) -> None:
+    """Lines of what is computed, and dots of what is simulated, moved a little from one another."""
+    known = methods(table)
+    simulated = [method for method in known if LOOKS[method].simulated]
+    apart = 0.2 * float(np.ptp(swept.values)) / len(swept.values)
+    for method in known:
+        rows, look = np.flatnonzero(select(table, method=method, scope="pose")), LOOKS[method]
+        if look.simulated:
+            shift = (simulated.index(method) - (len(simulated) - 1) / 2) * apart
+            _dots(axes, table, rows, swept.values + shift, look, floor, entries)
+        else:
+            value = table["failure"][rows]
+            shown = np.where(value > 0, value, np.nan) if floor else value
+            (entries[look.words],) = axes.plot(swept.values, shown, look.dashes, color=look.color)
+    axes.set_xlabel(swept.label)
+    tick_abscissa(axes, swept)
+    axes.margins(x=0.02)
 
 
 def _scale(axes: Axes, table: Table) -> float:
