@@ -281,3 +281,10 @@ reliability:
     expected = told["reliability"][told["scope"] == "pose"]
     assert chance == pytest.approx(expected, abs=1e-8)
     assert expected.min() < 0.99
+
+
+def test_sobol_indices_know_the_load() -> None:
+    result = ask(ARM + LOADED, "reliability.sobol=500", "reliability.methods=analytic")
+    table = result.tables["contributions"]
+    assert table["sobol_first"] == pytest.approx(table["share"], abs=1e-6)
+    assert table["sobol_total"] == pytest.approx(table["share"], abs=1e-6)
