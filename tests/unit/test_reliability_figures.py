@@ -12,8 +12,8 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.errors.allocation import allocation_figure
 from mechdesign.report.figures.errors.contributions import contributions_figure
 from mechdesign.report.figures.errors.looks import LOOKS
-from mechdesign.report.figures.errors.maps import Plane
 from mechdesign.report.figures.errors.panels import number
+from mechdesign.report.figures.planes import Plane
 from mechdesign.report.figures.reliability import figures
 from mechdesign.results import Column, Table
 from mechdesign.study.reliability_models import METHODS

@@ -11,10 +11,11 @@ from mechdesign.report.figures.errors.allocation import allocation_figure
 from mechdesign.report.figures.errors.contributions import contributions_figure
 from mechdesign.report.figures.errors.estimates import MOST_LISTED, estimate_figure
 from mechdesign.report.figures.errors.looks import LOOKS
-from mechdesign.report.figures.errors.maps import map_figures, plane
+from mechdesign.report.figures.errors.maps import map_figures
 from mechdesign.report.figures.errors.panels import along
 from mechdesign.report.figures.errors.simulations import convergence_figure, histogram_figure, trend_figure
 from mechdesign.report.figures.errors.sweeps import sweep_figures
+from mechdesign.report.figures.planes import plane
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -23,7 +24,7 @@ from mechdesign.study.poses import Poses
 def figures(study: Study, result: Result) -> dict[str, Figure]:
     """Whatever the result holds enough of to draw."""
     poses, tables = study.poses("reliability"), result.tables
-    swept, over = along(study, poses), plane(study, poses)
+    swept, over = along(study, poses), plane(study, poses, study.reliability)
     found: dict[str, Figure] = {}
     if swept is not None:
         found |= sweep_figures(study, tables["moments"], swept)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
@@ -15,6 +14,7 @@ from mechdesign.report.figures.deflected import deflections, first_pose, free_mo
 from mechdesign.report.figures.drawing import draw_mechanism, link_colors
 from mechdesign.report.figures.framing import equal_canvas
 from mechdesign.report.figures.labels import place_labels
+from mechdesign.report.figures.planes import Plane, map_sheet, plane
 from mechdesign.report.figures.scene import Scene, pose
 from mechdesign.report.figures.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
 from mechdesign.results import Result
@@ -40,8 +40,9 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
     if not poses.listed and poses.count > 2:
         if len(poses.grid) == 1:
             found["stiffness"] = _curves(study, result)
-        elif len(poses.grid) == 2:
-            found["stiffness"] = _map(study, result)
+        over = plane(study, poses, study.stiffness)
+        if over is not None:
+            found["stiffness"] = _map(study, result, over)
     return found
 
 
@@ -146,21 +147,13 @@ def _curves(study: Study, result: Result) -> Figure:
     return figure
 
 
-def _map(study: Study, result: Result) -> Figure:
-    """k_min over a grid of two coordinates."""
-    table, poses = result.tables["stiffness"], study.poses("stiffness")
-    names = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
-    x, y = (poses.values[name].reshape(poses.grid) for name in names)
-    values = np.where(table["k_min"] > 0, table["k_min"], np.nan).reshape(poses.grid)
-    figure = style.new_figure(style.WIDTH, 5.2)
-    axes = figure.add_subplot()
-    known = values[np.isfinite(values)]
-    norm = LogNorm(known.min(), known.max()) if len(known) and known.max() > known.min() else None
-    mesh = axes.pcolormesh(x, y, values, norm=norm, cmap=style.COLORMAP, shading="nearest")
-    figure.colorbar(mesh, label=style.axis_label("k_min", study.units.label("stiffness")))
-    quantities = [study.mechanism.quantity(name) for name in names]
-    axes.set_xlabel(style.axis_label(names[0], study.units.label(quantities[0])))
-    axes.set_ylabel(style.axis_label(names[1], study.units.label(quantities[1])))
-    if quantities == ["length", "length"]:
-        axes.set_aspect("equal")
-    return figure
+def _map(study: Study, result: Result, over: Plane) -> Figure:
+    """k_min over the poses, and k_max beside it."""
+    table, unit = result.tables["stiffness"], study.units.label("stiffness")
+    parts = []
+    for name in ("k_min", "k_max"):
+        values = np.where(np.isfinite(table[name]) & (table[name] > 0), table[name], np.nan)
+        parts.append((style.axis_label(name, unit), values.reshape(over.x.shape)))
+    about = f"at point {study.stiffness.at}" if study.stiffness is not None else ""
+    return map_sheet(study, over, parts, "Stiffness to a force in the softest and the stiffest direction", about,
+                     logarithmic=True)  # fmt: skip

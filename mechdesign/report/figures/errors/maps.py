@@ -2,64 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
-
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from mechdesign.report.figures import style
 from mechdesign.report.figures.errors.looks import LOOKS, best_moments, best_probability, select
-from mechdesign.report.figures.errors.panels import Floats, channels, coordinate_label, framed, moving_names, title
+from mechdesign.report.figures.errors.panels import channels
+from mechdesign.report.figures.planes import Plane, map_sheet
 from mechdesign.results import Result
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
-
-Extend = Literal["neither", "min", "max", "both"]
 
 MOST_MAPS = 4
-# Rays that differ in direction by less than this (radians) are the end of one patch and the begin of another.
-_SAME = 1e-6
-_LEFT, _BELOW, _BAR, _TOP, _GAP = 0.75, 0.55, 1.1, 0.7, 0.5  # inches
-_TALLEST = 5.2
-
-
-@dataclass(frozen=True, eq=False)
-class Plane:
-    """Poses in the plane of the two coordinates that vary, shape (lines, nodes)."""
-
-    names: tuple[str, str]
-    x: Floats
-    y: Floats
-    equal: bool
-    rays: bool
-
-    def patches(self) -> Iterator[slice]:
-        """Lines that belong together: rays of a workspace turn on within a patch, and stay or turn back to the next."""
-        cuts = np.zeros(0, dtype=int)
-        if self.rays:
-            ray = (self.x[:, -1] - self.x[:, 0]) + 1j * (self.y[:, -1] - self.y[:, 0])
-            cuts = np.flatnonzero(np.angle(ray[1:] / ray[:-1]) < _SAME) + 1
-        for begin, end in zip([0, *cuts], [*cuts, len(self.x)], strict=True):
-            if end - begin > 1:
-                yield slice(int(begin), int(end))
-
-
-def plane(study: Study, poses: Poses) -> Plane | None:
-    """The plane of a grid over two coordinates; None for every other choice of poses."""
-    names = moving_names(poses)
-    if poses.listed or len(poses.grid) != 2 or len(names) != 2 or min(poses.grid) < 3:
-        return None
-    x, y = (poses.values[name].reshape(poses.grid) for name in names)
-    quantities = {study.mechanism.quantity(name) for name in names}
-    section = study.reliability
-    assert section is not None
-    return Plane((names[0], names[1]), x, y, quantities == {"length"}, section.at_nodes)
 
 
 def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
@@ -72,101 +24,14 @@ def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
         rows = select(moments, output=output, order=order, method=method)
         parts.append((style.axis_label(output, unit), moments["sigma"][rows].reshape(over.x.shape)))
     note = f"by {LOOKS[method].words}; the error is that of made mechanisms at this pose"
-    found = {"deviation_map": _sheet(study, over, parts, "Standard deviation of the error", note)}
+    found = {"deviation_map": map_sheet(study, over, parts, "Standard deviation of the error", note)}
     if "reliability" in result.tables:
         table = result.tables["reliability"]
         method = best_probability(table)
         rows = select(table, method=method, scope="pose")
         failure = table["failure"][rows].reshape(over.x.shape)
-        found["failure_map"] = _sheet(
+        found["failure_map"] = map_sheet(
             study, over, [("", failure)], "Probability that an error leaves its limits", f"by {LOOKS[method].words}",
             logarithmic=True,
         )  # fmt: skip
     return found
-
-
-def _sheet(
-    study: Study, over: Plane, parts: list[tuple[str, Floats]], heading: str, note: str, *, logarithmic: bool = False
-) -> Figure:
-    """Maps side by side, or two by two, each with its own bar of colours."""
-    columns = min(len(parts), 2)
-    lines = -(-len(parts) // columns)
-    wide = (style.WIDTH - 0.1) / columns - _LEFT - _BAR
-    spans = np.ptp(over.x[np.isfinite(over.x)]), np.ptp(over.y[np.isfinite(over.y)])
-    tall = min(_TALLEST / lines, wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
-    tall = max(tall, 1.2)
-    height = _TOP + lines * (tall + _BELOW) + (lines - 1) * _GAP
-    figure = framed(height, left=0, right=0, top=0, bottom=0)
-    title(figure, heading, note, left=_LEFT)
-    for k, (name, values) in enumerate(parts):
-        left = _LEFT + (k % columns) * (wide + _LEFT + _BAR)
-        low = height - _TOP - tall - (k // columns) * (tall + _BELOW + _GAP)
-        axes = figure.add_axes((left / style.WIDTH, low / height, wide / style.WIDTH, tall / height))
-        bar = figure.add_axes(
-            ((left + wide + 0.12) / style.WIDTH, low / height, 0.14 / style.WIDTH, tall / height)
-        )  # fmt: skip
-        _map(axes, bar, over, values, logarithmic)
-        axes.set_title(name, loc="left", fontsize=9.5)
-        axes.set_xlabel(coordinate_label(study, over.names[0]))
-        axes.set_ylabel(coordinate_label(study, over.names[1]))
-    return figure
-
-
-def _map(axes: Axes, bar: Axes, over: Plane, values: Floats, logarithmic: bool) -> None:
-    known = np.isfinite(values) & ((values > 0) | (not logarithmic))
-    axes.grid(visible=False)
-    axes.set_facecolor("#EEEEEE")
-    if over.equal:
-        axes.set_aspect("equal")
-    if not known.any():
-        bar.set_visible(False)
-        return
-    levels = _powers(values[known]) if logarithmic else _round(values[known])
-    if logarithmic:
-        # Between nodes powers are interpolated; below the last level is all that is smaller, even 0.
-        values, levels = np.log10(np.maximum(values, 1e-3 * levels[0])), np.log10(levels)
-    shown = np.ma.masked_invalid(values)
-    ends = bool(shown.min() < levels[0]), bool(shown.max() > levels[-1])
-    extend: Extend = "both" if all(ends) else "min" if ends[0] else "max" if ends[1] else "neither"
-    norm = BoundaryNorm(levels, 256, extend=extend)
-    for patch in over.patches():
-        axes.contourf(over.x[patch], over.y[patch], shown[patch], levels=levels, cmap=style.COLORMAP, norm=norm,
-                      extend=extend)  # fmt: skip
-        axes.contour(over.x[patch], over.y[patch], shown[patch], levels=levels, colors="white", linewidths=0.5,
-                     linestyles="solid",
-                     alpha=0.7)  # fmt: skip
-        if over.equal:
-            for end in (0, -1):
-                axes.plot(over.x[patch, end], over.y[patch, end], color=style.INK, linewidth=1.2)
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    colors = figure.colorbar(ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
-    if logarithmic:
-        bar.set_yticks(levels, [_power(10.0**level) for level in levels])
-    bar.tick_params(labelsize=8)
-    colors.outline.set_visible(False)
-
-
-def _round(values: Floats) -> Floats:
-    low, high = float(values.min()), float(np.quantile(values, 0.97))
-    if high - low <= 1e-9 * abs(high):
-        low, high = low - 0.5 * abs(low) - 1e-12, low + 0.5 * abs(low) + 1e-12
-    return np.asarray(MaxNLocator(nbins=9, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
-
-
-def _powers(values: Floats) -> Floats:
-    """Levels 1, 2, 5 times powers of ten where values lie close, powers of ten where they do not."""
-    low, high = np.floor(np.log10(max(values.min(), 1e-16))), np.ceil(np.log10(values.max()))
-    powers = 10.0 ** np.arange(low, high + 1)
-    if len(powers) > 4:
-        step = -(-len(powers) // 9)
-        return np.asarray(powers[::-1][::step][::-1])
-    fine = np.outer(powers, (1, 2, 5)).ravel()
-    kept = (fine >= 0.4 * values.min()) & (fine <= 2.5 * values.max())
-    return fine[kept] if np.count_nonzero(kept) > 1 else fine
-
-
-def _power(level: float) -> str:
-    digit, power = f"{level:.0e}".split("e")
-    ten = f"10$^{{{int(power)}}}$"
-    return ten if digit == "1" else f"{digit}\N{MIDDLE DOT}{ten}"
