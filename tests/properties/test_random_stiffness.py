@@ -66,6 +66,41 @@ def test_displacements_of_all_points_are_those_of_finite_elements(case: Sprung) 
 
 @settings(max_examples=25)
 @given(sprung())
+def test_every_part_is_in_equilibrium_and_pins_bear_no_moment(case: Sprung) -> None:
+    """Forces of the joints on each link, pin and block, and the load on what is asked, add up to nothing."""
+    loads = [[30.0, -20.0, 8.0 if case.link else 0.0], [-1.0, 2.0, 0.0]]
+    table = ask_stiffness(case.text(loads=loads)).tables["forces"]
+    layout = case.layout
+    places = layout.places | {guide.name: layout.places[guide.point] for guide in layout.guides.values()}
+    places |= {body.name: layout.places[body.to] for body in layout.bodies.values() if body.to}
+    parts = {str(name) for column in ("from", "to") for name in table[column]}
+    loaded = "asked" if "asked" in parts else case.link
+    for number, applied in enumerate(loads, 1):
+        total = {part: np.zeros(3) for part in parts}
+        shares = dict.fromkeys(parts, 0.0)
+
+        def act(part: str, fx: float, fy: float, mz: float, at: complex, total: dict = total) -> None:
+            total[part] += [fx, fy, mz + at.real * fy - at.imag * fx]
+
+        if loaded in parts:
+            act(loaded, *applied, layout.places[case.at])
+        for row in table.rows():
+            if row["load"] != number:
+                continue
+            name, force = str(row["joint"]), np.array([row["fx"], row["fy"], row["mz"]])
+            at = places.get(name, 0j)
+            act(str(row["from"]), *force, at)
+            act(str(row["to"]), *-force, at)
+            for part in (row["from"], row["to"]):
+                shares[str(part)] = max(shares[str(part)], np.abs(force).max())
+            if name in layout.drives:
+                assert np.abs(force[:2]).max() < 1e-9 * np.abs(applied).max()
+        for part in parts - {GROUND}:
+            assert total[part] == pytest.approx(np.zeros(3), abs=1e-8 * (1 + shares[part])), part
+
+
+@settings(max_examples=25)
+@given(sprung())
 def test_stiffness_is_symmetric_positive_and_the_inverse_of_compliance(case: Sprung) -> None:
     result = ask_stiffness(case.text())
     stiff, soft = matrix(result, "K"), matrix(result, "C")
