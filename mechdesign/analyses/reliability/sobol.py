@@ -34,8 +34,10 @@ Floats = NDArray[np.float64]
 
 REPLICATES = 16
 # Mechanisms solved a pose, and poses, where the study does not say how many points.
-BUDGET = 20_000
+BUDGET = 8_000
 POSES = 4
+# Points of a replicate: beyond these there are more of them.
+_MOST = 4_000
 _STREAM = 3
 
 
@@ -111,14 +113,19 @@ def sample(
     rows : sequence of sequences of int
         The variables of each source; a source without is not asked.
     """
-    a, b = rng.standard_normal((2, dimension, count))
-    of_a, of_b = model(a), model(b)
-    mixed_values = np.full((len(rows), *of_a.shape), np.nan)
     asked = [k for k, own in enumerate(rows) if len(own)]
-    for k in asked:
-        point = a.copy()
-        point[list(rows[k])] = b[list(rows[k])]
-        mixed_values[k] = model(point)
+    points = np.empty((dimension, 2 + len(asked), count))
+    points[:, :2] = rng.standard_normal((2, dimension, count)).swapaxes(0, 1)
+    points[:, 2:] = points[:, :1]
+    for place, k in enumerate(asked):
+        own = list(rows[k])
+        points[own, 2 + place] = points[own, 1]
+    flat = points.reshape(dimension, -1)
+    parts = [model(flat[:, begin : begin + CHUNK]) for begin in range(0, flat.shape[1], CHUNK)]
+    found = np.concatenate(parts, axis=-1).reshape(*parts[0].shape[:2], 2 + len(asked), count)
+    of_a, of_b = found[:, :, 0], found[:, :, 1]
+    mixed_values = np.full((len(rows), *of_a.shape), np.nan)
+    mixed_values[asked] = np.moveaxis(found[:, :, 2:], 2, 0)
     keep = np.isfinite(of_a).all(axis=(0, 1)) & np.isfinite(of_b).all(axis=(0, 1))
     keep &= np.isfinite(mixed_values[asked]).all(axis=(0, 1, 2))
     of_a, of_b = of_a[:, :, keep], of_b[:, :, keep]
@@ -182,7 +189,7 @@ def indices(task: Task, section: ReliabilitySection, listed: bool) -> dict[int, 
     owners = np.array(sources.owners)
     rows = [np.flatnonzero(owners == s.name).tolist() if s.name in alone else [] for s in linear.sources]
     points = BUDGET // (sum(map(bool, rows)) + 2) if count is None else count
-    replicates = max(REPLICATES, -(-points // CHUNK))
+    replicates = max(REPLICATES, -(-points // _MOST))
     each = max(2, points // replicates)
     task.progress.start(len(settings) * replicates, "replicates")
 
