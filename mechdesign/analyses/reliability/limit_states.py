@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.reliability.cycle import limited_part
 from mechdesign.analyses.reliability.engine.problem import Problem
 from mechdesign.analyses.reliability.first_order import derivatives
 from mechdesign.analyses.reliability.simulation import Setting, errors_of, solve
@@ -25,6 +26,8 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
     MechanismError
         Never: what has no closed derivative is differenced.
     """
+
+    setting = limited_part(setting)
 
     def margins(u: Floats) -> Floats:
         errors, valid = errors_of(setting, sources.made(sources.at(u)), u.shape[1])
