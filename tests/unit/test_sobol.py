@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies import study_of
-from scipy.special import ndtr
+from scipy.special import ndtr, stdtrit
 
 import mechdesign
-from mechdesign.analyses.reliability.sobol import Control, Indices, combine, sample
+from mechdesign.analyses.reliability.sobol import Control, Indices, combine, sample, student
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 A, B = 7.0, 0.1
@@ -143,6 +143,11 @@ reliability:
 """
     table = mechdesign.reliability(study_of(text)).tables["contributions"]
     assert table["sobol_first"] == pytest.approx([1.0, 1.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [15, 16, 50, 1000])
+def test_students_quantile(degrees: int) -> None:
+    assert student(degrees) == pytest.approx(stdtrit(degrees, 0.9985), rel=2e-5)
 
 
 def test_which_poses_are_asked() -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ from mechdesign.study.reliability_models import SAMPLING, ReliabilitySection
 
 Floats = NDArray[np.float64]
 
-REPLICATES = 16
+REPLICATES, CONFIDENCE = 16, 0.997
 # Mechanisms solved a pose, and poses, where the study does not say how many points.
 BUDGET = 8_000
 POSES = 4
@@ -165,16 +166,27 @@ def combine(replicates: Sequence[Sampled], control: Control | None = None) -> In
 
 def _ratio(parts: Floats, whole: Floats) -> Floats:
     """Ratio of means over replicates and its interval: value, low, high; what is below 0 or above 1 is moved there."""
-    from scipy.special import stdtrit
-
-    from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE
-
     count, mean = len(parts), whole.mean(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         value = np.where(mean > 0, parts.mean(axis=0) / mean, np.nan)
         spread = np.std((parts - value * whole) / mean, axis=0, ddof=1) / np.sqrt(count)
-    half = -float(stdtrit(count - 1, 0.5 * (1.0 - CONFIDENCE))) * spread
+    half = student(count - 1) * spread
     return np.asarray(np.clip(np.stack([value, value - half, value + half]), 0.0, 1.0))
+
+
+def student(degrees: int) -> float:
+    """Student's quantile of half the width of an interval at 99.7 %, to 1e-5 from 15 degrees of freedom on.
+
+    [Fisher & Cornish, 1960; Abramowitz & Stegun, eq. 26.7.5.] SciPy, which has it too, takes a quarter of a second.
+    """
+    z, v = NormalDist().inv_cdf(0.5 * (1.0 + CONFIDENCE)), float(degrees)
+    terms = (
+        (z**3 + z) / (4 * v),
+        (5 * z**5 + 16 * z**3 + 3 * z) / (96 * v**2),
+        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / (384 * v**3),
+        (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / (92160 * v**4),
+    )
+    return z + sum(terms)
 
 
 def indices(task: Task, section: ReliabilitySection, listed: bool) -> dict[int, Indices]:
