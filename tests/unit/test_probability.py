@@ -76,6 +76,17 @@ def test_three_limits_by_the_lattice() -> None:
     assert mixed == pytest.approx(disc + single - disc * single, rel=1e-4)
 
 
+@pytest.mark.parametrize("limit", [2.0, 3.0, 4.0, 6.0, 9.0])
+def test_three_limits_of_errors_with_two_sources(limit: float) -> None:
+    """Rarely broken, and depending on each other: against the integral over the direction of the radial one."""
+    slopes = np.array([[1.0, 0.0], [0.0, 1.0], [0.6, 0.8]])
+    turn = 2 * np.pi * (np.arange(200_000) + 0.5) / 200_000
+    reach = limit / np.abs(slopes @ np.stack([np.cos(turn), np.sin(turn)])).max(axis=0)
+    exact = np.mean(np.exp(-0.5 * reach**2))
+    bands = [Band(k, -limit, limit) for k in range(3)]
+    assert failure_probability(slopes @ slopes.T, bands, []) == pytest.approx(exact, rel=3e-3)
+
+
 def test_an_error_that_does_not_vary_keeps_its_limit() -> None:
     covariance = np.diag([1.0, 0.0])
     bands = [Band(0, -2.0, 2.0), Band(1, -0.1, 0.1)]
