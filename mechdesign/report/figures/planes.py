@@ -134,14 +134,17 @@ def _round(values: Floats) -> Floats:
 
 
 def _powers(values: Floats) -> Floats:
-    """Levels 1, 2, 5 times powers of ten where values lie close, powers of ten where they do not."""
-    low, high = np.floor(np.log10(max(values.min(), 1e-16))), np.ceil(np.log10(values.max()))
-    powers = 10.0 ** np.arange(low, high + 1)
+    """Levels 1, 2, 5 times powers of ten where values lie close, powers of ten where they do not.
+
+    What a twentieth of the values lies beyond, as near a singularity, gets no levels of its own.
+    """
+    smallest, largest = (max(float(value), 1e-16) for value in np.quantile(values, (0.05, 0.95)))
+    powers = 10.0 ** np.arange(np.floor(np.log10(smallest)), np.ceil(np.log10(largest)) + 1)
     if len(powers) > 4:
         step = -(-len(powers) // 9)
         return np.asarray(powers[::-1][::step][::-1])
     fine = np.outer(powers, (1, 2, 5)).ravel()
-    kept = (fine >= 0.4 * values.min()) & (fine <= 2.5 * values.max())
+    kept = (fine >= 0.4 * smallest) & (fine <= 2.5 * largest)
     return fine[kept] if np.count_nonzero(kept) > 1 else fine
 
 
