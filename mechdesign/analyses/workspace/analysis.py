@@ -96,7 +96,8 @@ def _doubts(question: Question, given: Answer) -> Iterator[str]:
     where = ", ".join(f"{name} = {value:g}" for name, value in question.held.items())
     where = f" at {where}" if where else ""
     if not given.panels.closes[0]:
-        yield f"nothing is reachable{where}" + (f": {ROOTLESS}" if question.field.rootless else "")
+        assembly = " in the sketch's assembly" if question.field.same_assembly else ""
+        yield f"nothing is reachable{where}" + (f": {ROOTLESS}" if question.field.rootless else assembly)
         return
     for name in ("GII", "GRI"):
         error, value = given.errors[name][0], given.values[name][0]

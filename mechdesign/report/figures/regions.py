@@ -135,12 +135,12 @@ def outline_of(axes: Axes, boundary: Table, *, width: float = 1.5) -> set[str]:
     pieces = list(curves(boundary))
     # White below keeps the gaps of dashes clean.
     for rows in pieces:
-        axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=width + 0.6, zorder=2.9)
+        axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=width + 0.6, zorder=3.1)
     for rows in pieces:
         found = fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]]))
         color, dashes, _ = FATES[found]
         axes.plot(boundary["x"][rows], boundary["y"][rows], color=color, linestyle=dashes, linewidth=width,
-                  solid_capstyle="round", zorder=3)  # fmt: skip
+                  solid_capstyle="round", zorder=3.15)  # fmt: skip
         seen.add(found)
     return seen
 
@@ -162,6 +162,7 @@ def loci(axes: Axes, region: Region) -> set[str]:
             continue
         kind = str(table["kind"][rows[0]])
         axes.plot(table["x"][rows], table["y"][rows], color=LOCI[kind][0], linewidth=1.8, zorder=3.2,
+                  marker="o" if len(rows) == 1 else "", markersize=4,
                   path_effects=[withStroke(linewidth=3.4, foreground="white")])  # fmt: skip
         seen.add(kind)
     return seen
