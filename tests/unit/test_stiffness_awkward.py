@@ -11,6 +11,8 @@ from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
 from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.stiffness.analysis import ask
+from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.results import Result
 
 BEAM = "sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}"
@@ -122,6 +124,16 @@ def test_concurrent_legs_leave_a_turn_about_their_common_point(text: str) -> Non
     assert free(ask_stiffness(text, UPRIGHT, "stiffness.at=FAR")) == pytest.approx([-4000, 3000, 1], rel=1e-9)
 
 
+@pytest.mark.parametrize("text", [TRIPOD, PUSHED])
+def test_loads_on_what_is_free_have_no_effect_that_could_be_told(text: str) -> None:
+    result = ask_stiffness(text, UPRIGHT, "stiffness.loads=[[1, 2, 3]]")
+    for table, columns in (("deflections", ["dx", "dphi"]), ("forces", ["fx", "mz"]), ("displacements", ["dx"])):
+        for column in columns:
+            values = result.tables[table][column]
+            assert len(values)
+            assert np.isnan(values).all()
+
+
 def test_springs_through_one_point_add_up() -> None:
     stiff = matrix(ask_stiffness(TRIPOD, UPRIGHT), "K")
     expected = np.zeros((2, 2))
@@ -192,16 +204,74 @@ stiffness:
   sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}
   elastic: {one: beam, two: beam, coupler: beam, leg: beam}
   actuators: {swing: 1e4, lift: 1e6}
-  poses: [{swing: 65, lift: 1.2}, {swing: 0, lift: 1.2}, {swing: 0.001, lift: 1.2}]
+  poses: [{swing: 65, lift: 1.2}]
 """
 )
 
 
 def test_a_parallelogram_for_a_leg() -> None:
-    result = ask_stiffness(PARALLELOGRAM, "stiffness.poses=[{swing: 65, lift: 1.2}]")
+    result = ask_stiffness(PARALLELOGRAM)
     assert method(result) == "force method"
-    expected = by_elements(PARALLELOGRAM, "stiffness.poses=[{swing: 65, lift: 1.2}]")
+    expected = by_elements(PARALLELOGRAM)
     assert_allclose(matrix(result, "C"), expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_flat_parallelogram_is_free_and_held_twice_at_once() -> None:
+    """All four links in one line: they bear one force in two ways, and the coupler turns though the motor holds."""
+    flat = PARALLELOGRAM.replace("  drives:", "  branch: follow\n  drives:").replace("swing: 65", "swing: 0")
+    result = ask_stiffness(flat)
+    assert result.tables["stiffness"]["rank"][0] == 2
+    study = study_of(flat)
+    (solved,) = solve_poses(study, study.poses("stiffness"))
+    structure = Structure(study, solved.configuration)
+    here = slice(3 * structure.asked, 3 * structure.asked + 3)
+    _, loose = structure.frame.respond(structure.asked)
+    assert loose.shape[1] == 1
+    twist = loose[here, 0] / loose[here, 0][2]
+    assert free(result) == pytest.approx(twist, rel=1e-6)
+    # Loads that do no work on it are borne, and K says how far they move the plate.
+    loads = np.linalg.svd(twist[None])[2][1:].T
+    moved, _ = structure.frame.respond(structure.asked, loads)
+    assert_allclose(matrix(result, "K") @ moved[here], loads, atol=1e-5)
+
+
+STRETCHED = (
+    METRES
+    + """
+mechanism:
+  links:
+    ground: {O: [0, 0], G: [0, 0.5], Q: [0.3, -0.6]}
+    a: {O: [0, 0], A: [0.5, 0], M: [0.25, 0]}
+    b: [A, B, 0.5]
+    c: [Q, N, 0.5]
+    d: [N, M, 0.5]
+    block: {B: [0, 0]}
+  joints: {guide: {prismatic: [ground, block]}}
+  drives: {s: {slide: guide}}
+  sketch: {A: [0.45, 0.2], B: [0.95, 0], M: [0.23, 0.1], N: [0.6, -0.2]}
+stiffness:
+  link: block
+  at: B
+  sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}
+  elastic: {a: beam, b: beam, c: beam, d: beam}
+  actuators: {s: 1e5}
+  poses: [{s: 0.9}, {s: 1.0}]
+"""
+)
+
+
+def test_a_stretched_knee_carries_along_its_line() -> None:
+    """Three pins in one line bear a force along it beside the motor, whatever length rotations are counted by."""
+    result = ask_stiffness(STRETCHED)
+    assert method(result) == "force method"
+    assert matrix(result, "C", 0)[0, 0] == pytest.approx(1e-5, rel=1e-9)
+    assert matrix(result, "C", 1)[0, 0] == pytest.approx(1 / (1e5 + AXIAL), rel=1e-9)
+    study = study_of(STRETCHED)
+    asked = ask(study)
+    (solved,) = solve_poses(study, study.poses("stiffness"))
+    for length in (0.1, 1.0, 10.0):
+        held = load(twists_of(asked.network, asked.section, solved.configuration, length), 3).held
+        assert held.compliance[1] == pytest.approx(matrix(result, "C", 1), rel=1e-9)
 
 
 def in_millimetres(text: str) -> str:

@@ -60,7 +60,9 @@ class Twists:
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A body held by a network in n poses, and what unit loads at it do. Loads and displacements are plain, not scaled.
+    """A body held by a network in n poses, and what unit loads at it do; nan where the body is not held.
+
+    Loads and displacements are plain, not scaled.
 
     Parameters
     ----------
@@ -158,6 +160,7 @@ def load(twists: Twists, size: int) -> Loaded:
     shift[:, ~twists.free] = strain
     shift[:, twists.free] = -statics.inverse @ (loops @ strain)
     held = _held((total + total.swapaxes(1, 2)) / 2, statics, twists.length, size)
+    stress[held.rank < size], shift[held.rank < size] = np.nan, np.nan
     return Loaded(held.seen_from(twists.arm), twists, stress, shift)
 
 
