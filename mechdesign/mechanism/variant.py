@@ -68,22 +68,23 @@ class Variant(Mechanism):
         if not found.valid:
             if self.forward.iterative:
                 raise AssemblyError("the sketch cannot be assembled with these dimensions")
-            found = self._elsewhere(changed)
+            found = elsewhere(self.original, changed)
         return replace(found, places={})
 
-    def _elsewhere(self, changed: Mapping[str, float]) -> Configuration:
-        """A pose with the drives near to where they were drawn; the original's drawing where there is none."""
-        sketch, random = self.original.sketch_configuration, np.random.default_rng(0)
-        given = []
-        away = np.zeros(TRIES)
-        for coordinate in self.forward.structure.given:
-            part = random.uniform(-1, 1, TRIES)
-            away += part**2
-            given.append(sketch.value(coordinate) + part * (np.pi if coordinate.quantity == "angle" else self.size))
-        poses = self.original.forward.solve(given, changed, limits=False)
-        if not poses.valid.any():
-            return sketch
-        return poses.take(int(np.argmin(np.where(poses.valid, away, np.inf))))
+
+def elsewhere(mechanism: Mechanism, changed: Mapping[str, Value]) -> Configuration:
+    """A pose with other dimensions and the drives near to where they were drawn; the drawing where there is none."""
+    sketch, random = mechanism.sketch_configuration, np.random.default_rng(0)
+    given = []
+    away = np.zeros(TRIES)
+    for coordinate in mechanism.forward.structure.given:
+        part = random.uniform(-1, 1, TRIES)
+        away += part**2
+        given.append(sketch.value(coordinate) + part * (np.pi if coordinate.quantity == "angle" else mechanism.size))
+    poses = mechanism.forward.solve(given, changed, limits=False)
+    if not poses.valid.any():
+        return sketch
+    return poses.take(int(np.argmin(np.where(poses.valid, away, np.inf))))
 
 
 def drawn(mechanism: Mechanism, places: Mapping[str, Value]) -> Configuration:

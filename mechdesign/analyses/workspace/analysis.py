@@ -6,15 +6,31 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mechdesign.analyses.workspace.curves import Patch, patches
+from mechdesign.analyses.workspace.curves import Patch, patches_of_pieces
 from mechdesign.analyses.workspace.indices import INDICES, prepare
 from mechdesign.analyses.workspace.indices.index import determinant_power, power_of_length
 from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
-from mechdesign.analyses.workspace.rays import Designs
-from mechdesign.analyses.workspace.region import CLOSE, COLUMNS, RAYS, Answer, Question, answer, questions, split
-from mechdesign.analyses.workspace.tables import held_columns, inscribed_columns, outlines, stacked
+from mechdesign.analyses.workspace.region import (
+    CLOSE,
+    COLUMNS,
+    RAYS,
+    Answer,
+    Question,
+    answer,
+    areas_of_pieces,
+    questions,
+    split,
+)
+from mechdesign.analyses.workspace.tables import (
+    PIECE,
+    held_columns,
+    inscribed_columns,
+    outlines,
+    piece_columns,
+    stacked,
+)
 from mechdesign.errors import AssemblyError
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
@@ -55,17 +71,26 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     local: list[list[Column]] = []
     regions: list[tuple[Study, Question, list[Patch]]] = []
     shapes: list[tuple[Circle, Rectangle]] = []
+    pieces: list[list[Column]] = []
+    several = False
     warnings: list[str] = []
     for question in asked:
         given = answer(question, {}, 1, CLOSE)
         answers.append(given)
         warnings += _doubts(question, given)
         if given.panels.closes[0]:
-            designs = Designs(question.field, {}, 1, question.about)
-            found = list(patches(designs, given.panels, question.rays or RAYS, CLOSE.samples))
+            assert given.pieces is not None
+            found = patches_of_pieces(given.pieces, question.rays or RAYS, CLOSE.samples)
             local.append(_local(study, question, found))
-            shapes.append(inscribed(question.field, question.about, question.scan, found))
+            counted = [patch for patch in found if patch.piece == 1 or not question.field.same_assembly]
+            others = [patch for patch in found if patch not in counted]
+            shapes.append(inscribed(question.field, question.about, question.scan, counted, others))
             regions.append((study, question, found))
+            areas, drawn = areas_of_pieces(question, given, CLOSE), bool(given.pieces.drawn[0])
+            pieces.append(piece_columns(study, question, found, areas, drawn))
+            several |= len(areas) > 1
+            if others:
+                warnings.append(_left_out(study, question, areas, drawn))
         else:
             shapes.append((NO_CIRCLE, NO_RECTANGLE))
         progress.update(1)
@@ -77,6 +102,8 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
         Table("local", stacked(local), "local indices on a grid that follows the boundary"),
         *outlines(regions),
     ]  # fmt: skip
+    if several:
+        tables.append(Table("pieces", stacked(pieces), "pieces of the region that do not hang together"))
     empty = sum(not given.panels.closes[0] for given in answers)
     return Result("workspace", {table.name: table for table in tables}, tuple(warnings),
                   {"regions": len(asked), "empty": empty})  # fmt: skip
@@ -92,9 +119,24 @@ def _unreachable(study: Study, question: Question) -> str:
     )
 
 
-def _doubts(question: Question, given: Answer) -> Iterator[str]:
+def _where(question: Question) -> str:
     where = ", ".join(f"{name} = {value:g}" for name, value in question.held.items())
-    where = f" at {where}" if where else ""
+    return f" at {where}" if where else ""
+
+
+def _left_out(study: Study, question: Question, areas: Sequence[float], drawn: bool) -> str:
+    """That the indices are of one piece, and what is left out."""
+    one = "of the piece that holds the sketch" if drawn else "of the largest (the sketch lies in none)"
+    many, unit = len(areas) - 1, study.units.label("area")
+    left = f"{'another' if many == 1 else f'{many} others, together'} of area {sum(areas[1:]):.4g} {unit}".rstrip()
+    return (
+        f"the region{_where(question)} has {len(areas)} pieces that do not hang together: indices are {one}; "
+        f"{left} {'is' if many == 1 else 'are'} left out ('assembly: any' counts all)"
+    )
+
+
+def _doubts(question: Question, given: Answer) -> Iterator[str]:
+    where = _where(question)
     if not given.panels.closes[0]:
         assembly = " in the sketch's assembly" if question.field.same_assembly else ""
         yield f"nothing is reachable{where}" + (f": {ROOTLESS}" if question.field.rootless else assembly)
@@ -171,4 +213,5 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
         Column("patch", patch, "", "part of the region between two boundary curves"),
         Column("ray", ray, "", "ray of the patch's grid"),
         Column("node", node, "", "node along the ray, from the inner to the outer boundary"),
+        Column("piece", np.repeat([patch.piece for patch in found], [grid.size for grid in grids]), "", PIECE),
     ]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.panels import Panels
+from mechdesign.analyses.workspace.pieces import Pieces
 from mechdesign.analyses.workspace.rays import SAME, Designs, Floats, Intervals, Ints, trace
 
 SLACK = 1e-9
@@ -31,6 +32,8 @@ class Patch:
         Angles and the radii of both curves.
     enters, leaves : int
         Margins that are zero on them; -1 where the patch begins at the centre of the scan.
+    piece : int
+        Number of the region's piece that it belongs to, from 1.
     """
 
     theta: Floats
@@ -38,11 +41,23 @@ class Patch:
     outer: Floats
     enters: int
     leaves: int
+    piece: int = 1
 
     def grid(self, about: complex) -> NDArray[np.complex128]:
         """Nodes, shape (rays, GRID), denser towards both curves."""
         radius = self.inner[:, None] + self.fractions() * (self.outer - self.inner)[:, None]
         return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
+
+    def middle(self, about: complex) -> complex:
+        """A place inside, in the middle of the widest interval."""
+        k = int(np.argmax(self.outer - self.inner))
+        return complex(about + 0.5 * (self.inner[k] + self.outer[k]) * np.exp(1j * self.theta[k]))
+
+    def holds(self, z: NDArray[np.complex128], about: complex) -> NDArray[np.bool_]:
+        """Which places lie in the patch, as far as its rays tell."""
+        radius, theta = np.abs(z - about), self.theta[0] + (np.angle(z - about) - self.theta[0]) % (2 * np.pi)
+        inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
+        return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
 
     def fractions(self) -> Floats:
         """Places of a ray's nodes between both curves."""
@@ -70,6 +85,16 @@ def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterat
         for slot in range(usual):
             at: Ints = first + slot
             yield Patch(theta[kept], inner[at], outer[at], _most(enters[at]), _most(leaves[at]))
+
+
+def patches_of_pieces(pieces: Pieces, rays: int, samples: int) -> list[Patch]:
+    """Patches of a single design, piece by piece; about `rays` rays over all panels."""
+    total = float(np.sum(pieces.panels.high - pieces.panels.low))
+    found = []
+    for number, (designs, panels) in enumerate(pieces.all(), start=1):
+        own = round(rays * float(np.sum(panels.high - panels.low)) / total)
+        found += [replace(patch, piece=number) for patch in patches(designs, panels, own, samples)]
+    return found
 
 
 def _whole(traced: Intervals, near: float) -> tuple[Ints, Floats, Floats, Ints, Ints]:

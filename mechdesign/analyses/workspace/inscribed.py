@@ -72,7 +72,7 @@ class _Shape:
 
 
 def inscribed(
-    field: Field, about: complex, scan: tuple[float, float], patches: Sequence[Patch]
+    field: Field, about: complex, scan: tuple[float, float], patches: Sequence[Patch], others: Sequence[Patch] = ()
 ) -> tuple[Circle, Rectangle]:
     """The largest circle and rectangle inside one region.
 
@@ -82,6 +82,8 @@ def inscribed(
         Centre and range of angle (radians) of the scan: what lies beyond a scan of less than a turn does not count.
     patches : sequence of Patch
         The region's parts.
+    others : sequence of Patch
+        Parts of pieces that do not count.
     """
     if not patches:
         return NO_CIRCLE, NO_RECTANGLE
@@ -106,8 +108,12 @@ def inscribed(
     dx, dy = (high.real - low.real) / (CELLS - 2), (high.imag - low.imag) / (CELLS - 2)
     x = np.asarray(low.real + dx * (np.arange(CELLS) - 0.5), dtype=float)
     y = np.asarray(low.imag + dy * (np.arange(CELLS) - 0.5), dtype=float)
-    inside = margins((x[:, None] + 1j * y).ravel()) > 0
-    free = inside.all(axis=0).reshape(CELLS, CELLS)
+    cells = (x[:, None] + 1j * y).ravel()
+    inside = margins(cells) > 0
+    counts = inside.all(axis=0)
+    for other in others:
+        counts &= ~other.holds(cells, about)
+    free = counts.reshape(CELLS, CELLS)
     # What is negative nowhere (the length of a leg) is no border.
     borders = np.array(~inside.all(axis=1), dtype=bool)
     borders[[*(margin for _, margin in ends), *range(len(field.labels), len(borders))]] = True

@@ -6,6 +6,7 @@ import numpy as np
 
 from mechdesign.analyses.workspace.curves import GRID, patches
 from mechdesign.analyses.workspace.panels import find_panels
+from mechdesign.analyses.workspace.pieces import Pieces
 from mechdesign.analyses.workspace.rays import Designs
 from mechdesign.analyses.workspace.region import CLOSE, RAYS, Question, questions
 from mechdesign.errors import AssemblyError
@@ -49,6 +50,8 @@ def _grid(question: Question, most: int) -> Value:
     """Nodes of one region, shape (rays, GRID), on about `most` rays."""
     designs = Designs(question.field, {}, 1, question.about)
     panels = find_panels(designs, question.scan, CLOSE)
+    if question.field.same_assembly:
+        designs, panels = Pieces.of(designs, panels, question.scan, CLOSE.samples).only(0)
     if not panels.closes[0]:
         return np.zeros((0, GRID), dtype=complex)
     found = list(patches(designs, panels, min(question.rays or RAYS, most), CLOSE.samples))

@@ -40,6 +40,8 @@ class Panels:
         Radius beyond the whole region of each design.
     closes : ndarray of bool, shape (designs,)
         Whether any ray met the region.
+    intervals : ndarray of int, shape (panels,)
+        Intervals of a ray inside each panel; 0 where none has been traced there.
     """
 
     design: Ints
@@ -47,6 +49,7 @@ class Panels:
     high: Floats
     reach: Floats
     closes: NDArray[np.bool_]
+    intervals: Ints
 
 
 def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cuts: tuple[float, ...] = ()) -> Panels:
@@ -70,7 +73,8 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     design, cell = np.nonzero(codes[:, 1:] != codes[:, :-1])
     search = Search(designs, reach, effort.samples)
     design, breaks = search.all_breaks(intervals, design * len(angles) + cell, design, angles[cell], angles[cell + 1])
-    inside = intervals.counts.reshape(count, -1) > 0
+    counts = intervals.counts.reshape(count, -1)
+    inside = counts > 0
     fixed = np.tile([*scan, *cuts], count)
     owner = np.concatenate([np.repeat(np.arange(count), 2 + len(cuts)), design])
     place, firm = np.concatenate([fixed, breaks]), np.arange(len(fixed) + len(breaks)) < len(fixed)
@@ -88,7 +92,10 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     first, last = np.searchsorted(angles, low, side="right"), np.searchsorted(angles, high, side="left")
     met = np.concatenate([np.zeros((count, 1), dtype=int), np.cumsum(inside, axis=1)], axis=1)
     full = (last <= first) | (met[owner, np.maximum(last, first)] > met[owner, first])
-    return Panels(owner[full], low[full], high[full], reach, np.asarray(inside.any(axis=1)))
+    first, last = np.searchsorted(angles, low + TOGETHER, side="right"), np.searchsorted(angles, high - TOGETHER)
+    # Not at half of the panel: by symmetry a single point may divide the ray there.
+    usual = np.where(last > first, counts[owner, np.minimum(first + (last - first) // 4, len(angles) - 1)], 0)
+    return Panels(owner[full], low[full], high[full], reach, np.asarray(inside.any(axis=1)), usual[full])
 
 
 def _first_guess(designs: Designs) -> Floats:

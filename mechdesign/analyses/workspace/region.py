@@ -16,6 +16,7 @@ from mechdesign.analyses.workspace.indices import INDICES, OF_JACOBIAN, Prepared
 from mechdesign.analyses.workspace.integrands import Integrand
 from mechdesign.analyses.workspace.panels import Effort, Panels, find_panels
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
+from mechdesign.analyses.workspace.pieces import Pieces
 from mechdesign.analyses.workspace.quadrature import Integral, integrate, simple_means
 from mechdesign.analyses.workspace.rays import Designs, Floats
 from mechdesign.errors import MechanismError, Problem, StudyError
@@ -76,11 +77,21 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The wanted columns for each design, and their estimated errors (0 where the rule has none)."""
+    """The wanted columns for each design, and their estimated errors (0 where the rule has none).
+
+    Parameters
+    ----------
+    panels : Panels
+        Those that are counted.
+    pieces : Pieces or None
+        All pieces of the regions; the first of each design is counted, or all are in any assembly. None for several
+        designs whose pieces all count.
+    """
 
     values: dict[str, Floats]
     errors: dict[str, Floats]
     panels: Panels
+    pieces: Pieces | None
 
 
 def columns(names: Iterable[str]) -> tuple[str, ...]:
@@ -194,9 +205,14 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
     designs = Designs(question.field, places, count, question.about)
     cuts = tuple(sorted(set(question.counted) - set(question.scan)))
     panels = find_panels(designs, question.scan, effort, cuts)
+    pieces = None
+    if count == 1 or question.field.same_assembly:
+        pieces = Pieces.of(designs, panels, question.scan, effort.samples)
+        if question.field.same_assembly:
+            designs, panels = pieces.only(0)
     if not panels.closes.any():
         nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
-        return Answer(nothing, {name: np.zeros(count) for name in question.wanted}, panels)
+        return Answer(nothing, {name: np.zeros(count) for name in question.wanted}, panels, pieces)
     samples, gauss = effort.samples, question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
     integrands, peaks = _integrands(question), _peaks(question, designs, panels, samples)
@@ -231,7 +247,19 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
         if name:
             values[column], errors[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
     pick = question.wanted
-    return Answer({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels)
+    return Answer({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels, pieces)
+
+
+def areas_of_pieces(question: Question, given: Answer, effort: Effort) -> list[float]:
+    """Area of each piece of a single design's region."""
+    assert given.pieces is not None
+    if given.pieces.number[0] == 1 and "area" in given.values:
+        return [float(given.values["area"][0])]
+    none = np.zeros((0, 1), dtype=bool)
+    return [
+        float(integrate(*part, AREA_TOLERANCE, effort.samples, question.scan, (), none).area[0])
+        for part in given.pieces.all()
+    ]
 
 
 def _integrands(question: Question) -> tuple[Integrand, ...]:
@@ -304,6 +332,6 @@ def _simple(
 
 
 __all__ = [
-    "BRISK", "CLOSE", "COLUMNS", "RAYS", "Answer", "Integral", "Question", "answer", "batched", "columns", "questions",
-    "split",
+    "BRISK", "CLOSE", "COLUMNS", "RAYS", "Answer", "Integral", "Question", "answer", "areas_of_pieces", "batched",
+    "columns", "questions", "split",
 ]  # fmt: skip

@@ -18,6 +18,7 @@ from mechdesign.study import Study
 
 # So far inside the boundary (as a part of the radius) the drives are read where rounding opens the mechanism.
 BESIDE = 1e-12
+PIECE = "piece of the region: 1 is the sketch's, or else the largest"
 
 
 def held_columns(study: Study, question: Question, rows: int) -> list[Column]:
@@ -41,7 +42,7 @@ def boundary_columns(study: Study, question: Question, found: Sequence[Patch]) -
     """Points of the boundary curve by curve: what ends the region there, and the drives."""
     field, told = question.field, causes(question.field)
     curves = [
-        (patch.theta, radius, margin, side)
+        (patch.theta, radius, margin, side, patch.piece)
         for side, names in (("inner", ("inner", "enters")), ("outer", ("outer", "leaves")))
         for patch in found
         for radius, margin in [(getattr(patch, names[0]), getattr(patch, names[1]))]
@@ -71,8 +72,28 @@ def boundary_columns(study: Study, question: Question, found: Sequence[Patch]) -
         Column("at", np.repeat([told[curve[2]][1] for curve in curves], lengths), "", "which limit or singularity"),
         Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
         Column("side", np.repeat([curve[3] for curve in curves], lengths), "", "which end of the ray's interval"),
-        Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth piece of the boundary"),
+        Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth part of the boundary"),
+        Column("piece", np.repeat([curve[4] for curve in curves], lengths), "", PIECE),
     ]  # fmt: skip
+
+
+def piece_columns(
+    study: Study, question: Question, found: Sequence[Patch], areas: Sequence[float], drawn: bool
+) -> list[Column]:  # fmt: skip
+    """Pieces of a region: the area of each, a place inside it, and whether it holds the sketch's place."""
+    length = study.units.label("length")
+    number = np.arange(1, len(areas) + 1)
+    widest = [max((patch for patch in found if patch.piece == k), key=lambda p: float(np.max(p.outer - p.inner)))
+              for k in number]  # fmt: skip
+    z = np.array([patch.middle(question.about) for patch in widest])
+    return [
+        *held_columns(study, question, len(z)),
+        Column("piece", number, "", PIECE),
+        Column("area", np.array(areas), study.units.label("area"), "area of the piece"),
+        Column("x", z.real, length, "a place inside the piece"),
+        Column("y", z.imag, length, "a place inside the piece"),
+        Column("sketch", ((number == 1) & drawn).astype(int), "", "whether it holds the point's place in the sketch"),
+    ]
 
 
 def singularity_columns(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:

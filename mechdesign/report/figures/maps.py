@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Extend = Literal["neither", "max"]
 # Columns of the table that are no indices, beside the held coordinates.
-_NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node")
+_NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node", "piece")
 # An index whose largest values are a thin tail is cut off above this share of the area, which the bar shows.
 _TAIL = 0.96
 MOST = 6

@@ -29,6 +29,7 @@ FATES: Mapping[str, tuple[str, object, str]] = {
     "folded": (style.PURPLE, (0, (2, 1)), "a leg is folded"),
     "reach": (style.ORANGE, (0, (4, 1.2)), "a leg is at the end of its reach"),
     "singularity": (style.VERMILION, (0, (6, 1.5, 1, 1.5)), "ends at a singularity"),
+    "other": (style.FAINT, "-", "a piece that is left out"),
 }
 # Loci of singularities inside: of the closure (parallel) and of a leg (serial).
 LOCI: Mapping[str, tuple[str, str]] = {
@@ -37,6 +38,7 @@ LOCI: Mapping[str, tuple[str, str]] = {
 }
 # Of the region itself; opaque, so that patches leave no seams.
 PALE = "#D5EBF8"
+LEFT_OUT = "#ECECEC"
 _LEFT, _RIGHT, _TOP, _BELOW, _BAR, _LEGEND = 0.72, 0.12, 0.34, 0.52, 0.95, 0.24
 _TALLEST = 6.5
 # Free room around what is shown, as a share of its size; with a mechanism there are symbols that reach beyond points.
@@ -54,6 +56,8 @@ class Region:
     held : mapping of str to float
     row : int
         Its row of the table of indices.
+    others : (Table, Table) or None
+        Grids and boundary of pieces that are left out.
     """
 
     title: str
@@ -62,19 +66,24 @@ class Region:
     local: Table
     boundary: Table
     singularities: Table | None
+    others: tuple[Table, Table] | None = None
 
     def grids(self, column: str) -> Iterator[Grid]:
         """x, y and a column of each patch, shape (rays, nodes)."""
-        for patch in np.unique(self.local["patch"]):
-            rows = self.local["patch"] == patch
-            shape = (int(self.local["ray"][rows].max()) + 1, int(self.local["node"][rows].max()) + 1)
-            x, y, z = (self.local[name][rows].reshape(shape) for name in ("x", "y", column))
-            yield x, y, z
+        return _grids(self.local, column)
 
     def places(self) -> NDArray[np.complex128]:
-        """Every place of the region's grid and outline."""
-        found = [table["x"] + 1j * table["y"] for table in (self.local, self.boundary)]
+        """Every place of the region's grid and outline, and of what is left out."""
+        found = [table["x"] + 1j * table["y"] for table in (self.local, self.boundary, *(self.others or ()))]
         return np.concatenate(found)
+
+
+def _grids(local: Table, column: str) -> Iterator[Grid]:
+    for patch in np.unique(local["patch"]):
+        rows = local["patch"] == patch
+        shape = (int(local["ray"][rows].max()) + 1, int(local["node"][rows].max()) + 1)
+        x, y, z = (local[name][rows].reshape(shape) for name in ("x", "y", column))
+        yield x, y, z
 
 
 def regions(study: Study, result: Result) -> list[Region]:
@@ -92,10 +101,12 @@ def regions(study: Study, result: Result) -> list[Region]:
             f"{name} = {value:g} {study.units.label(study.mechanism.quantity(name))}".strip()
             for name, value in values.items()
         )
-        found.append(
-            Region(title, values, row, local, pick(result.tables["boundary"], values),
-                   pick(lines, values) if lines is not None and len(lines) else None)
-        )  # fmt: skip
+        boundary, others = pick(result.tables["boundary"], values), None
+        if study.workspace is not None and study.workspace.assembly == "same" and (local["piece"] > 1).any():
+            others = _rows(local, local["piece"] > 1), _rows(boundary, boundary["piece"] > 1)
+            local, boundary = _rows(local, local["piece"] == 1), _rows(boundary, boundary["piece"] == 1)
+        loci = pick(lines, values) if lines is not None and len(lines) else None
+        found.append(Region(title, values, row, local, boundary, loci, others))
     return found
 
 
@@ -104,6 +115,10 @@ def pick(table: Table, values: Mapping[str, float]) -> Table:
     rows = np.ones(len(table), dtype=bool)
     for name, value in values.items():
         rows &= table[name] == value
+    return _rows(table, rows)
+
+
+def _rows(table: Table, rows: NDArray[np.bool_]) -> Table:
     columns = tuple(type(c)(c.name, np.asarray(c.values)[rows], c.unit, c.meaning) for c in table.columns)
     return Table(table.name, columns, table.meaning)
 
@@ -125,8 +140,16 @@ def fate(kind: str, at: str) -> str:
 
 
 def outline(axes: Axes, region: Region, *, width: float = 1.5) -> set[str]:
-    """Draw a region's boundary, coloured by what ends it; returns the fates that occur."""
-    return outline_of(axes, region.boundary, width=width)
+    """Draw a region's boundary, coloured by what ends it, and faintly what is left out; returns what occurs."""
+    seen = outline_of(axes, region.boundary, width=width)
+    if region.others is not None:
+        local, boundary = region.others
+        for x, y, _ in _grids(local, "det_J"):
+            axes.fill(*_edge(x, y), color=LEFT_OUT, linewidth=0, antialiased=False, zorder=0.9)
+        for rows in curves(boundary):
+            axes.plot(boundary["x"][rows], boundary["y"][rows], color=style.FAINT, linewidth=0.8, zorder=2.8)
+        seen.add("other")
+    return seen
 
 
 def outline_of(axes: Axes, boundary: Table, *, width: float = 1.5) -> set[str]:
@@ -154,7 +177,8 @@ def loci(axes: Axes, region: Region) -> set[str]:
     if table is None:
         return set()
     seen = set()
-    edge = region.boundary["x"] + 1j * region.boundary["y"]
+    every = [region.boundary, *(region.others or ())[1:]]
+    edge = np.concatenate([table["x"] + 1j * table["y"] for table in every])
     near = 1e-7 * float(np.abs(region.places()).max())
     for rows in curves(table):
         middle = complex(table["x"][rows[len(rows) // 2]], table["y"][rows[len(rows) // 2]])
@@ -171,8 +195,12 @@ def loci(axes: Axes, region: Region) -> set[str]:
 def fill(axes: Axes, region: Region) -> None:
     """Fill the region in a pale colour."""
     for x, y, _ in region.grids("det_J"):
-        edge = [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
-        axes.fill(*edge, color=PALE, linewidth=0, antialiased=False)
+        axes.fill(*_edge(x, y), color=PALE, linewidth=0, antialiased=False)
+
+
+def _edge(x: Floats, y: Floats) -> list[Floats]:
+    """Coordinates along both curves of a patch."""
+    return [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
 
 
 def keys(fates: set[str], kinds: set[str]) -> list[Line2D]:

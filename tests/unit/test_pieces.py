@@ -1,0 +1,241 @@
+"""Regions of several pieces: which count, against formulas of the mechanisms and a flood fill on a fine grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+from scipy import ndimage
+
+import mechdesign
+from mechdesign.analyses.optimize.goals import Evaluator, goal
+from mechdesign.analyses.workspace.nodes import workspace_nodes
+from mechdesign.results import Result
+
+FIVE_BAR = """
+units: {length: dimensionless}
+mechanism:
+  parameters: {a: 0.25, b: 0.4, h: 0.15, low: 30, high: 200}
+  links:
+    ground: {A: [-h, 0], B: [h, 0]}
+    left: [A, C, a]
+    right: [B, D, a]
+    fore_left: [C, P, b]
+    fore_right: [D, P, b]
+  drives: {t1: {angle: left}, t2: {angle: right}}
+  limits: [{drive: t1, min: low, max: high}, {drive: t2, min: 180 - high, max: 180 - low}]
+  sketch: {C: [-0.3, 0.2], D: [0.3, 0.2], P: [0, 0.48]}
+workspace: {point: P, scan: {about: [0.05, 0.45]}}
+"""
+LEGS = """
+units: {length: dimensionless}
+mechanism:
+  parameters: {low: 1.2, high: 1.6}
+  measures: {d: C.x*C.y, across: (C.x - 0.5)*C.x}
+  links:
+    ground: {B1: [1, 0], B2: [-1, 0]}
+    leg_1: {from: B1, to: C, telescopic: true}
+    leg_2: {from: B2, to: C, telescopic: true}
+  drives: {l1: {length: leg_1}, l2: {length: leg_2}}
+  limits: [{drive: l1, min: low, max: high}, {drive: l2, min: low, max: high}]
+  sketch: {C: [0, 1]}
+workspace: {point: C, scan: {about: [0, 0]}, assembly: same, indices: []}
+"""
+WIDE = "{drive: l1, min: 0.2, max: 3}, {drive: l2, min: 0.2, max: 3}"
+ARM = """
+units: {length: dimensionless}
+mechanism:
+  parameters: {low: 0.9, high: 2}
+  links: {ground: {O: [0, 0], W: [1.2, 0]}, upper: [O, E, 1.5], lower: [E, P, 1]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
+  limits: [{distance: [W, P], min: low, max: high}]
+  sketch: {E: [-1, 1], P: [-2, 1]}
+workspace: {point: P, scan: {about: [0, 0]}, indices: [sigma_min]}
+"""
+CELLS = 1600
+Inside = Callable[[np.ndarray], np.ndarray]
+
+
+def five_bar(low: float = 30, high: float = 200) -> Inside:
+    """Elbows out, motors within limits, one side of the singularity: legs solved here."""
+
+    def inside(z: np.ndarray) -> np.ndarray:
+        elbows, good = [], np.ones(z.shape, dtype=bool)
+        for base, side, start in ((-0.15, 1, low), (0.15, -1, 180 - high)):
+            k = z - base
+            cosine = (0.25**2 + np.abs(k) ** 2 - 0.4**2) / (2 * 0.25 * np.abs(k))
+            good &= np.abs(cosine) < 1
+            angle = np.angle(k) + side * np.arccos(np.clip(cosine, -1, 1))
+            good &= np.radians(high - low) > (angle - np.radians(start)) % (2 * np.pi)
+            elbows.append(base + 0.25 * np.exp(1j * angle))
+        return np.asarray(good & ((np.conj(z - elbows[0]) * (z - elbows[1])).imag > 0))
+
+    return inside
+
+
+def legs(low: float, high: float) -> Inside:
+    def inside(z: np.ndarray) -> np.ndarray:
+        one, two = np.abs(z - 1), np.abs(z + 1)
+        return np.asarray((np.minimum(one, two) > low) & (np.maximum(one, two) < high) & (z.imag > 0))
+
+    return inside
+
+
+class Filled:
+    """Pieces of a region on a grid of cells of a square: areas, and the piece at a place."""
+
+    def __init__(self, inside: Inside, half: float) -> None:
+        self.half, self.cell = half, 2 * half / CELLS
+        x = (np.arange(CELLS) + 0.5) * self.cell - half
+        good = inside(x + 1j * x[:, None])
+        self.label, _ = ndimage.label(good)
+        self.areas = np.bincount(self.label.ravel()) * self.cell**2
+        # Cells that the boundary meets may be counted wrongly by half of their area.
+        edge = good ^ ndimage.binary_erosion(good)
+        self.doubt = 0.3 * np.bincount(self.label[edge], minlength=len(self.areas)) * self.cell**2
+
+    def at(self, x: float, y: float) -> int:
+        row, column = (int((v + self.half) / self.cell) for v in (y, x))
+        return int(self.label[row, column])
+
+
+def check(result: Result, filled: Filled, number: int) -> None:
+    """Every piece has the area of the flood fill's piece at its place, and the indices are of the first."""
+    main, pieces = result.main, result.tables["pieces"]
+    assert pieces["piece"].tolist() == list(range(1, number + 1))
+    there = [filled.at(x, y) for x, y in zip(pieces["x"], pieces["y"], strict=True)]
+    assert 0 not in there
+    assert len(set(there)) == number
+    for area, k in zip(pieces["area"], there, strict=True):
+        assert abs(area - filled.areas[k]) < filled.doubt[k]
+    assert (np.diff(pieces["area"][1:]) <= 1e-4 * pieces["area"].sum()).all()
+    assert main["area"][0] == pytest.approx(pieces["area"][0], rel=2e-6)
+    local, boundary = result.tables["local"], result.tables["boundary"]
+    x, y = (boundary[name][boundary["piece"] == 1] for name in ("x", "y"))
+    assert main["box_area"][0] == pytest.approx(np.ptp(x) * np.ptp(y), rel=1e-3)
+    assert set(local["piece"]) == set(boundary["piece"]) == set(range(1, number + 1))
+    for x, y, piece in list(zip(local["x"], local["y"], local["piece"], strict=True))[16::33]:
+        # In their thin tips pieces fall into many on a grid.
+        assert filled.at(x, y) not in {*there} - {there[piece - 1]}
+    (warning,) = result.warnings
+    assert f"has {number} pieces" in warning
+    assert f"{pieces['area'][1:].sum():.4g}" in warning
+
+
+@pytest.mark.parametrize("about", ["[0, 0]", "[0.05, 0.45]", "[0.7, 0.1]", "[0, -0.3]"])
+def test_two_pieces_of_equal_determinant_signs(about: str) -> None:
+    """Limits of the motors cut what the assembly leaves in two: seen from inside, from between, and from outside."""
+    result = mechdesign.workspace(study_of(FIVE_BAR, f"workspace.scan.about={about}", "workspace.indices=[]"))
+    check(result, Filled(five_bar(), 0.85), 2)
+    assert result.tables["pieces"]["sketch"].tolist() == [1, 0]
+    # The circle and the rectangle lie in the upper piece, too.
+    assert result.main["circle_y"][0] - result.main["circle_radius"][0] > 0
+    assert result.main["rectangle_y"][0] > 0.2
+
+
+def test_means_and_extremes_are_of_the_sketchs_piece() -> None:
+    """As of a scan that meets nothing else."""
+    text = (FIVE_BAR, "workspace.indices=[inverse_condition, resistivity]")
+    one = mechdesign.workspace(study_of(*text)).main
+    alone = mechdesign.workspace(study_of(*text, "workspace.scan={about: [0, 0], from: 0, to: 180}"))
+    assert "pieces" not in alone.tables
+    assert not alone.warnings
+    for name in ("GII", "GRI", "SUI", "area", "box_area", "inverse_condition_std", "resistivity_min"):
+        assert one[name][0] == pytest.approx(alone.main[name][0], rel=1e-4), name
+
+
+def test_a_piece_over_angle_zero_is_one() -> None:
+    """Two lenses left and right of a gap along the vertical, seen from the middle: the right one lies about angle 0."""
+    limits = f"mechanism.limits=[{WIDE}, {{measure: across, min: 0.2}}]"
+    text = (LEGS, limits, "mechanism.sketch.C=[-1.2, 1]", "workspace.scan.about=[0.1, 0.6]")
+    result = mechdesign.workspace(study_of(*text))
+
+    def inside(z: np.ndarray) -> np.ndarray:
+        one, two = np.abs(z - 1), np.abs(z + 1)
+        good = (one > 0.2) & (two > 0.2) & (one < 3) & (two < 3) & (z.imag > 0)
+        return np.asarray(good & ((z.real - 0.5) * z.real > 0.2))
+
+    check(result, Filled(inside, 3.1), 2)
+    assert result.tables["pieces"]["sketch"].tolist() == [1, 0]
+    assert result.tables["pieces"]["x"][0] < 0 < result.tables["pieces"]["x"][1]
+
+
+def test_pieces_that_touch_in_the_centre_of_the_scan_are_two() -> None:
+    """x y > 0 within two rings about bases on the axis: opposite quadrants meet in one point."""
+    limits = f"mechanism.limits=[{WIDE}, {{measure: d, min: 0}}]"
+    for about in ("[0, 0]", "[0.4, 0.7]"):
+        # In any assembly both quadrants are reached, and count together.
+        text = (LEGS, limits, f"workspace.scan.about={about}", "workspace.assembly=any", "mechanism.sketch.C=[0.3, 1]")
+        result = mechdesign.workspace(study_of(*text))
+        pieces = result.tables["pieces"]
+        assert pieces["area"] == pytest.approx(np.full(2, result.main["area"][0] / 2), rel=1e-5)
+        assert pieces["x"][0] > 0 > pieces["x"][1]
+        assert not result.warnings
+
+
+def test_a_hole_that_cuts_a_ring_in_two() -> None:
+    """A narrow ring about a wall's pin: the arm's hole divides it on one side, and its farthest reach on the other."""
+    text = (ARM, "mechanism.parameters={low: 1.32, high: 1.45}", "mechanism.sketch={E: [0, 1.5], P: [1.2, 1.4]}")
+    result = mechdesign.workspace(study_of(*text))
+
+    def inside(z: np.ndarray) -> np.ndarray:
+        wall = np.abs(z - 1.2)
+        return np.asarray((np.abs(z) > 0.5) & (np.abs(z) < 2.5) & (wall > 1.32) & (wall < 1.45))
+
+    check(result, Filled(inside, 2.6), 2)
+    assert result.tables["pieces"]["sketch"].tolist() == [1, 0]
+    assert result.tables["pieces"]["y"][0] > 0
+
+
+def test_the_largest_piece_counts_where_the_sketch_lies_in_none() -> None:
+    """Drawn in the gap, right of its middle."""
+    limits = f"mechanism.limits=[{WIDE}, {{measure: across, min: 0.2}}]"
+    result = mechdesign.workspace(study_of(LEGS, limits, "mechanism.sketch.C=[0.25, 1]"))
+    pieces = result.tables["pieces"]
+    assert pieces["sketch"].tolist() == [0, 0]
+    assert pieces["area"][0] > 1.1 * pieces["area"][1]
+    assert pieces["x"][0] < 0 < pieces["x"][1]
+    assert result.main["area"][0] == pytest.approx(pieces["area"][0], rel=2e-6)
+    assert "largest" in result.warnings[0]
+
+
+def test_one_piece_makes_no_table() -> None:
+    result = mechdesign.workspace(study_of(ARM, "mechanism.limits=[]"))
+    assert "pieces" not in result.tables
+    assert set(result.tables["local"]["piece"]) == {1}
+    assert not result.warnings
+
+
+def values(names: Sequence[str], changes: dict[str, np.ndarray], text: str) -> dict[str, np.ndarray]:
+    ranges = ", ".join(f"{name}: {{from: 0, to: 400, number: 2}}" for name in changes)
+    study = study_of(text, f"optimize={{variables: {{{ranges}}}, maximize: [{', '.join(names)}]}}")
+    goals = [goal(name, smallest=False) for name in names]
+    found = Evaluator(study, goals)(changes)
+    assert not any(found.reasons)
+    return {name: found.values[each] for name, each in zip(names, goals, strict=True)}
+
+
+def test_optimize_judges_the_piece_that_workspace_reports() -> None:
+    """Designs of one, two and three pieces in a batch, each beside a study of its own."""
+    names = ("GII", "SUI", "workspace.area", "workspace.resistivity_min")
+    changes = {"low": np.array([30.0, 60.0, 30.0]), "high": np.array([200.0, 170.0, 340.0])}
+    together = values(names, changes, FIVE_BAR.replace("{point", "{indices: [inverse_condition, resistivity], point"))
+    several = 0
+    for k in range(3):
+        own = [f"mechanism.parameters.{name}={float(column[k])}" for name, column in changes.items()]
+        result = mechdesign.workspace(study_of(FIVE_BAR, *own, "workspace.indices=[inverse_condition, resistivity]"))
+        several += "pieces" in result.tables
+        for name in names:
+            alone = result.main[name.removeprefix("workspace.")][0]
+            assert together[name][k] == pytest.approx(alone, rel=3e-4), (name, k)
+    assert several == 2
+
+
+def test_poses_all_over_the_workspace_are_of_the_same_piece() -> None:
+    poses = workspace_nodes(study_of(FIVE_BAR))
+    (group,) = poses.groups
+    filled = Filled(five_bar(), 0.85)
+    z = group.values["P.x"] + 1j * group.values["P.y"]
+    assert filled.at(0, -0.25) not in {0, *(filled.at(p.real, p.imag) for p in z)}
