@@ -53,7 +53,7 @@ def test_the_schema_accepts_the_shipped_studies(path, validator):
         "mechanism: {links: {ground: {from: O, to: A, lenght: 3}}}",
         "mechanism: {links: {}, branch: no}",
         "kinematics: {}",
-        "mechanism: {links: {ground: {O: [0, 0]}}}\nreliability: {methods: [form]}",
+        "mechanism: {links: {ground: {O: [0, 0]}}}\nreliability: {methods: [forms]}",
     ],
 )
 def test_the_schema_refuses_what_the_loader_refuses(text, validator, tmp_path):
