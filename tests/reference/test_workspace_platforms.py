@@ -182,3 +182,51 @@ def test_a_held_value_that_cannot_be_reached_is_an_empty_row(measures: str) -> N
     assert f"{name} = 175" in warning
     with pytest.raises(AssemblyError, match="reaches nothing"):
         mechdesign.workspace(study_of(RPR, changes[0], f"workspace.at={{{name}: [175]}}"))
+
+
+def aligned(z: np.ndarray, phi: float, cranked: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Whether the legs reach at one orientation, and the determinant of the lines along legs (or rods), written out.
+
+    It is zero where the three lines meet in one point or are parallel: C. M. Gosselin and J. Angeles, Singularity
+    analysis of closed-loop kinematic chains, IEEE Trans. Robotics and Automation 6 (1990).
+    """
+    turn, good, rows = np.exp(1j * phi), np.ones(z.shape, dtype=bool), []
+    elbows = (0.36 - 0.05j, 0.9 + 0.38j, 0.3 + 0.7j)
+    for base, corner, elbow in zip(BASES, CORNERS, elbows, strict=True):
+        line = z + turn * corner - base
+        size = np.abs(line)
+        good &= (size >= CRANK - ROD) & (size <= CRANK + ROD) if cranked else (size >= 0.3) & (size <= 0.75)
+        if cranked:
+            drawn = 0.5 + 0.34j + corner - base
+            side = np.sign(np.imag(np.conj(drawn) * (elbow - base)))
+            cosine = np.clip((size**2 + CRANK**2 - ROD**2) / (2 * CRANK * size), -1, 1)
+            line = line - CRANK * line / size * np.exp(1j * side * np.arccos(cosine))
+        rows.append((line.real, line.imag, np.imag(np.conj(turn * corner) * line)))
+    return good, np.linalg.det(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
+
+
+@pytest.mark.parametrize("every", [False, True])
+@pytest.mark.parametrize(("study", "held", "cranked", "drawn", "span"), [
+    (RPR, "[0, 15, -30]", False, 0.52 + 0.34j, (-20, -5)),
+    (RRR, "[0, 20, -30]", True, 0.5 + 0.34j, (-10, 25)),
+])  # fmt: skip
+def test_over_a_range_the_assembly_of_the_sketch(
+    study: str, held: str, cranked: bool, drawn: complex, span: tuple[float, float], every: bool
+) -> None:
+    """Where the determinant keeps the sign it has in the sketch: by counted orientations of random points."""
+    at = f"{{from: {span[0]}, to: {span[1]}, all: {str(every).lower()}}}"
+    section = study.replace(held, at).replace("assembly: any", "assembly: same")
+    (area,), (error,) = (mechdesign.workspace(study_of(section)).main[name] for name in ("area", "area_error"))
+    z = np.random.default_rng(4).uniform((0, -0.2), (1, 0.9), (40_000, 2)) @ np.array([1, 1j])
+    sign = np.sign(aligned(np.array([drawn]), 0.0, cranked)[1])
+    held_there = np.full(z.shape, every)
+    for phi in np.radians(np.linspace(*span, 241)):
+        good, determinant = aligned(z, phi, cranked)
+        good &= determinant * sign > 0
+        held_there = held_there & good if every else held_there | good
+    share = held_there.mean()
+    # Four standard deviations; between the orientations that are counted there is a little more (or less).
+    doubt = 4 * 1.1 * np.sqrt(share * (1 - share) / len(z)) + 1e-3 * area
+    assert error <= 2e-6 * area
+    assert area > 0
+    assert abs(area - 1.1 * share) <= doubt + error

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.meetings import ACCURACY, Meetings
+from mechdesign.analyses.workspace.meetings import Meetings
 from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, trace
 
 # Panel ends nearer to each other than this are one (radians): what lies between them is lost in rounding.
@@ -69,7 +69,7 @@ class Search:
         owners, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
         codes, doubted = signatures(intervals, len(field.labels)), np.zeros(len(design), dtype=bool)
         while True:
-            small = high - low <= ACCURACY
+            small = high - low <= self.designs.field.accuracy
             owners.append(design[small])
             places.append(0.5 * (low + high)[small])
             left, design, doubted = left[~small], design[~small], doubted[~small]

@@ -15,13 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.workspace.meetings import ROOTS, parabola
 from mechdesign.analyses.workspace.rays import Floats, Ints
 
 # Margins (margins + 2, n) of rays at radii and values; the last two are zero at the lower and upper end of the range.
 Margins = Callable[[Ints, Floats, Floats], Floats]
 # Intervals of the range at radii: ray, ends of shape (2, n), and the margins that are zero there.
 Cut = Callable[[Ints, Floats], tuple[Ints, Floats, Ints]]
-STEPS, ROUNDS, OPEN = 12, 14, 3
+STEPS, ROUNDS, OPEN = 12, 8, 3
+# How much of what is not known is gone into where that is much more than has been gone.
+NEARER, SHORT = 4.0, 0.06
+# Part of the way to where intervals seem to vanish; so near (of the reach) they do.
+SHARE, NARROW = 0.99, 1e-11
 # Steps of differences: of the reach, and of the step between two values.
 STEP = (1e-5, 1e-3)
 # A step of Newton's method is no longer than this (of reach, and steps between values).
@@ -34,6 +39,8 @@ BELOW = 1e-9
 SLACK = 1e-12
 # The first cut is so far inside (of the reach, and of what is known to be inside), a later one so far beyond.
 INSET, WITHIN, BEYOND = 1e-8, 0.25, 1e-9
+# Distance from where a margin ends with a square root (of the reach) at which it is looked at: at least and at most.
+NEAR = (1e-8, 1e-3)
 # Places of differences, in steps of radius and value.
 STENCIL = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1))
 
@@ -56,6 +63,8 @@ class Starts:
     reach : ndarray
     step : float
         Between two values.
+    singular : ndarray of bool, shape (margins + 2,)
+        Margins where others end with a square root.
     """
 
     radius: Floats
@@ -66,6 +75,7 @@ class Starts:
     outwards: Floats
     reach: Floats
     step: float
+    singular: NDArray[np.bool_]
 
 
 def extended(margins: Margins, cut: Cut, at: Starts, alone: bool) -> tuple[Floats, Floats, Ints]:
@@ -85,6 +95,8 @@ def extended(margins: Margins, cut: Cut, at: Starts, alone: bool) -> tuple[Float
     # Whether an extreme is known, just beyond which is looked.
     known, left = np.zeros(n, dtype=bool), np.arange(n)
     probe = radius + out * BEYOND * at.reach
+    # Where a cut was looked at last that had no solution, and how narrow it was there.
+    before, breadth = np.full(n, np.nan), np.full(n, np.nan)
     for attempt in range(ROUNDS):
         if not left.size:
             break
@@ -113,8 +125,24 @@ def extended(margins: Margins, cut: Cut, at: Starts, alone: bool) -> tuple[Float
         # forbids, or to what is not known.
         ahead = np.where(clear, r + out[ray] * BEYOND * at.reach[ray], 0.5 * (probe[ray] + r))
         next_one = _farthest(ray, out[ray] * ahead, solved)
-        probe[left] = 0.5 * (inside + outside)[left]
+        wide = _farthest(ray, ends[1] - ends[0], ~np.isin(ray, ray[best]))
+        mine, here, width = ray[wide], probe[ray[wide]], (ends[1] - ends[0])[wide]
+        # A margin ends with a square root nearby: by how intervals get narrower, quadratically at an envelope.
+        width = np.where(names[0, wide] == names[1, wide], width**2, width)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            top = here + width * (here - before[mine]) / (breadth[mine] - width)
+        before[mine], breadth[mine] = here, width
+        far = out[mine] * (top - here)
+        met_there = (far >= 0) & (far <= NARROW * at.reach[mine])
+        done[mine[met_there]] = known[mine[met_there]] = True
+        radius[mine[met_there]], value[mine[met_there]] = top[met_there], ends.mean(axis=0)[wide[met_there]]
+        pair[:, mine[met_there]] = names[:, wide[met_there]]
+        gap, gone = np.abs(outside - inside)[left], np.abs(inside - at.radius)[left]
+        share = np.where(shut[left] & (gap > NEARER * gone), SHORT, 0.5)
+        probe[left] = inside[left] + out[left] * share * gap
         probe[ray[next_one]] = ahead[next_one]
+        towards = (far > 0) & (far < np.abs(outside - inside)[mine])
+        probe[mine[towards]] = (here + SHARE * (top - here))[towards]
         if attempt == 0:
             probe[missed] = inside[missed]
         lost[np.setdiff1d(met, ray[next_one])] += 1
@@ -153,6 +181,10 @@ def _newton(
     """Radius and value where two margins are zero, or one and its slope over the range; if met; if it is extreme."""
     r, v = radius.copy(), value.copy()
     good, left = np.zeros(len(rays), dtype=bool), np.arange(len(rays))
+    # First the one that others end at with a square root.
+    swap = at.singular[names[1]] & ~at.singular[names[0]]
+    one, two = np.where(swap, names[::-1], names)
+    rooted = at.singular[one] & ~at.singular[two] & (two < len(at.singular) - 2)
     # Whether a radius is extreme: its bend over the range, or forces of both margins that hold it (multipliers).
     extreme = np.zeros(len(rays), dtype=bool)
     reach = at.reach[rays]
@@ -162,8 +194,8 @@ def _newton(
         h, k, lane = STEP[0] * reach[left], STEP[1] * at.step, np.arange(len(left))
         place = np.stack([r[left] + i * h for i, _ in STENCIL]), np.stack([v[left] + j * k for _, j in STENCIL])
         found = margins(rays[left], *place)
-        m, p = (found[name[left], :, lane].T for name in names)
-        envelope = names[0, left] == names[1, left]
+        m, p = (found[name[left], :, lane].T for name in (one, two))
+        envelope = (one == two)[left]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             g1, g1r, g1v = m[0], (m[1] - m[2]) / (2 * h), (m[3] - m[4]) / (2 * k)
             mixed = (m[5] + m[6] + 2 * m[0] - m[1] - m[2] - m[3] - m[4]) / (2 * h * k)
@@ -171,10 +203,21 @@ def _newton(
             g2 = np.where(envelope, g1v, p[0])
             g2r = np.where(envelope, mixed, (p[1] - p[2]) / (2 * h))
             g2v = np.where(envelope, bend, (p[3] - p[4]) / (2 * k))
+            # Of what has a square root where the first is zero: its value there, and its slope in the root.
+            root, slope = np.flatnonzero(rooted[left]), np.full(len(left), -1.0)
+            if root.size:
+                which = left[root]
+                curve = r[which] - m[[0, 3, 4]][:, root] / g1r[root]
+                near = np.clip(np.abs(g1 / g1r)[root], NEAR[0] * reach[which], NEAR[1] * reach[which])
+                values = v[which] + np.array([[0], [1], [-1]]) * k
+                end, slope[root] = _at_root(
+                    margins, rays[which], (one[which], two[which]), curve, values, near * np.sign(g1r[root])
+                )
+                g2[root], g2r[root], g2v[root] = end[0], 0.0, (end[1] - end[2]) / (2 * k)
             det = g1r * g2v - g1v * g2r
             dr, dv = -(g1 * g2v - g2 * g1v) / det, -(g1r * g2 - g2r * g1) / det
             out = at.outwards[rays[left]]
-            corner = (out * g2v / det <= 0) & (out * g1v / det >= 0)
+            corner = (out * g2v / det <= 0) & (out * g1v / det >= 0) & (slope < 0)
             extreme[left] = np.where(envelope, (out * g1r < 0) & (bend < 0), corner)
             short = np.minimum(1.0, LONGEST[1] * at.step / np.abs(dv))
             short = np.minimum(short, LONGEST[0] * reach[left] / np.abs(dr))
@@ -187,3 +230,17 @@ def _newton(
         good[left[met]] = True
         left = left[~met]
     return r, v, good, extreme
+
+
+def _at_root(
+    margins: Margins, rays: Ints, pair: tuple[Ints, Ints], curve: Floats, value: Floats, near: Floats
+) -> tuple[Floats, Floats]:
+    """What a margin is where another one is zero at radii `curve`, shape (3, n), and its slope in the other's root.
+
+    The slope is of the first of the three, shape (n,).
+    """
+    lane = np.arange(len(rays))
+    found = margins(rays, curve + near * ROOTS[:, None, None], np.broadcast_to(value, (3, *value.shape)))
+    leading, led = (np.moveaxis(found[name, :, :, lane], 0, -1) for name in pair)
+    end, slope, _ = parabola(np.sqrt(leading), led)
+    return end, slope[0]

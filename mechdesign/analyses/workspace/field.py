@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,8 @@ class Field:
     held: tuple[float, ...] = ()
     same_assembly: bool = True
     length: float | None = None
+    # Angles of rays at which the margins that bound the region change are wanted to this accuracy (radians).
+    accuracy: ClassVar[float] = 1e-13
 
     @property
     def outputs(self) -> Sequence[Coordinate]:

@@ -18,8 +18,6 @@ from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.workspace.field import Places
 from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints
 
-# Angles are wanted to this accuracy (radians).
-ACCURACY = 1e-13
 # They meet on a ray itself where what should be zero is this small a part of what it is on the other ray.
 ZERO = 1e-11
 # Distances between the samples by which a curve is approached, step by step: parts of the reach; where a ray touches,
@@ -111,7 +109,7 @@ class Meetings:
         none = np.full(len(use), np.nan)
         angles = bracketed_roots(
             lambda which, theta: ahead(use[which], theta), begin[use], at_begin[use], end[use], at_end[use],
-            none, none, np.full(len(use), ACCURACY),
+            none, none, np.full(len(use), designs.field.accuracy),
         )  # fmt: skip
         return self.pair[use], angles
 
@@ -132,7 +130,7 @@ class Meetings:
             x = near * np.where(touching, AROUND[:, None], ROOTS[:, None] * side)
             margins = designs.field.margins(designs.about + (radius + x) * turn, places, assembly=assembly)
             value, rival = margins[curve, :, lane].T, margins[other, :, lane].T
-            a, b, c = _parabola(x, value)
+            a, b, c = parabola(x, value)
             with np.errstate(invalid="ignore", divide="ignore"):
                 top = np.where(c * side < 0, -0.5 * b / c, np.nan)
                 nearest = -2 * a / (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
@@ -141,7 +139,7 @@ class Meetings:
                 break
             radius = radius + np.clip(step, -FARTHEST * reach, FARTHEST * reach)
         with np.errstate(invalid="ignore"):
-            zero_too = _parabola(np.sqrt(value), rival)[0]
+            zero_too = parabola(np.sqrt(value), rival)[0]
         found: Floats = np.where(touching, side * (a + 0.5 * b * top), np.where(central, b * reach, zero_too))
         return found
 
@@ -209,7 +207,7 @@ def _closing(longer: tuple[list[int], Floats], shorter: tuple[list[int], Floats]
     return [(int(first), np.flatnonzero(best == first)) for first in np.unique(best)]
 
 
-def _parabola(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+def parabola(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     """Coefficients of a + b x + c x^2 through three points (first axis)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         one, two = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])

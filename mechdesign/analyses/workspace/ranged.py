@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,8 @@ class Endings(Field):
     low: float = 0.0
     high: float = 0.0
     every: bool = False
+    # A kink so little inside a panel costs no more than its square; nearer to where labels change, rounding chooses.
+    accuracy: ClassVar[float] = 1e-7
 
     @cached_property
     def sliced(self) -> Sliced:
@@ -84,6 +87,9 @@ class Endings(Field):
 @dataclass(frozen=True, eq=False)
 class RangedDesigns(Designs):
     """Rays through a region over a range: `field` is of `Endings`, and so are the labels of what rays meet."""
+
+    # A kink so far inside a panel costs less than its square; nearer to where labels change, noise chooses them.
+    accuracy: ClassVar[float] = 1e-7
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
         """As `Designs.traced`."""
@@ -130,6 +136,7 @@ class RangedDesigns(Designs):
             ends[side, which], value[side, which], (ends[1] - ends[0])[which],
             np.stack([labels, at_end])[:, side, which], limit[side, which],
             np.where(side, 1.0, -1.0), reach[owner], (field.high - field.low) / (VALUES - 1),
+            np.append(field.sliced.singular, [False, False]),
         )  # fmt: skip
         across = Across(field.sliced, theta[owner], self.about, field.low, field.high, field.every, labels[side, which])
         radius, at, pair = extended(across.margins, across.cut, start, field.every)
