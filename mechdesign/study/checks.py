@@ -232,8 +232,9 @@ class Checker:
                 self.kind(path, _STIFFNESS_KINDS[self.names.drives[drive]])
         for joint, bearing in section.bearings.items():
             path = (*root, "bearings", joint)
-            slides = [*self.names.section.joints, *(n for n, k in self.names.section.links.items() if k.telescopic)]
-            pins = [point for point, owners in self.names.owners.items() if len(owners) > 1]
+            slides = [*self.names.slides, *self.names.legs]
+            clamped = [set(other.fixed) for other in self.names.section.joints.values() if other.fixed is not None]
+            pins = [p for p, owners in self.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
             if self.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
                 self.kind(path, "stiffness")
                 self.kind((*path, "radial"), "stiffness")

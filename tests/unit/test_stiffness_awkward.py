@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 from mechdesign.analyses.poses import solve_poses
 from mechdesign.analyses.stiffness.analysis import ask
 from mechdesign.analyses.stiffness.force_method import load, twists_of
+from mechdesign.errors import StudyError
 from mechdesign.results import Result
 
 BEAM = "sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}"
@@ -422,3 +423,18 @@ def test_an_arm_held_rigidly_all_along_is_rigid() -> None:
     assert not matrix(result, "C").any()
     assert result.tables["deflections"]["dx"].tolist() == [0]
     assert np.isfinite(result.tables["forces"]["fx"]).all()
+
+
+@pytest.mark.parametrize("name", ["grip", "B"])
+def test_a_clamp_has_no_bearing(name: str) -> None:
+    with pytest.raises(StudyError, match=f"no pin or slide '{name}'"):
+        ask_stiffness(BOOM, f"stiffness.bearings={{{name}: 1e6}}")
+
+
+def test_a_pivot_on_a_rigid_ground_does_not_move_at_all() -> None:
+    """Asked at its own foot a leg turns there, and nothing else."""
+    text = TRIPOD.replace("link: platform", "link: leg_1").replace("at: P", "at: A1")
+    compliance = matrix(ask_stiffness(text), "C")
+    assert compliance[2, 2] > 0
+    compliance[2, 2] = 0
+    assert not compliance.any()

@@ -13,6 +13,9 @@ from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.study.stiffness_models import Profile, StiffnessSection
 
+# A point this many times as far from the joints as they lie apart is far away.
+FAR = 10.0
+
 
 def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]) -> Chain:
     """A leg's joints and elastic elements in each pose, seen from places `at`."""
@@ -24,6 +27,17 @@ def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration, 
         configuration.point(leg.base) - at,
         configuration.point(leg.tip) - at,
     )
+
+
+def looked_at_from(
+    points: Iterable[str], at: NDArray[np.complex128], configuration: Configuration, length: float
+) -> NDArray[np.complex128]:
+    """From where joints are seen: the asked point, or their middle where that is far from them, and would hide them."""
+    places = [configuration.point(point) for point in dict.fromkeys(points)]
+    if not places:
+        return at
+    middle = sum(places[1:], places[0]) / len(places)
+    return np.asarray(np.where(np.abs(at - middle) > FAR * length, middle, at))
 
 
 def freedoms(

@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.stiffness.chains import freedoms
+from mechdesign.analyses.stiffness.chains import freedoms, looked_at_from
 from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import RANK, RIGID, Array
@@ -39,7 +39,7 @@ class Twists:
     ----------
     network : Network
     twist : ndarray, shape (n, 3, freedoms)
-        Seen from the middle of the joints; of a pin, from the pin.
+        Seen from the asked point, or from the middle of the joints where that is far away.
     compliance : ndarray, shape (n, freedoms)
         0 of free joints, which `free` marks.
     edge : ndarray of int, shape (freedoms,)
@@ -97,13 +97,13 @@ class Loaded:
         """Twist of each vertex about the asked point, a column for each unit load, shape (n, 3, size)."""
         twists, size = self.twists, self.stress.shape[2]
         scale = np.array([1.0, 1.0, 1.0 / twists.length])
-        there = moved_to(twists.arm)
-        return {
-            vertex: there
-            @ ((twists.network.signs(path)[twists.edge] * twists.twist) @ self.shift * scale[:, None] * scale[:size])
-            @ self._loads
-            for vertex, path in twists.network.paths.items()
-        }
+        there, shift = moved_to(twists.arm) * scale, self.shift * scale[:size] @ self._loads
+        found = {}
+        for vertex, path in twists.network.paths.items():
+            signs = twists.network.signs(path)[twists.edge]
+            on = np.flatnonzero(signs)
+            found[vertex] = there @ ((signs[on] * twists.twist[:, :, on]) @ shift[:, on])
+        return found
 
     @property
     def _loads(self) -> Array:
@@ -113,13 +113,10 @@ class Loaded:
 
 
 def twists_of(network: Network, section: StiffnessSection, configuration: Configuration, length: float) -> Twists:
-    """Freedoms of all edges, seen from the middle of the joints: a point far away would hide what is near."""
+    """Freedoms of all edges, with rotations counted as lengths by `length`."""
     at, n = configuration.point(section.at), configuration.shape[0]
-    joints = dict.fromkeys(edge.point for edge in network.edges)
-    middle = np.zeros(n, dtype=complex)
-    for point in joints:
-        middle = middle + configuration.point(point) / len(joints)
-    origin = at if section.link is None or not joints else middle
+    joints = [edge.point for edge in network.edges]
+    origin = at if section.link is None else looked_at_from(joints, at, configuration, length)
     found = [(k, *each) for k, edge in enumerate(network.edges)
              for each in freedoms(edge.elements, section, configuration, origin)]  # fmt: skip
     twist = np.zeros((n, 3, len(found)))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.stiffness.chains import chain_of
+from mechdesign.analyses.stiffness.chains import chain_of, looked_at_from
 from mechdesign.analyses.stiffness.compliance import Held, hold
 from mechdesign.analyses.stiffness.legs import Leg
 from mechdesign.analyses.stiffness.screws import (
@@ -36,13 +36,12 @@ def hold_by_legs(
     condensed : bool
         The pin is a point of one link only: the link turns freely under forces at it.
     """
-    n = configuration.shape[0]
+    n, body = configuration.shape[0], 3 if condensed else size
     at = configuration.point(section.at)
-    # A body is looked at from the middle of its joints: a point far away would hide what is near.
-    middle = at if size == 2 and not condensed else _middle(legs, configuration, at)
-    chains = [chain_of(leg, section, configuration, middle) for leg in legs]
+    ends = [point for leg in legs for point in (leg.base, leg.tip)]
+    origin = at if body == 2 else looked_at_from(ends, at, configuration, length)
+    chains = [chain_of(leg, section, configuration, origin) for leg in legs]
     ranks = [np.broadcast_to(joint_rank(chain.passive, length), (n,)) for chain in chains]
-    body = 3 if condensed else size
     if not chains:
         return _restrict(hold([np.zeros((3, 0, n))], [np.zeros((0, 0, n))], length, body), condensed), []
     springs: list[Springs] = []
@@ -59,16 +58,9 @@ def hold_by_legs(
         for k, (w, chain) in enumerate(zip(wrenches, here, strict=True)):
             for spring in equivalent_springs(w, chain, length):
                 springs.append(
-                    Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + middle[rows], spring.angle)
+                    Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + origin[rows], spring.angle)
                 )
-    return _restrict(_join(parts, n).seen_from(at - middle), condensed), springs
-
-
-def _middle(legs: Sequence[Leg], configuration: Configuration, at: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """The middle of all first and last joints of legs; the asked point where there are none."""
-    points = list(dict.fromkeys(point for leg in legs for point in (leg.base, leg.tip)))
-    places = np.stack([configuration.point(point) for point in points] or [at])
-    return np.asarray(places.mean(axis=0))
+    return _restrict(_join(parts, n).seen_from(at - origin), condensed), springs
 
 
 def _signatures(ranks: NDArray[np.intp]) -> list[tuple[list[int], NDArray[np.intp]]]:
