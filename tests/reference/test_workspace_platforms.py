@@ -9,7 +9,7 @@ from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import AssemblyError
+from mechdesign.errors import AssemblyError, StudyError
 
 FIVE_BAR = """
 units: {length: m}
@@ -230,3 +230,10 @@ def test_over_a_range_the_assembly_of_the_sketch(
     assert error <= 2e-6 * area
     assert area > 0
     assert abs(area - 1.1 * share) <= doubt + error
+
+
+def test_over_a_range_without_a_closed_form_is_told() -> None:
+    """A measure that is an expression is held by iteration, which cuts across a range do not know."""
+    changes = ["mechanism.measures={turn: platform.angle*1}", "workspace.at={turn: {from: -10, to: 25}}"]
+    with pytest.raises(StudyError, match="closed form"):
+        mechdesign.workspace(study_of(RPR, *changes))

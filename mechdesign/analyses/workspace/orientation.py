@@ -12,11 +12,11 @@ from mechdesign.analyses.workspace.bounding import bounding_box
 from mechdesign.analyses.workspace.curves import Patch, patches
 from mechdesign.analyses.workspace.loci import causes
 from mechdesign.analyses.workspace.panels import Effort, find_panels
-from mechdesign.analyses.workspace.quadrature import integrate
+from mechdesign.analyses.workspace.quadrature import FINEST_AREA, integrate
 from mechdesign.analyses.workspace.ranged import Endings, RangedDesigns
 from mechdesign.analyses.workspace.region import Question, questions
 from mechdesign.analyses.workspace.tables import held_columns, stacked
-from mechdesign.errors import AssemblyError
+from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.progress import Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -33,7 +33,7 @@ def reachable(study: Study, progress: Progress) -> Result:
     Raises
     ------
     StudyError
-        If the section lacks what cannot be assumed.
+        If the section lacks what cannot be assumed, or the inverse problem has no closed form.
     AssemblyError
         If nothing can be reached, or the region has no end.
     """
@@ -73,7 +73,16 @@ def reachable(study: Study, progress: Progress) -> Result:
         Table("boundary", stacked(outlines), "boundary of the region, curve by curve"),
     ]
     empty = sum(row[1] == 0 for row in rows)
-    return Result("workspace", {table.name: table for table in tables}, (), {"regions": len(asked), "empty": empty})
+    late = [error / area for _, area, error, _ in rows if error > FINEST_AREA * area]
+    warnings: tuple[str, ...] = ()
+    if late:
+        warnings = (
+            f"the area is known to {max(late):.1g} of itself only (area_error): over the range of {name} the boundary "
+            "is too rough for more",
+        )
+    return Result(
+        "workspace", {table.name: table for table in tables}, warnings, {"regions": len(asked), "empty": empty}
+    )
 
 
 def _questions(study: Study, name: str, over: Over) -> Iterator[Question]:
@@ -86,6 +95,12 @@ def _questions(study: Study, name: str, over: Over) -> Iterator[Question]:
     low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
     for question in questions(replace(study, workspace=study.workspace.model_copy(update=update)), wanted=()):
         base = question.field
+        if base.plan.iterative:
+            message = (
+                f"over a range of {name} the inverse problem must have a closed form, which it has not here; "
+                f"ask for single values: at: {{{name}: [...]}}"
+            )
+            raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
         field = Endings(
             base.mechanism, base.plan, base.held, base.same_assembly, base.length,
             list(study.workspace.at).index(name), low, high, over.all,
