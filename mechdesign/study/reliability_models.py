@@ -214,7 +214,11 @@ class ErrorLimit(Model):
 
 
 class Precision(Model):
-    """How precise a failure probability is wanted: half the width of its 99.7 % interval."""
+    """How precise a failure probability is wanted.
+
+    ``relative`` is its coefficient of variation, standard error over value: half of its 99.7 % interval is about three
+    times that. ``half_width`` is half the interval itself.
+    """
 
     relative: Annotated[float, Reader("none", 0.0, True)] | None = None
     half_width: Annotated[float, Reader("none", 0.0, True)] | None = None
@@ -227,7 +231,9 @@ class Precision(Model):
     @model_validator(mode="after")
     def _one(self) -> Precision:
         if (self.relative is None) == (self.half_width is None):
-            raise failure("give either 'relative', a fraction of the failure probability, or 'half_width'")
+            raise failure(
+                "give either 'relative', a coefficient of variation, or 'half_width', half the 99.7 % interval"
+            )
         return self
 
     @classmethod

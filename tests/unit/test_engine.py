@@ -11,7 +11,7 @@ from scipy.special import ndtr
 from mechdesign.analyses.reliability.engine.design_points import find
 from mechdesign.analyses.reliability.engine.form import form
 from mechdesign.analyses.reliability.engine.importance import importance_sampling
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.engine.quasi import quasi_monte_carlo
 
@@ -36,7 +36,7 @@ CASES = {
     "lognormals_40": limit_states.lognormals(40),
     "noisy": limit_states.noisy(),
 }
-PRECISION = Precision(0.05, None)
+PRECISION = Precision(0.05 / WIDTH, None)
 # Distances of the parabola's design points: where x + y dy/dx = 0, the outer two.
 _X = np.sort(np.roots([0.5, -0.15, -3.985, 0.4995]).real)[[0, 2]]
 PARABOLA = sorted(np.hypot(_X, 5 - 0.5 * (_X - 0.1) ** 2).tolist())

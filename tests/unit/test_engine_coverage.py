@@ -11,7 +11,7 @@ from mechdesign.analyses.reliability.engine.design_points import find
 from mechdesign.analyses.reliability.engine.importance import importance_sampling
 from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE, binomial, weighted
 from mechdesign.analyses.reliability.engine.ladder import climb
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
 from mechdesign.analyses.reliability.engine.quasi import quasi_monte_carlo
 
@@ -60,7 +60,7 @@ def test_importance_sampling_that_ends_at_its_precision(name: str) -> None:
     case, intervals = CASES[name], []
     for seed in range(SEEDS):
         rng, problem = generator(seed + 10_000), case.problem
-        found = importance_sampling(problem, find(problem, rng), rng, 100_000, Precision(0.1, None))
+        found = importance_sampling(problem, find(problem, rng), rng, 100_000, Precision(0.1 / WIDTH, None))
         intervals.append((found.low, found.high))
         assert found.high - found.low <= 0.2 * found.failure
     check(intervals, case.exact)
@@ -90,7 +90,7 @@ def test_auto(name: str, used: str) -> None:
     for seed in range(SEEDS):
         problem, other = case.problem, case.problem
         found, method, _ = climb(
-            problem, Precision(0.1, None), lambda n, s=seed, p=other: plain(p, s + 10**6, n), generator(seed),
+            problem, Precision(0.1 / WIDTH, None), lambda n, s=seed, p=other: plain(p, s + 10**6, n), generator(seed),
             100_000, 100_000,
         )  # fmt: skip
         assert method == used

@@ -9,7 +9,7 @@ from helpers.limit_states import Case
 
 from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.ladder import FEW, PILOT, climb, disagree
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, failed
 
 Said = tuple[Estimate, str, dict[str, Estimate]]
@@ -30,7 +30,8 @@ def climbed(case: Case, precision: Precision, most: int = 200_000, sees: Case | 
 
 
 def relative(share: float) -> Precision:
-    return Precision(share, None)
+    """Half the interval as a share of the probability."""
+    return Precision(share / WIDTH, None)
 
 
 def precise(found: Estimate, precision: Precision) -> bool:

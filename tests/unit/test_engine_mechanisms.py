@@ -70,7 +70,7 @@ def estimates(result: Result) -> dict[str, Estimate]:
 @pytest.mark.parametrize("name", STUDIES)
 def test_methods_agree(name: str) -> None:
     methods = "reliability.methods=[monte_carlo, quasi_monte_carlo, form, importance_sampling, auto]"
-    found = estimates(ask(name, methods, "reliability.samples=60000", "reliability.precision=0.1"))
+    found = estimates(ask(name, methods, "reliability.samples=60000", "reliability.precision=0.0336"))
     plain = found["monte_carlo"]
     assert 1e-4 < plain.failure < 0.05
     for method in ("quasi_monte_carlo", "importance_sampling", "auto"):
@@ -94,7 +94,7 @@ def test_the_number_of_threads_and_a_second_run_change_nothing(name: str) -> Non
 
 def test_auto_along_a_sweep_of_73_poses() -> None:
     sweep = ["reliability.poses=null", "reliability.sweep={theta1: {from: 0, to: 360, step: 5}, theta2: 60}"]
-    result = ask("correlation", "reliability.methods=[auto, quasi_monte_carlo]", "reliability.precision=0.2", *sweep)
+    result = ask("correlation", "reliability.methods=[auto, quasi_monte_carlo]", "reliability.precision=0.0673", *sweep)
     table = result.tables["reliability"]
     poses = table["scope"] == "pose"
     auto, quasi = (poses & (table["method"] == name) for name in ("auto", "quasi_monte_carlo"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.reliability.engine.precision import WIDTH
 from mechdesign.analyses.reliability.methods import Found, Task, wanted_precision
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -20,18 +21,19 @@ def unreached(study: Study, poses: Poses, found: Sequence[Found], task: Task) ->
             # Of no failure at all the interval's upper end is told elsewhere.
             if estimate.failures and not precision.reached(estimate.failure, estimate.low, estimate.high):
                 half = 0.5 * (estimate.high - estimate.low)
-                short[pose] = half / estimate.failure if precision.half_width is None else half
+                short[pose] = half / (WIDTH * estimate.failure) if precision.half_width is None else half
     if not short:
         return []
     pose = max(short, key=lambda each: short[each])
     if precision.half_width is None:
         asked, reached = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
-        asked += " of the probability of failure"
+        what = "the coefficient of variation"
     else:
         asked, reached = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
+        what = "half the interval"
     others = f" (the worst of {len(short)} poses)" if len(short) > 1 else ""
     return [
-        f"auto: half the interval is {reached} at {pose_in_words(study, poses, pose)}{others}, not the {asked} asked; "
+        f"auto: {what} is {reached} at {pose_in_words(study, poses, pose)}{others}, not the {asked} asked; "
         f"it ends at {task.most} samples, which reliability.samples sets"
     ]
 

@@ -10,21 +10,22 @@ WIDTH = 2.97
 
 @dataclass(frozen=True)
 class Precision:
-    """Half the width of the 99.7 % interval.
+    """How wide the 99.7 % interval may be.
 
     Parameters
     ----------
     relative : float or None
-        As a fraction of the probability of failure.
+        Coefficient of variation: the standard error as a fraction of the probability of failure. Half the interval is
+        about three times that.
     half_width : float or None
-        Itself.
+        Half the interval itself.
     """
 
     relative: float | None
     half_width: float | None
 
     def _half(self, value: float) -> float:
-        return self.half_width if self.half_width is not None else (self.relative or 0.0) * value
+        return self.half_width if self.half_width is not None else WIDTH * (self.relative or 0.0) * value
 
     def reached(self, value: float, low: float, high: float) -> bool:
         """Whether an interval is narrow enough."""
