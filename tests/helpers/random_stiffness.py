@@ -40,7 +40,8 @@ class Sprung:
         self.actuators = {
             drive: 10 ** rng.uniform(2, 4) for drive in some(list(layout.drives), share if self.elastic else 1.0)
         }
-        pins = [point for point in layout.places if len(layout.owners(point)) > 1]
+        clamps = [{clamp.first, clamp.second} for clamp in layout.clamps.values()]
+        pins = [p for p in layout.places if len(layout.owners(p)) > 1 and set(layout.owners(p)) not in clamps]
         slides = [*layout.guides, *(body.name for body in moving if body.to)]
         share = rng.choice([0.0, 0.0, 0.4])
         self.bearings: dict[str, dict[str, float]] = {

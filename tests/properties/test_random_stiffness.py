@@ -22,8 +22,8 @@ from mechdesign.analyses.stiffness.serial import hold_by_legs
 from mechdesign.mechanism import Configuration
 from mechdesign.study import Study
 
-# What is rigid, or all but, beside compliances that are never below 1e-6.
-NOTHING = 1e-18
+# What is rigid, but for rounding: whatever gives has a compliance of 1e-6 or more.
+NOTHING = 1e-15
 
 
 def posed(text: str) -> tuple[Study, Configuration]:
