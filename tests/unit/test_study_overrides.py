@@ -39,10 +39,18 @@ def test_values_are_yaml(load):
         (
             "reliability.dimensions.rod.length.tolerance=1",
             lambda s: s.reliability.dimensions["rod.length"].tolerance,
-            1.0,
+            (-1.0, 1.0),
         ),
-        ("reliability.dimensions.rod.length=2", lambda s: s.reliability.dimensions["rod.length"].tolerance, 2.0),
-        ("reliability.dimensions.crank.length=2", lambda s: s.reliability.dimensions["crank.length"].tolerance, 2.0),
+        (
+            "reliability.dimensions.rod.length=2",
+            lambda s: s.reliability.dimensions["rod.length"].tolerance,
+            (-2.0, 2.0),
+        ),
+        (
+            "reliability.dimensions.crank.length=2",
+            lambda s: s.reliability.dimensions["crank.length"].tolerance,
+            (-2.0, 2.0),
+        ),
         ("reliability.dimensions.ground.D.x.sigma=2", lambda s: s.reliability.dimensions["ground.D.x"].sigma, 2.0),
         ("reliability.limits.B.x=1", lambda s: s.reliability.limits["B.x"].max, 1.0),
         ("mechanism.links.rocker.length=61", lambda s: s.mechanism.description.places["rocker.length"].nominal, 61.0),
