@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import signal
-import subprocess
-import sys
-import time
-from pathlib import Path
 
 import pytest
 
@@ -154,6 +149,3 @@ def test_an_output_directory_that_cannot_be_written(folder, invoke) -> None:
     done = invoke("kinematics", "study.yaml", "--out", "file/results")
     assert done.exit_code == 4
     assert "cannot be written" in done.stderr
-
-
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peak memory is read from /proc")

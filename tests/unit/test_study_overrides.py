@@ -31,26 +31,18 @@ def test_values_are_yaml(load):
     assert study.resolved["mechanism"]["parameters"] == {"r": 42}
 
 
+def tolerance(study, name):
+    return study.reliability.dimensions[name].tolerance
+
+
 @pytest.mark.parametrize(
     ("override", "read", "value"),
     [
         ("kinematics.sweep.theta.to=45", lambda s: s.kinematics.sweep["theta"].to, 45.0),
         ("kinematics.rates.theta=2", lambda s: s.kinematics.rates, {"theta": 2.0}),
-        (
-            "reliability.dimensions.rod.length.tolerance=1",
-            lambda s: s.reliability.dimensions["rod.length"].tolerance,
-            (-1.0, 1.0),
-        ),
-        (
-            "reliability.dimensions.rod.length=2",
-            lambda s: s.reliability.dimensions["rod.length"].tolerance,
-            (-2.0, 2.0),
-        ),
-        (
-            "reliability.dimensions.crank.length=2",
-            lambda s: s.reliability.dimensions["crank.length"].tolerance,
-            (-2.0, 2.0),
-        ),
+        ("reliability.dimensions.rod.length.tolerance=1", lambda s: tolerance(s, "rod.length"), (-1.0, 1.0)),
+        ("reliability.dimensions.rod.length=2", lambda s: tolerance(s, "rod.length"), (-2.0, 2.0)),
+        ("reliability.dimensions.crank.length=2", lambda s: tolerance(s, "crank.length"), (-2.0, 2.0)),
         ("reliability.dimensions.ground.D.x.sigma=2", lambda s: s.reliability.dimensions["ground.D.x"].sigma, 2.0),
         ("reliability.limits.B.x=1", lambda s: s.reliability.limits["B.x"].max, 1.0),
         ("mechanism.links.rocker.length=61", lambda s: s.mechanism.description.places["rocker.length"].nominal, 61.0),
