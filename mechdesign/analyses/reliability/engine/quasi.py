@@ -17,8 +17,6 @@ REPLICATES = 16
 # Beyond so few failures the means of the replicates are far from normal, and the interval is that of plain samples,
 # which is wider: the variance of a scrambled net is hardly ever above theirs.
 FEW = 200
-# scipy's tables end here.
-MOST_DIMENSIONS = 21_201
 
 
 def replicates(samples: int) -> list[int]:
