@@ -229,7 +229,9 @@ class Checker:
         for drive in section.actuators:
             path = (*root, "actuators", drive)
             if self.known(drive, self.names.drives, "drive", path, at_key=True):
-                self.kind(path, _STIFFNESS_KINDS[self.names.drives[drive]])
+                raw = self.reporter.raw(path)
+                for part in (path, *((*path, k) for k in range(len(raw) if isinstance(raw, list) else 0))):
+                    self.kind(part, _STIFFNESS_KINDS[self.names.drives[drive]])
         for joint, bearing in section.bearings.items():
             path = (*root, "bearings", joint)
             slides = [*self.names.slides, *self.names.legs]

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo, model_validator
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, core_schema
 
+from mechdesign.study.lists import as_list
 from mechdesign.study.models import Model
 from mechdesign.study.numbers import (
     NUMBER_FORM,
     Angle,
     AnyName,
+    Context,
     LinkName,
     Number,
     PointName,
@@ -25,6 +27,7 @@ from mechdesign.study.numbers import (
     PositiveStress,
     failure,
     or_short,
+    read_number,
 )
 from mechdesign.study.pose_models import PoseSection
 
@@ -102,6 +105,27 @@ class Bearing(Model):
         return or_short(schema, handler, NUMBER_FORM)
 
 
+class _Series:
+    """Annotation of a stiffness: a number, or a list of those in series, such as motor, gear and belt."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [NUMBER_FORM, {"type": "array", "items": NUMBER_FORM, "minItems": 1}],
+                "description": "a stiffness, or those of what is in series"}  # fmt: skip
+
+    @staticmethod
+    def _validate(raw: Any, info: ValidationInfo) -> float:
+        parts = [read_number(each, info.context or Context()).nominal for each in as_list(raw)]
+        if not parts:
+            raise failure("expected a stiffness, or a list of those in series")
+        for part in parts:
+            if part <= 0:
+                raise failure(f"must be positive, not {part:g}")
+        return 1.0 / sum(1.0 / part for part in parts)
+
+
 class StiffnessSection(PoseSection):
     """How stiff is it?"""
 
@@ -109,7 +133,7 @@ class StiffnessSection(PoseSection):
     at: PointName
     sections: dict[str, Profile] = Field(default_factory=dict)
     elastic: dict[LinkName, str] = Field(default_factory=dict)
-    actuators: dict[AnyName, PositiveNumber] = Field(default_factory=dict)
+    actuators: dict[AnyName, Annotated[float, _Series()]] = Field(default_factory=dict)
     bearings: dict[AnyName, Bearing] = Field(default_factory=dict)
     direction: Angle | None = None
     loads: tuple[tuple[Number, ...], ...] = ()

@@ -128,3 +128,9 @@ def test_result_does_not_depend_on_jobs_or_chunks(monkeypatch: pytest.MonkeyPatc
 def test_what_has_no_stiffness_is_told(text: str, said: str) -> None:
     with pytest.raises(StudyError, match=said):
         ask_stiffness(text)
+
+
+def test_motor_and_transmission_in_series() -> None:
+    """Compliances of what is in series add up, whatever units they are given in."""
+    series = ask_stiffness(FIVE_BAR, "stiffness.actuators={a1: [3000, 1.5e6 N*mm/rad], a2: [2000, 2000]}")
+    assert matrix(series, "K") == pytest.approx(matrix(ask_stiffness(FIVE_BAR), "K"), rel=1e-12)
