@@ -233,6 +233,36 @@ def test_optimize_judges_the_piece_that_workspace_reports() -> None:
     assert several == 2
 
 
+# Thin gaps and tips beside limits and determinants, some of them between the first rays of a scan.
+THIN = {
+    "low": np.array([30.0, 100.0, 30.0, 90.0, 74.71]),
+    "high": np.array([360.0, 215.0, 195.0, 200.0, 165.1794]),
+    "a": np.array([0.25, 0.25, 0.26, 0.25, 0.2535]),
+    "b": np.array([0.4, 0.4, 0.4, 0.4, 0.3896]),
+}
+
+
+def test_optimize_finds_thin_gaps_and_tips() -> None:
+    """As a study of its own that is looked at more closely."""
+    names = {"workspace.area": 1e-6, "GII": 1e-5, "SUI": 1e-6}
+    together = values(list(names), THIN, FIVE_BAR)
+    for k in range(len(THIN["low"])):
+        own = [f"mechanism.parameters.{name}={float(column[k])}" for name, column in THIN.items()]
+        alone = mechdesign.workspace(study_of(FIVE_BAR, *own, "workspace.indices=[]")).main
+        for name, tolerance in names.items():
+            there = alone[name.removeprefix("workspace.")][0]
+            assert together[name][k] == pytest.approx(there, rel=tolerance), (name, k)
+
+
+def test_a_design_is_the_same_alone_and_in_a_batch() -> None:
+    names = ("workspace.area", "GII", "SUI")
+    together = values(names, THIN, FIVE_BAR)
+    for k in range(len(THIN["low"])):
+        alone = values(names, {name: column[k : k + 1] for name, column in THIN.items()}, FIVE_BAR)
+        for name in names:
+            assert together[name][k] == pytest.approx(alone[name][0], rel=1e-9), (name, k)
+
+
 def test_poses_all_over_the_workspace_are_of_the_same_piece() -> None:
     poses = workspace_nodes(study_of(FIVE_BAR))
     (group,) = poses.groups

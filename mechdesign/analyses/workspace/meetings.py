@@ -124,9 +124,10 @@ class Meetings:
         curve, other, side = self.curve[which], self.other[which], self.side[which]
         touching, central = curve == other, other < 0
         lane, turn = np.arange(len(which)), np.exp(1j * theta)
-        radius = np.where(central, 0.0, radius)
+        radius, near, settled = np.where(central, 0.0, radius), reach, np.zeros(len(which), dtype=bool)
         for zero, extreme in zip(TO_ZERO, TO_EXTREME, strict=True):
-            near = np.where(touching, np.maximum(extreme * self.span[which], LEAST * reach), zero * reach)
+            step = np.where(touching, np.maximum(extreme * self.span[which], LEAST * reach), zero * reach)
+            near = np.where(settled, near, step)
             x = near * np.where(touching, AROUND[:, None], ROOTS[:, None] * side)
             margins = designs.field.margins(designs.about + (radius + x) * turn, places, assembly=assembly)
             value, rival = margins[curve, :, lane].T, margins[other, :, lane].T
@@ -135,8 +136,12 @@ class Meetings:
                 top = np.where(c * side < 0, -0.5 * b / c, np.nan)
                 nearest = -2 * a / (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
             step = np.where(touching, top, np.where(central, 0.0, nearest))
-            if zero == TO_ZERO[-1] and not (np.abs(step) > SETTLED * near).any():
-                break
+            if zero == TO_ZERO[-1]:
+                # Each by itself, so that what else is looked at changes nothing.
+                settled |= ~(np.abs(step) > SETTLED * near)
+                if settled.all():
+                    break
+            step = np.where(settled, 0.0, step)
             radius = radius + np.clip(step, -FARTHEST * reach, FARTHEST * reach)
         with np.errstate(invalid="ignore"):
             zero_too = parabola(np.sqrt(value), rival)[0]

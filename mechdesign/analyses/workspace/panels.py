@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.breaks import TOGETHER, Search, signatures
 from mechdesign.analyses.workspace.overlooked import overlooked
-from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, trace
+from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, curved, trace
 from mechdesign.errors import AssemblyError
 
 PROBES = 4
@@ -22,10 +22,25 @@ DOUBLINGS = 16
 
 @dataclass(frozen=True)
 class Effort:
-    """How finely the region is looked for: rays over the scan, samples along each ray."""
+    """How finely the region is looked for.
+
+    Parameters
+    ----------
+    rays : int
+        Rays over the scan.
+    samples : int
+        Samples of each interval, for margins that are not quadratic along rays.
+    views : int
+        Rays about each of the other centres that a region is looked at from.
+    closer : int or None
+        Where given, only designs with limits that are not quadratic along rays (angles, not distances) are looked at
+        from other centres, and by so many rays over the scan: such limits leave thin parts.
+    """
 
     rays: int
     samples: int
+    views: int = 96
+    closer: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,23 +75,30 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     AssemblyError
         If the region has no end.
     """
-    count = designs.count
-    reach = _extent(designs, np.linspace(*scan, PROBES + 1), _first_guess(designs), effort.samples)[0]
-    angles = np.linspace(*scan, effort.rays + 1)
-    reach, intervals = _extent(designs, angles, reach, effort.samples)
-    if count == 1:
-        missed = overlooked(designs, float(reach[0]), effort.samples, angles, intervals)
-        if missed.size:
-            angles = np.unique(np.concatenate([angles, missed]))
-            reach, intervals = _extent(designs, angles, reach, effort.samples)
-    codes = signatures(intervals, len(designs.field.labels)).reshape(count, -1)
-    design, cell = np.nonzero(codes[:, 1:] != codes[:, :-1])
-    search = Search(designs, reach, effort.samples)
-    design, breaks = search.all_breaks(intervals, design * len(angles) + cell, design, angles[cell], angles[cell + 1])
-    counts = intervals.counts.reshape(count, -1)
-    inside = counts > 0
+    count, samples = designs.count, effort.samples
+    design, angle = _scanned(count, np.linspace(*scan, PROBES + 1))
+    reach = _extent(designs, design, angle, _first_guess(designs), samples)[0]
+    some = np.arange(count)
+    if effort.closer is not None:
+        bent = curved(designs, design, angle, reach[design])
+        limits = [kind == "limit" for kind, _ in designs.field.labels[: len(bent)]]
+        some = np.unique(design[bent[limits].any(axis=0)])
+    design, angle = _scanned(count, np.linspace(*scan, effort.rays + 1))
+    reach, intervals = _extent(designs, design, angle, reach, samples)
+    if some.size:
+        finer = np.linspace(*scan, (effort.closer or effort.rays) + 1)
+        owner, missed = overlooked(designs, some, reach, samples, effort.views, scan, design, angle, intervals)
+        more = np.repeat(some, len(finer)) + 1j * np.tile(finer, len(some))
+        rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * missed, more]))
+        if len(rays) > len(design):
+            design, angle = rays.real.astype(np.intp), rays.imag
+            reach, intervals = _extent(designs, design, angle, reach, samples)
+    codes = signatures(intervals, len(designs.field.labels))
+    cell = np.flatnonzero((codes[1:] != codes[:-1]) & (design[1:] == design[:-1]))
+    search = Search(designs, reach, samples)
+    found, breaks = search.all_breaks(intervals, cell, design[cell], angle[cell], angle[cell + 1])
     fixed = np.tile([*scan, *cuts], count)
-    owner = np.concatenate([np.repeat(np.arange(count), 2 + len(cuts)), design])
+    owner = np.concatenate([np.repeat(np.arange(count), 2 + len(cuts)), found])
     place, firm = np.concatenate([fixed, breaks]), np.arange(len(fixed) + len(breaks)) < len(fixed)
     order = np.lexsort((place, owner))
     owner, place, firm = owner[order], place[order], firm[order]
@@ -89,13 +111,29 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     keep = owner[1:] == owner[:-1]
     owner, low, high = owner[:-1][keep], place[:-1][keep], place[1:][keep]
     # A panel is empty where every ray that was traced inside it met nothing.
-    first, last = np.searchsorted(angles, low, side="right"), np.searchsorted(angles, high, side="left")
-    met = np.concatenate([np.zeros((count, 1), dtype=int), np.cumsum(inside, axis=1)], axis=1)
-    full = (last <= first) | (met[owner, np.maximum(last, first)] > met[owner, first])
-    first, last = np.searchsorted(angles, low + TOGETHER, side="right"), np.searchsorted(angles, high - TOGETHER)
+    counts = intervals.counts
+    met = np.concatenate([[0], np.cumsum(counts > 0)])
+    first, last = _between(design, angle, owner, low, high)
+    full = (last <= first) | (met[np.maximum(last, first)] > met[first])
+    first, last = _between(design, angle, owner, low + TOGETHER, high - TOGETHER)
     # Not at half of the panel: by symmetry a single point may divide the ray there.
-    usual = np.where(last > first, counts[owner, np.minimum(first + (last - first) // 4, len(angles) - 1)], 0)
-    return Panels(owner[full], low[full], high[full], reach, np.asarray(inside.any(axis=1)), usual[full])
+    usual = np.where(last > first, counts[np.minimum(first + (last - first) // 4, len(angle) - 1)], 0)
+    closes = np.bincount(design, counts, count) > 0
+    return Panels(owner[full], low[full], high[full], reach, closes, usual[full])
+
+
+def _scanned(count: int, angles: Floats) -> tuple[Ints, Floats]:
+    """The same rays for every design: design and angle of each."""
+    return np.repeat(np.arange(count), len(angles)), np.tile(angles, count)
+
+
+def _between(design: Ints, angle: Floats, owner: Ints, low: Floats, high: Floats) -> tuple[Ints, Ints]:
+    """The first ray of each range of angle, and the first after it; NumPy orders complex numbers by both parts."""
+    rays = design + 1j * angle
+    return (
+        np.searchsorted(rays, owner + 1j * low, side="right"),
+        np.searchsorted(rays, owner + 1j * high, side="left"),
+    )
 
 
 def _first_guess(designs: Designs) -> Floats:
@@ -107,13 +145,11 @@ def _first_guess(designs: Designs) -> Floats:
     return np.broadcast_to(np.asarray(total + drawn, dtype=float), (designs.count,)).copy()
 
 
-def _extent(designs: Designs, angles: Floats, reach: Floats, samples: int) -> tuple[Floats, Intervals]:
+def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int) -> tuple[Floats, Intervals]:
     """Trace rays, doubling the reach until no ray ends inside; returns the reach needed and the intervals."""
-    count, rays = designs.count, len(angles)
-    design, theta = np.repeat(np.arange(count), rays), np.tile(angles, count)
     for _ in range(DOUBLINGS):
         intervals = trace(designs, design, theta, reach[design], samples)
-        beyond = intervals.beyond.reshape(count, rays).any(axis=1)
+        beyond = np.bincount(design, intervals.beyond, designs.count) > 0
         if not beyond.any():
             break
         reach = np.where(beyond, 2 * reach, reach)
@@ -122,6 +158,6 @@ def _extent(designs: Designs, angles: Floats, reach: Floats, samples: int) -> tu
             "the workspace has no end: a ray from "
             f"({designs.about.real:g}, {designs.about.imag:g}) stays inside; give the drives limits"
         )
-    farthest = np.zeros(count)
+    farthest = np.zeros(designs.count)
     np.maximum.at(farthest, design[intervals.ray], intervals.outer)
     return np.where(farthest > 0, 1.2 * farthest, reach), intervals

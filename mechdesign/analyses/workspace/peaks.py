@@ -27,6 +27,8 @@ RADII = np.concatenate([[0.01], np.linspace(0.07, 0.93, 8), [0.99]])
 NEAR = np.array([1e-8, 1.6e-7])
 # Powers of the distance beyond which an index is said to vanish, or to be infinite, at the boundary.
 POWER = 0.25
+# A determinant so small, as a part of a design's largest, has the sign that rounding gives it (in the tip of a cusp).
+ROUNDING = 1e-12
 STENCIL = np.linspace(-1.0, 1.0, 5)
 SHRINK = 0.35
 MOST_ROUNDS = 40
@@ -135,9 +137,11 @@ def _at_crossings(
 ) -> None:
     """Note them too where a forward singularity lies inside: the determinant has both signs."""
     determinant = np.broadcast_to(local.determinant, design.shape)
-    crossed = np.ones(designs.count, dtype=bool)
+    crossed, size = np.ones(designs.count, dtype=bool), np.zeros(designs.count)
+    known = np.flatnonzero(np.isfinite(determinant))
+    np.maximum.at(size, design[known], np.abs(determinant[known]))
     for sign in (1, -1):
-        crossed &= np.bincount(design[sign * determinant > 0], minlength=designs.count) > 0
+        crossed &= np.bincount(design[sign * determinant > ROUNDING * size[design]], minlength=designs.count) > 0
     for k, index in enumerate(indices):
         limit = index.index.crossing
         if limit is not None:

@@ -125,19 +125,30 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
 
 
 def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
-    """First the margins that are quadratic along rays, whose roots are known; then the others, within what is left."""
+    """First what is quadratic along a ray, whose roots are known; then the other margins, within what is left.
+
+    Each ray is judged by itself: what else is traced with it changes nothing.
+    """
     places, direction = designs.of(design), np.exp(1j * theta)
     values = designs.field.margins(designs.about + FIVE[:, None] * reach * direction, places, assembly=False)
     quadratic, (a, b, c) = _parabolas(values)
-    rows = np.flatnonzero(quadratic)
-    margin, ray, turn, x, start = _quadratic_roots(a[rows], b[rows], c[rows])
-    found = _intervals(rows[margin], ray, turn, x * reach[ray], start, reach, slack)
-    whole = len(rows) == len(values) and not designs.field.same_assembly
+    if not quadratic.all():
+        # What is not quadratic has no roots here.
+        a, b, c = np.where(quadratic, a, 1.0), np.where(quadratic, b, 0.0), np.where(quadratic, c, 0.0)
+    margin, ray, turn, x, start = _quadratic_roots(a, b, c)
+    found = _intervals(margin, ray, turn, x * reach[ray], start, reach, slack)
+    whole = quadratic.all() and not designs.field.same_assembly
     return found if whole else _others(designs, places, direction, found, quadratic, samples, slack * reach)
 
 
+def curved(designs: Designs, design: Ints, theta: Floats, reach: Floats) -> NDArray[np.bool_]:
+    """Which margins (but those of the assembly) are not quadratic along which rays; shape (margins, rays)."""
+    z = designs.about + FIVE[:, None] * reach * np.exp(1j * theta)
+    return ~_parabolas(designs.field.margins(z, designs.of(design), assembly=False))[0]
+
+
 def _parabolas(values: Floats) -> tuple[NDArray[np.bool_], tuple[Floats, Floats, Floats]]:
-    """Coefficients of a + b x + c x^2 through margins at x = 0, 1/2, 1, and which margins are such on every ray.
+    """Coefficients of a + b x + c x^2 through margins at x = 0, 1/2, 1, and which margins are such on each ray.
 
     Differences of squared distances are quadratic along a ray; the samples at 1/4 and 3/4 tell.
     """
@@ -147,7 +158,7 @@ def _parabolas(values: Floats) -> tuple[NDArray[np.bool_], tuple[Floats, Floats,
         allowed = QUADRATIC * np.abs(values).max(axis=1)
         fits = np.abs(a + 0.25 * (b + 0.25 * c) - at_1) <= allowed
         fits &= np.abs(a + 0.75 * (b + 0.75 * c) - at_3) <= allowed
-    return fits.all(axis=1), (a, b, c)
+    return fits, (a, b, c)
 
 
 def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints, Floats, Ints]:
@@ -172,14 +183,19 @@ def _others(
     samples: int,
     thin: Floats,
 ) -> Intervals:
-    """Cut intervals where one of the margins that are not quadratic is negative or unknown."""
-    owner, inner, width = found.ray, found.inner, found.outer - found.inner
+    """Cut intervals where one of the margins that are not quadratic along their ray is negative or unknown."""
+    extra = len(designs.field.labels) - len(quadratic)
+    known = np.concatenate([quadratic, np.zeros((extra, len(direction)), dtype=bool)])
+    sampled = np.flatnonzero(~np.asarray(known.all(axis=0))[found.ray])
+    owner, inner, width = found.ray[sampled], found.inner[sampled], (found.outer - found.inner)[sampled]
     local = {name: value[owner] for name, value in places.items()}
     fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, samples))), INSET, 1 - INSET)
     radii = inner + fraction[:, None] * width
-    values = designs.field.margins(designs.about + radii * direction[owner], local)
-    values = values[np.flatnonzero(np.append(~quadratic, np.ones(len(values) - len(quadratic), dtype=bool)))]
-    rows = np.flatnonzero(np.append(~quadratic, np.ones(len(designs.field.labels) - len(quadratic), dtype=bool)))
+    rows = np.flatnonzero(~known.all(axis=1))
+    values = designs.field.margins(designs.about + radii * direction[owner], local)[rows]
+    # Roots that are known have ended the intervals.
+    margin, lane = np.nonzero(known[rows][:, owner])
+    values[margin, :, lane] = 1.0
     positive = values > 0
     thick = width > thin[owner]
 
@@ -205,11 +221,12 @@ def _others(
         return margin_at(margin[which], lanes[lane[which]], radius)
 
     low, high, third = ((x[asked], f[asked]) for x, f in (brackets.low, brackets.high, brackets.third))
-    radius[asked] = bracketed_roots(evaluate, *low, *high, *third, ROUNDING * found.outer[lanes[lane[asked]]])
+    cut_of = sampled[lanes]
+    radius[asked] = bracketed_roots(evaluate, *low, *high, *third, ROUNDING * found.outer[cut_of[lane[asked]]])
     turn = np.where(brackets.high[1] > 0, 1, -1)
     start = (~positive[:, 0][:, lanes]).sum(axis=0)
-    part = _intervals(rows[margin], lane, turn, radius, start, found.outer[lanes], 0.0)
-    return _replace(found, lanes, part)
+    part = _intervals(rows[margin], lane, turn, radius, start, found.outer[cut_of], 0.0)
+    return _replace(found, cut_of, part)
 
 
 def _idle(
