@@ -193,3 +193,30 @@ def test_a_region_without_an_end_says_so() -> None:
 def test_nothing_reachable_says_so() -> None:
     with pytest.raises(AssemblyError, match="reaches nothing"):
         mechdesign.workspace(study_of(LEGS, "workspace.scan={about: [9, 0], from: -20, to: 20}"))
+
+
+SIMILAR = """
+units: {length: m}
+mechanism:
+  links:
+    ground: {A1: [-0.6, -0.4], A2: [0.6, -0.4], A3: [0, 0.8]}
+    leg_1: {from: A1, to: B1, telescopic: true}
+    leg_2: {from: A2, to: B2, telescopic: true}
+    leg_3: {from: A3, to: B3, telescopic: true}
+    platform: {P: [0, 0], B1: [-0.15, -0.1], B2: [0.15, -0.1], B3: [0, 0.2]}
+  drives: {l1: {length: leg_1}, l2: {length: leg_2}, l3: {length: leg_3}}
+  limits: [{drive: l1, min: 0.3, max: 0.75}, {drive: l2, min: 0.3, max: 0.75}, {drive: l3, min: 0.3, max: 0.75}]
+  sketch: {P: [0.02, 0.04], B1: [-0.13, -0.03], B2: [0.15, -0.09], B3: [0.06, 0.23]}
+workspace: {point: P, at: {platform.angle: [0, -20]}, characteristic_length: 0.2}
+"""
+
+
+@pytest.mark.parametrize("assembly", ["any", "same"])
+def test_every_pose_is_singular_where_platform_and_base_are_similar(assembly: str) -> None:
+    """Not turned against the base, the platform's legs always meet in one point; its area is known all the same."""
+    result = mechdesign.workspace(study_of(SIMILAR, f"workspace.assembly={assembly}"))
+    main = result.main
+    assert np.isnan(main["GII"]).tolist() == [True, False]
+    assert (main["area"] > 0).all()
+    (warning,) = (text for text in result.warnings if "every pose" in text)
+    assert "platform.angle = 0 is a forward singularity" in warning

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mechdesign.analyses.workspace.curves import Patch, patches_of_pieces
+from mechdesign.analyses.workspace.degenerate import singular_everywhere, without_indices
 from mechdesign.analyses.workspace.indices import INDICES, prepare
 from mechdesign.analyses.workspace.indices.index import determinant_power, power_of_length
 from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
@@ -75,9 +77,14 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     several = False
     warnings: list[str] = []
     for question in asked:
-        given = answer(question, {}, 1, CLOSE)
+        if singular_everywhere(question):
+            question = replace(question, field=replace(question.field, same_assembly=False))
+            given = without_indices(question, CLOSE)
+            warnings.append(f"every pose{_where(question)} is a forward singularity: indices have no value")
+        else:
+            given = answer(question, {}, 1, CLOSE)
+            warnings += _doubts(question, given)
         answers.append(given)
-        warnings += _doubts(question, given)
         if given.panels.closes[0]:
             assert given.pieces is not None
             found = patches_of_pieces(given.pieces, question.rays or RAYS, CLOSE.samples)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.workspace.chains import joined
 from mechdesign.analyses.workspace.contours import zero_curves
 from mechdesign.analyses.workspace.curves import Patch
+from mechdesign.analyses.workspace.degenerate import singular
 from mechdesign.analyses.workspace.ends import Ends
 from mechdesign.analyses.workspace.field import Field
 from mechdesign.mechanism import Mechanism
@@ -93,7 +94,7 @@ def _in_words(mechanism: Mechanism, group: Group) -> str:
 def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus]:
     """Forward singularities inside a region, found on a grid of its patches to rounding and ordered into curves."""
     names = forward_names(field.mechanism)
-    if field.same_assembly or not names:
+    if field.same_assembly or not names or all(singular(field, patch.grid(about)) for patch in patches):
         return []
 
     def values(z: Complex) -> Floats:
