@@ -14,7 +14,7 @@ from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.redundancy import doubled, owners_of, repeating
 from mechdesign.mechanism.rigidity import Equations, Vector, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
-from mechdesign.mechanism.structure import Structure, Undetermined, compile_structure
+from mechdesign.mechanism.structure import Undetermined, compile_structure
 
 DRIVES = "mechanism.drives"
 # A message names so many joints and links, and so many motions; nobody reads more.
@@ -151,20 +151,6 @@ def over_constrained(
     if given != real:
         mend += f"; then give {real} drive{'s' if real > 1 else ''} instead of {given}"
     return MechanismError(f"{start}; {mend}", where)
-
-
-def check_independent(equations: Equations, structure: Structure) -> None:
-    """Check the groups without a closed form for equations that depend on each other whatever the dimensions.
-
-    Raises
-    ------
-    Undetermined
-        If there are any: a part that floats is joined within itself too often, and another is free.
-    """
-    if any(group.form == "newton" for group in structure.groups):
-        jacobian = equations.generic(structure.given)
-        if np.isfinite(jacobian).all() and null_space(jacobian).shape[1]:
-            raise Undetermined("the given coordinates fix one part of the mechanism twice and leave another free")
 
 
 def undetermined(

@@ -18,6 +18,7 @@ from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.describe import report
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph, build_graph
+from mechdesign.mechanism.independence import check_independent
 from mechdesign.mechanism.limits import Bound
 from mechdesign.mechanism.model import Description, Limit, Quantity
 from mechdesign.mechanism.outputs import first
@@ -135,7 +136,7 @@ class Mechanism:
                 )
             try:
                 structure = compile_structure(self.graph, coordinates)
-                diagnosis.check_independent(self.equations, structure)
+                check_independent(self.equations, structure)
             except Undetermined as error:
                 raise diagnosis.undetermined(
                     self.description, self.equations, self.sketch, coordinates, str(error)

@@ -115,8 +115,18 @@ class Equations:
         return np.vstack([self._edge_rows(spans, directions), *(self._row(x, coordinate) for coordinate in held)])
 
     def generic(self, held: Sequence[Coordinate] = ()) -> Vector:
-        """The Jacobian for dimensions without any special relation (but the directions of slides)."""
-        rng = np.random.default_rng(1)
+        """The Jacobian for dimensions without any special relation (but the directions of slides).
+
+        Of several draws one of the largest rank: chance can only lower it. Not finite where no draw is, as a held
+        expression may be defined for few values only.
+        """
+        draws = [self.drawn(held, seed) for seed in range(TRIES)]
+        finite = [jacobian for jacobian in draws if np.isfinite(jacobian).all()]
+        return min(finite, key=lambda jacobian: null_space(jacobian).shape[1], default=draws[0])
+
+    def drawn(self, held: Sequence[Coordinate], seed: int) -> Vector:
+        """The Jacobian for dimensions drawn at random (but the directions of slides)."""
+        rng = np.random.default_rng(seed)
         x = rng.uniform(-1, 1, self.inner + 2 * (len(self.graph.nodes) - 1))
         tail, head, *_ = self._ends
         nodes = self.unpack(x)[0]
