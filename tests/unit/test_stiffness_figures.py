@@ -44,6 +44,17 @@ def test_pictures_of_a_pin(overrides: list[str], names: set[str]) -> None:
     assert pictures(FIVE_BAR, *overrides) == names
 
 
+def test_what_is_rigid_on_the_way_has_no_curve() -> None:
+    """An arm that its drives hold rigidly; with a soft one, seen from its hinge, it gives to moments only."""
+    along = [
+        "stiffness.poses=null",
+        sweep("{shoulder: {from: 0, to: 90, step: 10}, elbow: 50}"),
+        "stiffness.elastic={}",
+    ]
+    assert pictures(ARM, *along, "stiffness.actuators={}") == set()
+    assert pictures(ARM, *along, "stiffness.link=upper", "stiffness.at=O") == {"stiffness"}
+
+
 def test_a_leg_without_springs_has_no_picture_of_them() -> None:
     assert pictures(ARM, "stiffness.loads=[[0, -100, 0]]") == {"directions", "deflections"}
 

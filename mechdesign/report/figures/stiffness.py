@@ -38,11 +38,12 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
         found["directions"] = directions
     poses = study.poses("stiffness")
     if not poses.listed and poses.count > 2:
-        if len(poses.grid) == 1:
-            found["stiffness"] = _curves(study, result)
         over = plane(study, poses, study.stiffness)
         if over is not None:
             found["stiffness"] = _map(study, result, over)
+        curves = _curves(study, result) if len(poses.grid) == 1 else None
+        if curves is not None:
+            found["stiffness"] = curves
     return found
 
 
@@ -123,25 +124,33 @@ def _directions(study: Study, result: Result) -> Figure | None:
     return figure
 
 
-def _curves(study: Study, result: Result) -> Figure:
-    table, poses = result.tables["stiffness"], study.poses("stiffness")
+def _curves(study: Study, result: Result) -> Figure | None:
+    """Stiffnesses to a force and to a moment along a path; what is rigid or free everywhere has no curve."""
+    table, poses, units = result.tables["stiffness"], study.poses("stiffness"), study.units
     moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
     along = poses.values[moving[0]] if len(moving) == 1 else np.arange(poses.count)
-    turning = "k_phi" in table
-    figure = style.new_figure(style.WIDTH, 5.2 if turning else 3.4)
-    axes = figure.subplots(1 + turning, 1, sharex=True, squeeze=False)[:, 0]
-    for name, look in (("k_x", "-"), ("k_y", "-"), ("k_min", "--"), ("k_max", ":")):
-        values = np.where(np.isfinite(table[name]), table[name], np.nan)
-        axes[0].plot(along, values, look, label=name, color=style.INK if look != "-" else None)
-    axes[0].set_ylabel(style.axis_label("stiffness to a force", study.units.label("stiffness")))
-    if turning:
-        axes[1].plot(along, table["k_phi"], color=style.GREEN, label="k_phi")
-        axes[1].set_ylabel(style.axis_label("to a moment", study.units.label("rotational_stiffness")))
-    for axis in axes:
+    forces = {"k_x": ("-", None), "k_y": ("-", None), "k_min": ("--", style.INK), "k_max": (":", style.INK)}
+    panels = [
+        (about, kind, looks)
+        for about, kind, looks in (
+            ("stiffness to a force", "stiffness", forces),
+            ("to a moment", "rotational_stiffness", {"k_phi": ("-", style.GREEN)}),
+        )
+        if any(name in table and np.isfinite(table[name]).any() for name in looks)
+    ]
+    if not panels:
+        return None
+    figure = style.new_figure(style.WIDTH, 5.2 if len(panels) > 1 else 3.4)
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (about, kind, looks) in zip(axes, panels, strict=True):
+        for name, (look, color) in looks.items():
+            values = np.where(np.isfinite(table[name]), table[name], np.nan)
+            axis.plot(along, values, look, label=name, color=color)
+        axis.set_ylabel(style.axis_label(about, units.label(kind)))
         axis.set_yscale("log")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     single = len(moving) == 1
-    unit = study.units.label(study.mechanism.quantity(moving[0])) if single else ""
+    unit = units.label(study.mechanism.quantity(moving[0])) if single else ""
     axes[-1].set_xlabel(style.axis_label(moving[0] if single else "pose along the path", unit))
     figure.align_ylabels(axes)
     return figure
