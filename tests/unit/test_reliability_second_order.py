@@ -232,6 +232,16 @@ reliability:
     assert found == pytest.approx(shift, rel=0.02)
 
 
+def test_a_parameter_that_changes_nothing_adds_nothing() -> None:
+    moments = []
+    for more in ({}, {"mechanism.parameters.c": "7", "reliability.dimensions.c": "0.5"}):
+        study = study_of(LEVER, "reliability.dimensions.a=0.3", *(f"{path}={value}" for path, value in more.items()))
+        table = mechdesign.reliability(study).tables["moments"]
+        moments.append([table[name].tolist() for name in ("mean", "sigma", "worst_case")])
+    assert moments[0] == moments[1]
+    assert 10 < moments[0][0][1] < 10.1
+
+
 def test_without_neighbours_there_is_no_second_order() -> None:
     """Exactly at the fold, the crank upright and as long as the rod, a shorter rod cannot be assembled."""
     changes = ["mechanism.links.rod=[A, B, 100]", "reliability.poses=[{theta: 90}, {theta: 60}]"]

@@ -148,8 +148,11 @@ class Sources:
         found = []
         for scalar in self.scalars:
             mean, variance, _, _ = scalar.law.moments
-            slopes = _geometric(self.study.parameters.derivatives(scalar.name)) if scalar.kind == "parameter" else None
-            found.append(Source(scalar.name, (slopes or {scalar.name: 1.0},), mean, variance, scalar.law.reach))
+            slopes = {scalar.name: 1.0}
+            if scalar.kind == "parameter":
+                # Of one that changes nothing there are none.
+                slopes = _geometric(self.study.parameters.derivatives(scalar.name))
+            found.append(Source(scalar.name, (slopes,), mean, variance, scalar.law.reach))
         for pin in self.pins:
             mean, variance, _, _ = (0.0, 0.0, 0.0, 0.0) if pin.spread is None else pin.spread.moments
             spread = PIN_LAWS[pin.analytic].variance * (variance + (pin.radius + mean) ** 2)
