@@ -243,6 +243,13 @@ def test_stiffness_indices_need_what_they_are_about(name: str, said: str) -> Non
         mechdesign.workspace(study)
 
 
+def test_stiffness_indices_need_something_that_gives() -> None:
+    """Where nothing does, k_min is infinite everywhere: neither integrated nor drawn."""
+    study = study_of(FIVE_BAR, "stiffness={at: P}", "workspace.indices=[k_min]")
+    with pytest.raises(StudyError, match="stiffness: indices of stiffness need something that gives"):
+        mechdesign.workspace(study)
+
+
 def test_reliability_as_an_index_needs_limits() -> None:
     study = study_of(FIVE_BAR, "reliability={dimensions: {q1: 0.1}}", "workspace.indices=[reliability]")
     with pytest.raises(StudyError, match="needs limits"):

@@ -35,9 +35,13 @@ CLEAR = (5.0, 18.0)
 
 
 def map_figures(study: Study, found: Sequence[Region]) -> dict[str, Figure]:
-    """One map an index of the table of local indices; of many regions a few, spread evenly."""
+    """One map an index of the table of local indices; of many regions a few, spread evenly.
+
+    There is none of an index that is infinite everywhere.
+    """
     shown = [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST)).astype(int))]
-    return {name: _map(study, shown, name) for name in index_columns(found[0])}
+    names = [name for name in index_columns(found[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
+    return {name: _map(study, shown, name) for name in names}
 
 
 def index_columns(region: Region) -> list[str]:

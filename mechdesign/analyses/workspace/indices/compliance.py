@@ -11,6 +11,7 @@ import numpy as np
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate
 from mechdesign.analyses.workspace.indices.local import Floats
+from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.configuration import Configuration
 
 if TYPE_CHECKING:
@@ -19,10 +20,21 @@ if TYPE_CHECKING:
 
 
 def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) -> Evaluate:
-    """An index from compliances, shape (n, size, size), to values, shape (n,); `free` where a twist is free."""
+    """An index from compliances, shape (n, size, size), to values, shape (n,); `free` where a twist is free.
+
+    Raises
+    ------
+    StudyError
+        If nothing gives: every stiffness would be infinite.
+    """
     # Here, for the poses of a stiffness question may themselves be nodes of a workspace.
     from mechdesign.analyses.stiffness.analysis import ask
 
+    section = study.stiffness
+    assert section is not None
+    if not (section.elastic or section.actuators or section.bearings):
+        message = "indices of stiffness need something that gives: elastic links, actuators or bearings"
+        raise StudyError((Problem(message, "stiffness", str(study.path or "")),))
     return assembled_only(partial(_evaluate, ask(study), value, free))
 
 
