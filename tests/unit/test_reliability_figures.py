@@ -85,6 +85,14 @@ def test_every_method_alone_is_drawn(method: str) -> None:
     assert legend(found["reliability"])[0].startswith(LOOKS[method].words)
 
 
+def test_a_listed_pose_without_a_value_is_left_empty() -> None:
+    found, _ = drawn(ARM, "reliability.poses=[{q1: 30, q2: 90}, {P.x: 300, P.y: 0}]",
+                     "reliability.methods=[analytic, monte_carlo]")  # fmt: skip
+    (axes,) = found["reliability"].axes
+    assert sorted(text.xy[0] for text in axes.texts) == pytest.approx([-0.15, 0.15])
+    assert len(axes.get_xticks()) == 2
+
+
 def test_methods_look_different() -> None:
     assert set(LOOKS) == set(METHODS)
     for aspect in ("words", "color", "marker"):

@@ -84,6 +84,8 @@ def _listed(study: Study, axes: Axes, table: Table, poses: Poses, floor: float, 
             (entries[look.words],) = axes.plot(at, value, look.marker, color=look.color, clip_on=False)
         for x, row in zip(at, rows, strict=True) if written else ():
             height = float(table["failure_high" if unseen[row] else "failure"][row])
+            if np.isnan(height):
+                continue
             axes.annotate(f"< {number(height)}" if unseen[row] else number(height), (x, max(height, floor)),
                           xytext=(8, 0), textcoords="offset points", va="center", fontsize=8)  # fmt: skip
     words = [pose_in_words(study, poses, row).replace(", ", "\n") for row in range(count)]
