@@ -145,7 +145,20 @@ def test_everything_fails(dead: float) -> None:
     assert quasi.failure == quasi.high == 1.0
     assert quasi.invalid == (4096 if np.isnan(dead) else 0)
     found = sampled(problem, most=10_000)
+    assert found.failure <= 1.0
     assert found.high == pytest.approx(1.0, abs=0.05)
+
+
+def test_form_does_not_know_what_breaks_a_limit_without_a_design_point() -> None:
+    assert np.isnan(tangents(Problem(3, lambda u: np.full((1, u.shape[1]), -1.0))))
+
+
+def test_a_band_without_width_is_always_left() -> None:
+    problem = Problem(3, lambda u: np.stack([u[0], -u[0]]))
+    assert tangents(problem) == pytest.approx(1.0, abs=1e-6)
+    assert max(tangents(problem, seed) for seed in range(1, 6)) <= 1.0
+    found = sampled(problem, most=10_000)
+    assert found.low <= found.failure <= found.high <= 1.0
 
 
 @pytest.mark.parametrize("beta", [-0.5, -2.0, -4.0])

@@ -51,6 +51,22 @@ LIMITS = {
 }
 
 
+def test_form_without_a_design_point_says_so_and_gives_no_probability() -> None:
+    """A crank that is 0.4 too long for certain breaks the limit, and nothing random leads there or away."""
+    certain = ("reliability.dimensions={crank.length: [0.4, 0.4]}", "reliability.clearances={}",
+               "reliability.limits={B.x: 0.1}", "reliability.samples=2000")  # fmt: skip
+    sweep = "reliability.sweep={theta: {from: 30, to: 50, step: 10}}"
+    study = study_of(SLIDER_CRANK, *certain, "reliability.poses=null", sweep, "reliability.methods=[analytic, form]")
+    result = mechdesign.reliability(study)
+    table = result.tables["reliability"]
+    own = table["method"] == "form"
+    assert table["failure"][~own].tolist() == [1.0] * 4
+    assert np.isnan(table["failure"][own]).all()
+    assert table["scope"][own].tolist() == ["pose"] * 3 + ["cycle"]
+    (said,) = [note for note in result.warnings if note.startswith("form:")]
+    assert "theta = 30 deg and at 2 more poses" in said
+
+
 @pytest.mark.parametrize("limits", LIMITS.values(), ids=LIMITS)
 def test_all_methods_agree_about_limits_of_rates_and_of_several_outputs(limits: str) -> None:
     """The whole ladder against each other: their intervals overlap, and what claims none is near."""

@@ -19,7 +19,7 @@ from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unkn
 from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
 from mechdesign.analyses.reliability.methods import METHODS, MOST, Found, Partial, Task, analytic
 from mechdesign.analyses.reliability.question import Question, ask
-from mechdesign.analyses.reliability.shortfalls import unassembled, unreached
+from mechdesign.analyses.reliability.shortfalls import pointless, unassembled, unreached
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.unseen import unseen
@@ -114,7 +114,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         counts["cycles"] = cycles[0]
     failures = [
         *disagreements(study, poses, found), *unseen(study, poses, found), *unreached(study, poses, found, task),
-        *unassembled(found), *notes(found, task), *sobol.doubts(study, poses, task, indices), *failures,
+        *pointless(study, poses, found), *unassembled(found), *notes(found, task),
+        *sobol.doubts(study, poses, task, indices), *failures,
     ]  # fmt: skip
     if interrupted:
         interrupted += f"{counts.get('samples', 0)} samples, "

@@ -77,7 +77,7 @@ def bounds(estimates: Sequence[Estimate]) -> Estimate:
     The value is the conservative end, whatever the dependence between the poses. [Boole's inequality.]
     """
     low = float(np.max([each.low for each in estimates]))
-    high = min(1.0, float(np.sum([each.high for each in estimates])))
+    high = float(np.minimum(1.0, np.sum([each.high for each in estimates])))
     return Estimate(high, low, high, 0)
 
 

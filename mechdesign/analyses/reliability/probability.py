@@ -103,7 +103,7 @@ def half_spaces(normals: Floats, distances: Floats) -> float:
     held = normals @ u > distances[:, None]
     # Its own half-space holds a point whatever rounding says.
     held[half, np.arange(_POINTS)] = True
-    return total * float(np.mean(1.0 / held.sum(axis=0)))
+    return min(total * float(np.mean(1.0 / held.sum(axis=0))), 1.0)
 
 
 def _outside(low: float, high: float, sigma: float) -> float:

@@ -1,7 +1,8 @@
-"""What methods that sample about the limits fell short of: the precision asked, and what cannot be assembled there."""
+"""What methods that look about the limits fell short of: the precision asked, design points, what can be assembled."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from mechdesign.analyses.poses import pose_in_words
@@ -35,6 +36,19 @@ def unreached(study: Study, poses: Poses, found: Sequence[Found], task: Task) ->
     return [
         f"auto: {what} is {reached} at {pose_in_words(study, poses, pose)}{others}, not the {asked} asked; "
         f"it ends at {task.most} samples, which reliability.samples sets"
+    ]
+
+
+def pointless(study: Study, poses: Poses, found: Sequence[Found]) -> list[str]:
+    """A sentence where `form` found no design point although limits are broken."""
+    unknown = [pose for each in found if each.method == "form"
+               for pose, estimate in each.estimates.items() if math.isnan(estimate.failure)]  # fmt: skip
+    if not unknown:
+        return []
+    others = f" and at {len(unknown) - 1} more poses" if len(unknown) > 1 else ""
+    return [
+        f"form: samples break a limit at {pose_in_words(study, poses, unknown[0])}{others}, but no design point was "
+        "found: it has no probability there"
     ]
 
 

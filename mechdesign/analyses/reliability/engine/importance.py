@@ -122,7 +122,8 @@ def importance_sampling(
                 more = MARGIN * precision.needed(mean, squares / done - mean * mean)
                 wanted = int(min(samples, max(1.2 * done, more)))
     low, high = weighted(total, squares, most, done)
-    return Estimate(total / done, low, high, problem.evaluations, done, failures, invalid)
+    # Weights are 1 on the average only.
+    return Estimate(min(total / done, 1.0), low, high, problem.evaluations, done, failures, invalid)
 
 
 def _about(points: DesignPoints) -> Mixture:

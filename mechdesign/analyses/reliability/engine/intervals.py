@@ -35,7 +35,7 @@ def weighted(total: float, squares: float, most: float, samples: int) -> tuple[f
     one, tail = most / samples, 0.5 * (1.0 - CONFIDENCE)
     low = _gamma(mean, variance, tail)
     high = _gamma(mean + one, variance + one * one, 1.0 - tail)
-    return low, min(high, 1.0)
+    return min(low, 1.0), min(high, 1.0)
 
 
 def _gamma(mean: float, variance: float, share: float) -> float:
