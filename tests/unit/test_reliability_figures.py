@@ -229,6 +229,16 @@ def test_density_of_velocities_has_their_limits() -> None:
     assert found["density_contours"].axes[0].get_xlabel() == "P.x velocity error [mm/s]"
 
 
+def test_density_of_an_output_and_its_velocity() -> None:
+    found, result = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
+                          "reliability.limits={P.x: 0.2, P.x_velocity: 0.3}")  # fmt: skip
+    table = result.tables["density"]
+    assert [c.name for c in table.columns if c.name.endswith("_error")] == ["P.x_error", "P.x_velocity_error"]
+    assert not np.array_equal(table["P.x_error"], table["P.x_velocity_error"])
+    axes = found["density_contours"].axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("P.x error [mm]", "P.x velocity error [mm/s]")
+
+
 def test_density_of_one_sided_tolerances_lies_about_their_mean() -> None:
     found, result = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]",
                           "reliability.dimensions={'*.length': {tolerance: [0, 0.6]}}")  # fmt: skip

@@ -182,8 +182,7 @@ def elasticity(study: Study) -> tuple[Elasticity | None, list[str]]:
 
 def unknown(loaded: Elasticity, channels: Sequence[Channel]) -> list[str]:
     """A warning that names the channels whose deflection is not known."""
-    names = {0: "", 1: "_velocity", 2: "_acceleration"}
-    lost = [c.coordinate.name + names[c.order] for c in channels if not loaded.knows(c)]
+    lost = [channel.name for channel in channels if not loaded.knows(channel)]
     if not lost:
         return []
     return [

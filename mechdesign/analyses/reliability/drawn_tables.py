@@ -52,8 +52,8 @@ def density(answer: Answer) -> Table | None:
     if not rows:
         return None
     cells, sigma, mean = CELLS * CELLS, np.array(scales), np.array(means)
-    output, _, unit = answer.labels
-    names = [output[k] for k in pair]
+    unit = answer.labels[2]
+    names = [answer.question.channels[k].name for k in pair]
     columns = [
         *answer.at(np.repeat(np.array(rows, dtype=np.intp), cells)),
         Column(

@@ -30,6 +30,11 @@ class Channel:
     coordinate: Coordinate
     order: int
 
+    @property
+    def name(self) -> str:
+        """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
+        return self.coordinate.name + (f"_{ORDERS[self.order]}" if self.order else "")
+
 
 @dataclass(frozen=True)
 class Rates:

@@ -28,21 +28,16 @@ _LEVELS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8)
 
 def density_figures(study: Study, table: Table, moments: Table, where: str, method: str) -> dict[str, Figure]:
     """Contours and surfaces of the first pose of a density table; the axes are the errors, in their units."""
-    columns = [column for column in table.columns if column.name.endswith("_error")]
-    outputs = [column.name.removesuffix("_error") for column in columns]
-    units = [column.unit for column in columns]
-    # Outputs and units name the order: it may be velocities that are limited.
-    orders = [
-        next(order for output, order, unit in channels(moments) if (output, unit) == pair)
-        for pair in zip(outputs, units, strict=True)
-    ]
+    known = {f"{output}{SUFFIXES[order]}_error": (output, order) for output, order, _ in channels(moments)}
+    columns = [column for column in table.columns if column.name in known]
+    outputs, orders = ([known[column.name][k] for column in columns] for k in range(2))
     kept = np.flatnonzero(_first_pose(table))
     cells = int(np.sqrt(len(kept)))
     x, y = (table[column.name][kept].reshape(cells, cells) for column in columns)
     densities = [table[name][kept].reshape(cells, cells) for name in ("normal", "simulated")]
     labels = [
         style.axis_label(f"{output} {order} error".replace("position ", ""), unit)
-        for output, order, unit in zip(outputs, orders, units, strict=True)
+        for output, order, unit in zip(outputs, orders, [column.unit for column in columns], strict=True)
     ]
     titles = ("bivariate normal, first order", f"simulation ({method})")
     limits = _limits(study, outputs, orders)
