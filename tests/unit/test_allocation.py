@@ -204,6 +204,12 @@ def test_limits_that_no_tolerance_keeps() -> None:
     assert "shrink to nothing" in ask(CHAIN, "reliability.limits.B.x=1e-5").failed
     moved = ask(CHAIN, "reliability.dimensions.a=[0.5, 0.7]")
     assert "mean errors" in moved.failed
+    # A clearance that is held, and would do, is not to blame.
+    small = "  clearances: {O: {radial: 0.01, link: lever}}\n"
+    text = LEVER.replace("theta: 0}", "theta: 90}") + small
+    result = ask(text, "reliability.limits={P.y: 0.3}", "reliability.dimensions.lever.length=[0.5, 0.7]")
+    assert "mean errors" in result.failed
+    assert "held" not in result.failed
 
 
 def test_asymmetric_tolerances_keep_their_middle() -> None:
