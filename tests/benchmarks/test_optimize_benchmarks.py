@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.memory import peak_of
 
 import mechdesign
 from mechdesign.analyses.optimize.goals import Evaluator, goal
@@ -79,14 +79,7 @@ def test_memory_of_a_million_designs(benchmark: Any, tmp_path: Path) -> None:
     changes = [part for change in (PATH, poses, section) for part in ("--set", change)]
     command = [sys.executable, "-m", "mechdesign", "optimize", str(CONFIGS / "gallery" / "four_bar.yaml"), *changes]
 
-    def run() -> int:
-        with subprocess.Popen([*command, "--out", str(tmp_path)], stdout=subprocess.DEVNULL) as process:
-            _, status, used = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-        assert process.returncode == 0
-        return int(used.ru_maxrss * (1 if sys.platform == "darwin" else 1024))
-
-    peak = benchmark.pedantic(run, rounds=1)
+    peak = benchmark.pedantic(lambda: peak_of([*command, "--out", str(tmp_path)]), rounds=1)
     benchmark.extra_info["peak_megabytes"] = peak / 1e6
     with (tmp_path / "designs.csv").open() as lines:
         assert sum(1 for _ in lines) == 16 * 16 * 62 * 63 + 1
