@@ -41,6 +41,11 @@ def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
     for index, pair in enumerate(pairs):
         if pair in pairs[:index]:
             checker.reporter.report(("reliability", "correlation", index), "this pair is given twice")
+    if not section.methods:
+        checker.reporter.report(("reliability", "methods"), "name at least one method")
+    for index, method in enumerate(section.methods):
+        if method in section.methods[:index]:
+            checker.reporter.report(("reliability", "methods", index), f"{method!r} is given twice")
     if section.allocate is not None:
         _allocate(checker, section, dimensions, clearances)
     load = _load(checker, section, dimensions)

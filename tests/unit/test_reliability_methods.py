@@ -8,7 +8,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.workspace import nodes
-from mechdesign.errors import Interrupted
+from mechdesign.errors import Interrupted, StudyError
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.reliability_models import METHODS
@@ -49,6 +49,15 @@ LIMITS = {
     "three orders of one output": "{B.x: 0.6, B.x_velocity: 0.7, B.x_acceleration: {min: -1.5, max: 1.7}}",
     "a circle of velocities and an angle": "{A_velocity: {radius: 0.5}, rod.angle: {max: 0.05}}",
 }
+
+
+@pytest.mark.parametrize(
+    ("methods", "message"),
+    [("[]", "reliability.methods: name at least one"), ("[auto, form, auto]", "methods.2: 'auto' is given twice")],
+)
+def test_methods_are_at_least_one_and_none_twice(methods: str, message: str) -> None:
+    with pytest.raises(StudyError, match=message):
+        study_of(SLIDER_CRANK, f"reliability.methods={methods}")
 
 
 def test_form_without_a_design_point_says_so_and_gives_no_probability() -> None:
