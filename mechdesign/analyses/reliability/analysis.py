@@ -53,9 +53,10 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     Returns
     -------
     Result
-        Tables ``moments``, ``reliability`` (where there are limits), ``contributions``, ``density`` and
-        ``convergence``; where tolerances are allocated ``allocation`` and ``confirmation``, and the study
-        ``allocated.yaml`` that has them.
+        Tables ``moments``, ``reliability`` (where there are limits) and ``contributions``; of methods that sample the
+        errors ``density`` (of two outputs), ``histogram``, ``convergence`` and ``estimate`` (where there are limits);
+        where tolerances are allocated ``allocation`` and ``confirmation``, and the study ``allocated.yaml`` that has
+        them.
 
     Raises
     ------
@@ -63,6 +64,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         If nothing varies.
     AssemblyError
         If no pose at all can be assembled.
+    Interrupted
+        On Ctrl-C, with what was found so far.
     """
     keep_freed_memory()
     sources, warnings = find_sources(study)

@@ -37,7 +37,8 @@ def failure_probability(
         May be singular.
     bands, discs
         All limits must hold. One or two limited outputs are integrated to about 1e-14 of the result; more by a
-        randomised lattice, to about 1e-5 of it, or where that is rarely broken by sampling, to about 1e-3.
+        randomised lattice, to about 1e-5 of it, or where bands are rarely broken by sampling, to about 1e-3. A circle
+        beside other limits that is rarely broken may be missed by the lattice: the result is then too small.
     mean : ndarray, shape (outputs,), optional
         Of the errors; left out, zero.
     """
