@@ -88,8 +88,7 @@ class Across:
         """Margins, negated where what is outside is looked at, and the distances from both ends of the range."""
         z = self.about + radius * np.exp(1j * self.theta[ray])
         found = self.sliced.margins(z, {VALUE: value})
-        found = np.where(np.isnan(found), np.nan, -found) if self.every else found
-        return np.concatenate([found, [value - self.low, self.high - value]])
+        return np.concatenate([-found if self.every else found, [value - self.low, self.high - value]])
 
     def cut(self, ray: Ints, radius: Floats) -> tuple[Ints, Floats, Ints]:
         """Intervals of the range at points of rays, see `extremes.Cut`."""

@@ -88,9 +88,6 @@ class Endings(Field):
 class RangedDesigns(Designs):
     """Rays through a region over a range: `field` is of `Endings`, and so are the labels of what rays meet."""
 
-    # A kink so far inside a panel costs less than its square; nearer to where labels change, noise chooses them.
-    accuracy: ClassVar[float] = 1e-7
-
     def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
         """As `Designs.traced`."""
         # Nearer to where labels change, rounding chooses them.

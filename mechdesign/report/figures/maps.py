@@ -96,7 +96,7 @@ def label_levels(
     taken = np.zeros(0, dtype=complex)
     for k, level in enumerate(levels[1:]):
         places = [(part[j], part[j + 1] - part[j - 1]) for part in lines[k] if len(part) > 4
-                  for j in range(2, len(part) - 2, max(1, len(part) // 40))]  # fmt: skip
+                  for j in range(2, len(part) - 2, max(1, len(part) // 40)) if part[j + 1] != part[j - 1]]  # fmt: skip
         if not places:
             continue
         at, along = np.array(places).T
