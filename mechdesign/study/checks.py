@@ -135,7 +135,7 @@ class Checker:
                     self.kind((*path, index), quantity)
         for index, name in enumerate(section.indices or ()):
             needed = NEEDED.get(name)
-            if needed is not None and self.parts.get(needed) is None:
+            if needed is not None and self.reporter.raw((needed,)) is None:
                 message = f"the index {name!r} needs the {needed} section, and the study has none"
                 self.reporter.report(("workspace", "indices", index), message)
         scan = section.scan

@@ -27,7 +27,7 @@ _ACCELERATION_KINDS: dict[Quantity, str] = {"length": "acceleration", "angle": "
 
 def coordinates(checker: Checker, command: str, section: PoseSection) -> None:
     """Check the names and units of the coordinates that poses give."""
-    if section.at_nodes and checker.parts.get("workspace") is None:
+    if section.at_nodes and checker.reporter.raw(("workspace",)) is None:
         checker.reporter.report((command, "poses"), "needs the workspace section, whose nodes are meant")
     for index, pose in enumerate(section.poses or ()):
         _given(checker, pose, (command, "poses", index))

@@ -236,6 +236,16 @@ def test_what_indices_need(change: str, said: str | None) -> None:
         study_of(FIVE_BAR, change)
 
 
+def test_a_section_that_is_wrong_is_not_said_to_be_missing() -> None:
+    for change in (
+        ["stiffness={at: P, stiff: 1}", "workspace.indices=[k_min]"],
+        ["stiffness={at: P, poses: workspace}", "workspace.shape=1"],
+    ):
+        with pytest.raises(StudyError, match="unknown key") as caught:
+            study_of(FIVE_BAR, *change)
+        assert len(caught.value.problems) == 1
+
+
 @pytest.mark.parametrize(("name", "said"), [("k_direction", "needs a direction"), ("deflection", "needs loads")])
 def test_stiffness_indices_need_what_they_are_about(name: str, said: str) -> None:
     study = study_of(FIVE_BAR, ELASTIC, f"workspace.indices=[{name}]")
