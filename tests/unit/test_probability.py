@@ -149,3 +149,19 @@ def test_limits_about_another_place_than_the_mean() -> None:
     alone = disc_failure(covariance, 2.5, mean)
     wide = (Band(0, -50.0, 50.0),)
     assert failure_probability(covariance, wide, (disc,), mean) == pytest.approx(alone, rel=1e-4)
+
+
+@pytest.mark.parametrize(("radius", "rho"), [(7.0, 0.9), (6.0, 0.0), (9.0, -0.5), (4.5, 0.99)])
+def test_a_circle_beside_an_idle_limit_is_the_circle_however_rare(radius: float, rho: float) -> None:
+    covariance = np.array([[1.0, rho, 0.1], [rho, 1.0, 0.0], [0.1, 0.0, 1.0]])
+    mean = np.array([0.2, -0.1, 0.0])
+    alone = disc_failure(covariance[:2, :2], radius, mean[:2])
+    beside = failure_probability(covariance, (Band(2, -50.0, 50.0),), (Disc(0, 1, radius),), mean)
+    assert beside == pytest.approx(alone, rel=0.03)
+
+
+def test_a_circle_beside_a_limit_that_counts_as_well() -> None:
+    """Independent of each other: 1 - (1 - p)(1 - q)."""
+    p, q = disc_failure(np.eye(2), 6.0), 2 * ndtr(-5.5)
+    found = failure_probability(np.eye(3), (Band(2, -5.5, 5.5),), (Disc(0, 1, 6.0),))
+    assert found == pytest.approx(p + q, rel=0.02)

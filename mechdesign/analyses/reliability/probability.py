@@ -6,7 +6,7 @@ reliability is one minus it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ _SHIFTS = 8
 # Below this sum of the limits' probabilities a lattice sees too few failures; points that are drawn there instead.
 _RARE = 0.05
 _POINTS = 20_000
+# Sides of the polygon in a circle, beyond which points are drawn.
+_SIDES = 64
 
 
 def failure_probability(
@@ -37,8 +39,7 @@ def failure_probability(
         May be singular.
     bands, discs
         All limits must hold. One or two limited outputs are integrated to about 1e-14 of the result; more by a
-        randomised lattice, to about 1e-5 of it, or where bands are rarely broken by sampling, to about 1e-3. A circle
-        beside other limits that is rarely broken may be missed by the lattice: the result is then too small.
+        randomised lattice, to about 1e-5 of it, or where they are rarely broken by sampling, to about 1e-3.
     mean : ndarray, shape (outputs,), optional
         Of the errors; left out, zero.
     """
@@ -57,26 +58,50 @@ def failure_probability(
         (disc,) = discs
         pair = [disc.x, disc.y]
         return disc_failure(covariance[np.ix_(pair, pair)], disc.radius, mean[pair])
-    if not discs:
-        rare = _rare(covariance, bands, sigma)
-        if rare is not None:
-            return rare
-    return _lattice(covariance, bands, discs, mean)
+    rare = _rare(covariance, bands, discs, sigma, mean)
+    return _lattice(covariance, bands, discs, mean) if rare is None else rare
 
 
-def _rare(covariance: Floats, bands: Sequence[Band], sigma: Floats) -> float | None:
-    """Probability outside any of several bands where it is small; None where a lattice is better."""
-    if sum(_outside(band.low, band.high, float(sigma[band.output])) for band in bands) > _RARE:
+def _rare(
+    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], sigma: Floats, mean: Floats
+) -> float | None:
+    """Probability outside any of several limits where it is small; None where a lattice is better."""
+    total = sum(_outside(band.low, band.high, float(sigma[band.output])) for band in bands)
+    for disc in discs:
+        pair = [disc.x, disc.y]
+        total += disc_failure(covariance[np.ix_(pair, pair)], disc.radius, mean[pair])
+    if total > _RARE:
         return None
     squares, axes = np.linalg.eigh(covariance)
     rows = axes * np.sqrt(np.maximum(squares, 0.0))
-    ends = [(band.output, way, limit) for band in bands if sigma[band.output] > 0
-            for way, limit in ((1.0, band.high), (-1.0, -band.low)) if np.isfinite(limit)]  # fmt: skip
-    normals = np.array([way * rows[output] / sigma[output] for output, way, _ in ends]).reshape(-1, len(rows))
-    return half_spaces(normals, np.array([limit / sigma[output] for output, _, limit in ends]))
+    slopes = [way * rows[band.output] for band in bands for way in (1.0, -1.0)]
+    ends = [end for band in bands for end in (band.high, -band.low)]
+    # What is outside a circle is beyond a side of the polygon in it.
+    turns = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    for disc in discs:
+        for x, y in zip(np.cos(turns), np.sin(turns), strict=True):
+            slopes.append(x * rows[disc.x] + y * rows[disc.y])
+            ends.append(disc.radius * np.cos(np.pi / _SIDES) - x * mean[disc.x] - y * mean[disc.y])
+    size = np.linalg.norm(slopes, axis=1)
+    used = (size > 0) & np.isfinite(ends)
+    flat = np.count_nonzero(used[: 2 * len(bands)])
+
+    def broken(u: Floats, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        found = np.asarray(held[:flat].any(axis=0))
+        for disc in discs:
+            found |= np.hypot(*(mean[k] + rows[k] @ u for k in (disc.x, disc.y))) > disc.radius
+        return found
+
+    return half_spaces(
+        np.array(slopes)[used] / size[used, None], np.array(ends)[used] / size[used], broken if discs else None
+    )
 
 
-def half_spaces(normals: Floats, distances: Floats) -> float:
+def half_spaces(
+    normals: Floats,
+    distances: Floats,
+    broken: Callable[[Floats, NDArray[np.bool_]], NDArray[np.bool_]] | None = None,
+) -> float:
     """Probability that a standard normal point lies in any half-space ``normal . u > distance``, to some 1e-3 of it.
 
     Parameters
@@ -84,6 +109,9 @@ def half_spaces(normals: Floats, distances: Floats) -> float:
     normals : ndarray, shape (half-spaces, dimension)
         Unit vectors.
     distances : ndarray, shape (half-spaces,)
+    broken : callable, optional
+        Which points count, where not all in the half-spaces do: from points, shape (dimension, n), and the half-spaces
+        that hold them, shape (half-spaces, n).
 
     Notes
     -----
@@ -93,7 +121,7 @@ def half_spaces(normals: Floats, distances: Floats) -> float:
     """
     chances = ndtr(-distances)
     total = float(chances.sum())
-    if len(chances) < 2 or total == 0:
+    if total == 0 or (len(chances) < 2 and broken is None):
         return total
     rng = np.random.Generator(np.random.SFC64(0))
     half = rng.choice(len(chances), _POINTS, p=chances / total)
@@ -104,7 +132,10 @@ def half_spaces(normals: Floats, distances: Floats) -> float:
     held = normals @ u > distances[:, None]
     # Its own half-space holds a point whatever rounding says.
     held[half, np.arange(_POINTS)] = True
-    return min(total * float(np.mean(1.0 / held.sum(axis=0))), 1.0)
+    weights = 1.0 / held.sum(axis=0)
+    if broken is not None:
+        weights = np.where(broken(u, held), weights, 0.0)
+    return min(total * float(np.mean(weights)), 1.0)
 
 
 def _outside(low: float, high: float, sigma: float) -> float:
