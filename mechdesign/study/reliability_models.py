@@ -48,12 +48,13 @@ SAMPLING = frozenset(("monte_carlo", "quasi_monte_carlo", "importance_sampling",
 DEFAULT_METHODS = ("analytic", "monte_carlo")
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
-_ORDERS = {"_velocity": 1, "_acceleration": 2}
+# What the names of errors of positions, velocities and accelerations end in.
+SUFFIXES = ("", "_velocity", "_acceleration")
 
 
 def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
     """The coordinate (or point) that a name is about, and whether it means the position, velocity or acceleration."""
-    for suffix, order in _ORDERS.items():
+    for order, suffix in enumerate(SUFFIXES):
         if not known(name) and name.endswith(suffix) and known(name.removesuffix(suffix)):
             return name.removesuffix(suffix), order
     return name, 0

@@ -17,7 +17,7 @@ from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
-from mechdesign.study.reliability_models import LOADS
+from mechdesign.study.reliability_models import LOADS, SUFFIXES
 
 Floats = NDArray[np.float64]
 ORDERS = ("position", "velocity", "acceleration")
@@ -33,7 +33,7 @@ class Channel:
     @property
     def name(self) -> str:
         """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
-        return self.coordinate.name + (f"_{ORDERS[self.order]}" if self.order else "")
+        return self.coordinate.name + SUFFIXES[self.order]
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.reliability.engine.precision import CONFIDENCE
 from mechdesign.analyses.reliability.first_order import FirstOrder
 from mechdesign.analyses.reliability.methods import Task
 from mechdesign.analyses.reliability.pins import PIN_LAWS
@@ -33,7 +34,7 @@ from mechdesign.study.reliability_models import SAMPLING, ReliabilitySection
 
 Floats = NDArray[np.float64]
 
-REPLICATES, CONFIDENCE = 16, 0.997
+REPLICATES = 16
 # Mechanisms solved a pose, and poses, where the study does not say how many points.
 BUDGET = 8_000
 POSES = 4

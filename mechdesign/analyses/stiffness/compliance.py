@@ -107,6 +107,25 @@ def hold(wrenches: Sequence[Array], compliances: Sequence[Array], length: float,
     return Held(stiffness / outer, compliance * outer, rank, free, margin)
 
 
+def principal(soft: Array) -> tuple[Array, Array, Array]:
+    """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi)."""
+    mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
+    radius = np.hypot(half, soft[:, 0, 1])
+    with np.errstate(divide="ignore"):
+        stiffest = mean - radius
+        high = np.where(stiffest > 1e-13 * mean, 1 / stiffest, np.where(np.isnan(mean), np.nan, np.inf))
+        low = 1 / (mean + radius)
+    angle = np.mod(np.arctan2(soft[:, 0, 1], half) / 2 + np.pi / 2, np.pi)
+    return low, high, angle
+
+
+def directional(soft: Array, direction: float) -> Array:
+    """Stiffness to a force in a direction (radians), the displacement counted along it."""
+    along = np.array([np.cos(direction), np.sin(direction)])
+    with np.errstate(divide="ignore"):
+        return np.asarray(1 / np.einsum("i,nij,j->n", along, soft[:, :2, :2], along))
+
+
 def _inverse(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Inverse (size, size, n) of the square wrench matrix where it is regular, and where that is."""
     norms = np.sqrt((matrix**2).sum(axis=0)).prod(axis=0)

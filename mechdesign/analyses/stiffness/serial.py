@@ -11,6 +11,7 @@ from mechdesign.analyses.stiffness.chains import chain_of, looked_at_from
 from mechdesign.analyses.stiffness.compliance import Held, hold
 from mechdesign.analyses.stiffness.legs import Leg
 from mechdesign.analyses.stiffness.screws import (
+    RIGID,
     constraint_compliance,
     equivalent_springs,
     joint_rank,
@@ -87,7 +88,7 @@ def _restrict(held: Held, condensed: bool) -> Held:
     stiffness = np.full(compliance.shape, np.nan)
     determinant = np.linalg.det(compliance)
     with np.errstate(invalid="ignore"):
-        good = determinant > 1e-12 * compliance[:, 0, 0] * compliance[:, 1, 1]
+        good = determinant > RIGID * compliance[:, 0, 0] * compliance[:, 1, 1]
     stiffness[good] = np.linalg.inv(compliance[good])
     rank = np.where(np.isfinite(determinant), 2, np.minimum(held.rank, 1))
     return Held(stiffness, compliance, rank, held.free[:, :2], held.margin)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_columns
+from mechdesign.analyses.stiffness.compliance import directional, principal
 from mechdesign.analyses.stiffness.legs import Leg
 from mechdesign.analyses.stiffness.screws import Array
 from mechdesign.results import Column, Table
@@ -54,7 +55,7 @@ def stiffness_table(
 ) -> Table:
     units = study.units
     size = stiff.shape[1]
-    low, high, angle = _principal(soft)
+    low, high, angle = principal(soft)
     with np.errstate(divide="ignore"):
         direct = [1 / soft[:, k, k] for k in range(size)]
     columns = pose_columns(study, poses)
@@ -71,10 +72,14 @@ def stiffness_table(
         Column("k_angle", angle / units.angle_factor, units.label("angle"), "angle of the stiffest direction"),
     ]
     if direction is not None:
-        along = np.array([np.cos(direction), np.sin(direction)])
-        with np.errstate(divide="ignore"):
-            value = 1 / np.einsum("i,nij,j->n", along, soft[:, :2, :2], along)
-        columns.append(Column("k_direction", value, unit, "force in the asked direction over displacement along it"))
+        columns.append(
+            Column(
+                "k_direction",
+                directional(soft, direction),
+                unit,
+                "force in the asked direction over displacement along it",
+            )
+        )
     columns += _entries(study, "K", stiff, "stiffness", "stiffness matrix at the asked point; nan where rigid")
     columns.append(Column("rank", rank, "", "number of independent wrenches that hold the body"))
     for k, name in enumerate(("free_x", "free_y", "free_phi")[:size]):
@@ -89,18 +94,6 @@ def stiffness_table(
         )
     )
     return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
-
-
-def _principal(soft: Array) -> tuple[Array, Array, Array]:
-    """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi)."""
-    mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
-    radius = np.hypot(half, soft[:, 0, 1])
-    with np.errstate(divide="ignore"):
-        stiffest = mean - radius
-        high = np.where(stiffest > 1e-13 * mean, 1 / stiffest, np.where(np.isnan(mean), np.nan, np.inf))
-        low = 1 / (mean + radius)
-    angle = np.mod(np.arctan2(soft[:, 0, 1], half) / 2 + np.pi / 2, np.pi)
-    return low, high, angle
 
 
 def eigen_table(study: Study, poses: Poses, soft: Array, length: float) -> Table:

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, gammaincinv, stdtrit
 
-Floats = NDArray[np.float64]
+from mechdesign.analyses.reliability.engine.precision import CONFIDENCE
 
-CONFIDENCE = 0.997
+Floats = NDArray[np.float64]
 
 
 def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:

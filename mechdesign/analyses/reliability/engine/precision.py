@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-# Half the width of a 99.7 % interval in standard errors.
+# Of all intervals.
+CONFIDENCE = 0.997
+# Half the width of such an interval in standard errors.
 WIDTH = 2.97
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from mechdesign.analyses.stiffness.compliance import directional
 from mechdesign.analyses.workspace.indices.compliance import of_compliance
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index
 from mechdesign.errors import Problem, StudyError
@@ -28,8 +27,7 @@ def prepare(study: Study) -> Evaluate:
         message = "the index 'k_direction' needs a direction, for example {direction: 90}"
         raise StudyError((Problem(message, "stiffness.direction", str(study.path or "")),))
     turn = direction * study.units.angle_factor
-    along = np.array([np.cos(turn), np.sin(turn)])
-    return of_compliance(study, lambda soft: 1 / np.einsum("i,nij,j->n", along, soft[:, :2, :2], along), 0.0)
+    return of_compliance(study, lambda soft: directional(soft, turn), 0.0)
 
 
 INDEX = Index(

@@ -12,16 +12,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from mechdesign.analyses.reliability.first_order import ORDERS
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.reliability_models import SUFFIXES as ORDER_SUFFIXES
 
 Floats = NDArray[np.float64]
 
 # More of them in one picture cannot be told apart.
 MOST_PANELS = 6
-SUFFIXES = {"position": "", "velocity": "_velocity", "acceleration": "_acceleration"}
+SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
 _LEFT, _RIGHT, _TOP, _APART = 0.88, 0.3, 0.62, 0.42  # inches
 _TALL = 1.75
 # Below the lowest panel: its axis alone, and with a legend of one or two rows.
