@@ -1,6 +1,7 @@
 """Hypothesis: no deadlines, for machines are noisy; in CI the same examples at every run, to repeat it by.
 
 Linear algebra keeps to one thread: the matrices are small, and several workers share the processors.
+`--budget 30m` is how long the random searches of `tests/hunt` go on.
 """
 
 from __future__ import annotations
@@ -9,8 +10,22 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
+
+SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}  # of the units that --budget takes
+
+
+def seconds_of(text: str) -> float:
+    """Seconds of `90s`, `30m` or `2h`."""
+    return float(text[:-1]) * SECONDS[text[-1]]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--budget", type=seconds_of, default=None, help="time for the random searches of tests/hunt: 90s, 30m, 2h"
+    )
