@@ -1,8 +1,8 @@
 """Random searches for wrong answers, against solvers that share nothing with the package.
 
 A test takes `seeds` and asks it for as many cases as continuous integration can afford. With `pytest tests/hunt
---budget 30m` the cases go on, each test for its equal share of that time. A case is known by its seed, so that a find is
-repeated by it; each find is kept as a test of its own.
+--budget 30m` the cases go on, each test for its equal share of that time. A case is known by its seed, so that a find
+is repeated by it; each find is kept as a test of its own.
 
     def test_areas_against_rasters(seeds):
         for seed in seeds(20):
