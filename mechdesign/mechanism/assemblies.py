@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +15,10 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import Guess
 from mechdesign.mechanism.structure import Group
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.mechanism import Mechanism
 
 # Bound of the assemblies that are listed and followed.
 MOST = 256
@@ -118,11 +115,11 @@ def _variant(
 
 def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configuration]:
     """Assembled poses at the sketch's values for some modes of the closed forms; the sketch first, if it is one."""
-    sketch = plan.mechanism.sketch_configuration
-    vectors = plan.mechanism.geometry.nominal
+    sketch = plan.core.sketch_configuration
+    vectors = plan.core.geometry.nominal
     given = [np.asarray(sketch.value(coordinate), dtype=float) for coordinate in plan.structure.given]
     random = np.random.default_rng(0)
-    size = plan.mechanism.size
+    size = plan.core.size
     guess: Guess = {
         index: (
             [random.uniform(-np.pi, np.pi, STARTS) for _ in group.angles],
@@ -137,7 +134,7 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
         solved &= converged
     every = plan.configuration(state, (STARTS,), {}, vectors, solved, limits=False)
     good = every.valid
-    for slide in plan.mechanism.graph.telescopic:
+    for slide in plan.core.graph.telescopic:
         # A leg without length has no direction: whatever its angle, it is no assembly.
         with np.errstate(invalid="ignore"):
             good = good & (np.asarray(every.slides[slide]) > SAME * size)

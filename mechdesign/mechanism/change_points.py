@@ -6,18 +6,14 @@ goes on smoothly, which means that the group's assembly mode changes its sign.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.golden import lowest
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.plan import Plan
-    from mechdesign.mechanism.structure import Group
+from mechdesign.mechanism.structure import Group
 
 # A closure that falls below this part of its largest value touches zero: it is a difference of squared lengths.
 TOUCHING = 1e-10
@@ -37,15 +33,31 @@ class ChangePoints:
     """Assembly modes along one given coordinate: as drawn at the sketch, changed at every change point between.
 
     The points are searched once for each range of the coordinate that is asked for, and kept.
+
+    Parameters
+    ----------
+    modes : sequence of int
+        Assembly mode of each group as drawn.
+    sketch : float
+        Value of the coordinate in the sketch (radians or length).
+    period : float
+        A turn, or for a length the mechanism's size.
+    closures : callable
+        Closures of the first groups at values of the coordinate, for so many modes.
     """
 
-    def __init__(self, plan: Plan) -> None:
-        self._plan = plan
-        coordinate = plan.structure.given[0]
-        self.sketch = float(plan.mechanism.sketch_configuration.value(coordinate))
-        self._period = 2 * np.pi if coordinate.quantity == "angle" else max(plan.mechanism.size, 1e-300)
-        self._range = (self.sketch, self.sketch)
-        self._places: list[Array] = [np.empty(0) for _ in plan.modes]
+    def __init__(
+        self,
+        groups: Sequence[Group],
+        modes: Sequence[int],
+        sketch: float,
+        period: float,
+        closures: Callable[[Array, Sequence[Value]], Sequence[Value]],
+    ) -> None:
+        self._groups, self._modes, self._all_closures = groups, modes, closures
+        self.sketch, self._period = sketch, period
+        self._range = (sketch, sketch)
+        self._places: list[Array] = [np.empty(0) for _ in modes]
 
     def modes(self, values: Value) -> list[Value]:
         """Mode of each group at values of the given coordinate (radians or lengths)."""
@@ -60,7 +72,7 @@ class ChangePoints:
 
     def _parity(self, values: Array, groups: int) -> list[Value]:
         """Modes of the first groups; the others as drawn."""
-        found: list[Value] = list(self._plan.modes)
+        found: list[Value] = list(self._modes)
         for index in range(groups):
             places = self._places[index]
             if len(places):
@@ -78,8 +90,8 @@ class ChangePoints:
         count = int(np.ceil((high - low) / self._period * SAMPLES)) + 1
         samples = np.linspace(low, high, count)
         # Modes of a group decide where those behind it have their change points.
-        self._places = [np.empty(0) for _ in self._plan.modes]
-        for index, (group, mode) in enumerate(zip(self._plan.structure.groups, self._plan.modes, strict=True)):
+        self._places = [np.empty(0) for _ in self._modes]
+        for index, (group, mode) in enumerate(zip(self._groups, self._modes, strict=True)):
             if group.form == "newton":
                 # Its assembly is followed by continuity; what is solved behind it stays as drawn.
                 break
@@ -88,11 +100,9 @@ class ChangePoints:
         self._range = (low, high)
 
     def _closures(self, index: int, values: Array) -> Array:
-        plan = self._plan
-        groups = plan.structure.groups[: index + 1]
-        modes = self._parity(values, index)
-        state = plan.run([values], plan.mechanism.geometry.nominal, None, modes[: index + 1])
-        own = [c for c, group in zip(state.closures, closing_groups(groups), strict=True) if group == index]
+        modes = self._parity(values, index)[: index + 1]
+        closing = closing_groups(self._groups[: index + 1])
+        own = [c for c, group in zip(self._all_closures(values, modes), closing, strict=True) if group == index]
         return np.stack([np.broadcast_to(c, values.shape) for c in own])
 
     def _search(self, index: int, samples: Array) -> Array:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
+from mechdesign.mechanism.geometry import Geometry, Vectors
+from mechdesign.mechanism.graph import Graph
 from mechdesign.memory import keep_freed_memory
 from mechdesign.parallel import map_chunks, worker_count
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.plan import Plan
 
 # Poses of a chunk: the fastest of 4,096 to 262,144, measured. Closed forms are some fifty short operations; threads
 # hand the interpreter's lock over at each and gain only on longer arrays.
@@ -27,16 +26,30 @@ def too_large(shape: tuple[int, ...]) -> bool:
     return int(np.prod(shape, dtype=np.int64)) > CHUNK
 
 
+class AtOnce(Protocol):
+    """Solution of a batch in one piece, see `Plan.solve_at_once`."""
+
+    def __call__(
+        self,
+        values: Sequence[Value],
+        dims: Mapping[str, Value],
+        shape: tuple[int, ...],
+        start: Configuration | None,
+    ) -> Configuration: ...
+
+
 def solve(
-    plan: Plan,
+    at_once: AtOnce,
+    geometry: Geometry,
     values: Sequence[Value],
     dims: Mapping[str, Value],
     shape: tuple[int, ...],
     start: Configuration | None,
-    limits: bool,
     jobs: int | None,
+    *,
+    small: bool,
 ) -> Configuration:
-    """`Plan.solve` chunk by chunk; the same result, whatever `jobs`."""
+    """A large batch chunk by chunk; the same result, whatever `jobs`. `small` chunks suit iterations."""
     keep_freed_memory()
     count = int(np.prod(shape, dtype=np.int64))
 
@@ -49,19 +62,18 @@ def solve(
     if start is not None and start.shape:
         rows_of_start = flat(np.arange(int(np.prod(start.shape))).reshape(start.shape))
 
-    length = CHUNK if plan.iterative or worker_count(jobs) == 1 else MANY
+    length = CHUNK if small or worker_count(jobs) == 1 else MANY
 
     def part(begin: int) -> Configuration:
         some = slice(begin, begin + length)
         begun = start
         if start is not None and rows_of_start is not None:
             begun = start.take(np.unravel_index(rows_of_start[some], start.shape))
-        return plan.solve_at_once(
+        return at_once(
             [v if v.ndim == 0 else v[some] for v in given],
             {name: v if v.ndim == 0 else v[some] for name, v in places.items()},
             (min(length, count - begin),),
             begun,
-            limits,
         )
 
     first = part(0)
@@ -73,7 +85,7 @@ def solve(
 
     for _ in map_chunks(fill, range(length, count, length), jobs):
         pass
-    return whole.configuration(plan, dims, shape)
+    return whole.configuration(first.graph, geometry.vectors(dims), dims, shape)
 
 
 class _Whole:
@@ -93,7 +105,9 @@ class _Whole:
                 if np.ndim(array):
                     array[some] = value
 
-    def configuration(self, plan: Plan, dims: Mapping[str, Value], shape: tuple[int, ...]) -> Configuration:
+    def configuration(
+        self, graph: Graph, vectors: Vectors, dims: Mapping[str, Value], shape: tuple[int, ...]
+    ) -> Configuration:
         reason = self.reason.reshape(shape)
         nodes, rotations, slides, closures = (
             [v.reshape(shape) if np.ndim(v) else v for v in kind] for kind in self.parts
@@ -104,8 +118,6 @@ class _Whole:
             nodes, rotations, slides = (
                 [v if np.ndim(v) else hide(v, lost) for v in kind] for kind in (nodes, rotations, slides)
             )
-        vectors = plan.mechanism.geometry.vectors(dims)
-        graph = plan.mechanism.graph
         return Configuration(graph, vectors, shape, nodes, rotations, slides, closures, reason, dict(dims))
 
 

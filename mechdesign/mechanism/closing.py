@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,38 +11,39 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, cross, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import STALLED, regularity
+from mechdesign.mechanism.core import Core
+from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.redundancy import owners_of
 from mechdesign.mechanism.rigidity import CLOSED, Vector
 from mechdesign.mechanism.sketch import KEY
 from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Group
 
-if TYPE_CHECKING:
-    from mechdesign.mechanism.mechanism import Mechanism
-
 # Poses of a sweep for the range in which a mechanism closes, and halvings of its ends.
 SWEEP, HALVINGS = 721, 40
 
 
-def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
+def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
     """Why a mechanism's sketch cannot be assembled at its own drive values, and what would mend it.
 
     Parameters
     ----------
+    plan : Plan
+        That of the drives.
     state : State
-        What the forward plan found.
+        What it found.
     given : sequence of (Coordinate, float)
         The drives and their values (radians or lengths).
     """
-    plan, unit, equations = mechanism.forward, mechanism.description.angle_unit, mechanism.equations
+    unit, equations = core.description.angle_unit, core.equations
     values = ", ".join(f"{c.name} = {v / (unit if c.quantity == 'angle' else 1.0):.6g}" for c, v in given)
     start = f"the sketch cannot be assembled at its own drive values{f' ({values})' if given else ''}"
-    x, gap = equations.solve(equations.from_sketch(mechanism.sketch), given)
+    x, gap = equations.solve(equations.from_sketch(core.sketch), given)
     if gap < CLOSED:
-        told = _closed_otherwise(mechanism, x, start, [coordinate for coordinate, _ in given])
+        told = _closed_otherwise(core, plan, x, start)
         if told is not None:
             return told
     where, mend = open_group(state, equations.gaps(x))
@@ -53,14 +53,14 @@ def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Co
             def valid(sweep: NDArray[np.float64], k: int = k) -> Value:
                 return plan.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
 
-            found = closing_range(valid, coordinate, mechanism.size, unit)
+            found = closing_range(valid, coordinate, core.size, unit)
             if found:
                 mend = f"{found}; draw it there, or {mend}"
                 break
     return MechanismError(f"{start}: {where}; {mend}", KEY)
 
 
-def check_regular(mechanism: Mechanism, configuration: Configuration) -> None:
+def check_regular(core: Core, plan: Plan, configuration: Configuration) -> None:
     """Check that the sketch, assembled by Newton's method, is not one of a chain that its drives do not hold at all.
 
     Raises
@@ -68,30 +68,28 @@ def check_regular(mechanism: Mechanism, configuration: Configuration) -> None:
     MechanismError
         If the mechanism is over-constrained and has more freedom than drives.
     """
-    if not mechanism.forward.iterative or regularity(mechanism.linearize(configuration)) > STALLED:
+    if not plan.iterative or regularity(Linearization(plan.structure, core.geometry, configuration)) > STALLED:
         return
-    equations, count = mechanism.equations, len(mechanism.drives)
+    equations, count = core.equations, len(plan.structure.given)
     nodes = np.array([complex(node) for node in configuration.nodes])
     angles = np.array([np.angle(turn) for turn in configuration.rotations])
     slides = np.array([float(slide) for slide in configuration.slides])
     real, middle = equations.mobility(equations.pack(nodes, angles, slides))
     if real > count:
-        raise over_constrained(mechanism.description, equations, middle, count, real, count)
+        raise over_constrained(core.description, equations, middle, count, real, count)
 
 
-def _closed_otherwise(
-    mechanism: Mechanism, x: Vector, start: str, drives: Sequence[Coordinate]
-) -> MechanismError | None:
+def _closed_otherwise(core: Core, plan: Plan, x: Vector, start: str) -> MechanismError | None:
     """A group that closes, but not where Newton's method gets to from the sketch, or not in one place only."""
-    equations, graph = mechanism.equations, mechanism.graph
+    equations, graph, drives = core.equations, core.graph, plan.structure.given
     real, middle = equations.mobility(x)
     if real > len(drives):
-        return over_constrained(mechanism.description, equations, middle, len(drives), real, len(drives))
+        return over_constrained(core.description, equations, middle, len(drives), real, len(drives))
     free = motions_in_words(equations, equations.jacobian(x, drives))
     if free:
         return MechanismError(f"the sketch is at a singular position: with its drives held, {free}; draw another", KEY)
     nodes, _, slides = equations.unpack(x)
-    if not mechanism.forward.iterative or any(slides[slide] <= 0 for slide in graph.telescopic):
+    if not plan.iterative or any(slides[slide] <= 0 for slide in graph.telescopic):
         return None
     places = nodes * equations.size
     moving = [

@@ -2,39 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import assemblies
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.four_bars import describe_loops
-from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Term
-from mechdesign.mechanism.naming import group_in_words, placed_before
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.mechanism import Mechanism
-
-
-def joints_in_words(description: Description, graph: Graph) -> list[str]:
-    """Every joint with the links it joins."""
-    holders: dict[str, list[str]] = {}
-    for body, point in graph.points:
-        if ":" not in point:
-            link = body.removesuffix(":rod")
-            if link not in holders.setdefault(point, []):
-                holders[point].append(link)
-    clamps = [joint.point for joint in description.joints.values() if isinstance(joint, Fixed)]
-    found = [
-        f"revolute {point} ({', '.join(links)})"
-        for point, links in holders.items()
-        if len(links) - clamps.count(point) > 1
-    ]
-    found += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
-    for name, joint in description.joints.items():
-        links = joint.links if isinstance(joint, Fixed) else (joint.line.link, getattr(joint, "slider", joint.point))
-        found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(links)})")
-    return found
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.mechanism import Mechanism
+from mechdesign.mechanism.model import Limit, Measure, Term
+from mechdesign.mechanism.naming import group_in_words, joints_in_words, placed_before
 
 
 def groups_in_words(mechanism: Mechanism) -> list[str]:
@@ -54,7 +29,7 @@ def groups_in_words(mechanism: Mechanism) -> list[str]:
     return lines
 
 
-def report(mechanism: Mechanism) -> str:
+def describe(mechanism: Mechanism) -> str:
     """Links, joints, mobility, the order of solution, assembly modes, measures, limits, and what is odd."""
     description, graph = mechanism.description, mechanism.graph
     loops = len(graph.edges) - len(graph.nodes) + 1

@@ -8,9 +8,9 @@ import numpy as np
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.describe import joints_in_words
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description
+from mechdesign.mechanism.naming import joints_in_words
 from mechdesign.mechanism.redundancy import doubled, owners_of, repeating
 from mechdesign.mechanism.rigidity import Equations, Vector, null_space, separated
 from mechdesign.mechanism.sketch import Sketch

@@ -14,17 +14,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, cross
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND, rod_of
+from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Fixed, Prismatic, Slot
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.mechanism import Mechanism
 
 Kind = Literal["four-bar", "slider-crank", "inverted slider-crank"]
 

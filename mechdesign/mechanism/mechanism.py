@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,27 +10,23 @@ from numpy.typing import ArrayLike, NDArray
 from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
-from mechdesign.mechanism.algebra import Value, rotation
+from mechdesign.mechanism.algebra import rotation
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.describe import report
-from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.graph import Graph, build_graph
 from mechdesign.mechanism.independence import check_independent
-from mechdesign.mechanism.limits import Bound
-from mechdesign.mechanism.model import Description, Limit, Quantity
+from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.rigidity import Equations
-from mechdesign.mechanism.sketch import Sketch, assembly_modes, drawn_value, locate, roots_as_drawn
+from mechdesign.mechanism.sketch import assembly_modes, drawn_value, roots_as_drawn
 from mechdesign.mechanism.structure import Undetermined, compile_structure
 
 # Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).
 TIE_ROUNDING = 1e-9
 
 
-class Mechanism:
+class Mechanism(Core):
     """A planar mechanism, compiled once; see `mechdesign.mechanism.model.Description` for what it is made from.
 
     Raises
@@ -41,25 +36,13 @@ class Mechanism:
     """
 
     def __init__(self, description: Description) -> None:
-        self.description = description
-        self.graph: Graph = build_graph(description)
-        self.geometry = Geometry(self.graph, description.places)
-        self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
+        super().__init__(description)
         self._plans: dict[tuple[str, ...], Plan] = {}
         self._check_ties()
-        self.sketch: Sketch = locate(description, self.graph, self.geometry)
         self._check_mobility()
         self.drives: tuple[str, ...] = tuple(description.drives)
-        self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
-
-    @cached_property
-    def size(self) -> float:
-        """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only."""
-        return max(
-            [abs(complex(w)) for w in self.geometry.nominal.w] + [abs(x) for x in self.sketch.nodes if x] + [0.0]
-        )
 
     @property
     def mobility(self) -> int:
@@ -77,23 +60,9 @@ class Mechanism:
         """Names of all points."""
         return tuple(node for node in self.graph.nodes if ":" not in node)
 
-    def coordinate(self, name: str) -> Coordinate:
-        """Look a coordinate up by name.
-
-        Raises
-        ------
-        MechanismError
-            If there is none of that name.
-        """
-        return names.resolve(name, self.description, self.graph)
-
     def quantity(self, name: str) -> Quantity:
         """Kind of a coordinate: ``length``, ``angle`` or ``none``."""
         return self.coordinate(name).quantity
-
-    def describe(self) -> str:
-        """Links, joints, mobility and the order of solution, in words."""
-        return report(self)
 
     def _check_ties(self) -> None:
         offsets = self.geometry.nominal.offsets
@@ -111,11 +80,6 @@ class Mechanism:
         if len(self.description.drives) != self.mobility:
             drives = [self.coordinate(name) for name in self.description.drives]
             raise diagnosis.wrong_count(self.description, self.equations, self.sketch, self.mobility, drives)
-
-    @property
-    def equations(self) -> Equations:
-        """All equations at once, to tell what is wrong with a mechanism."""
-        return Equations(self.graph, self.geometry, self.size or 1.0)
 
     def plan(self, given: Sequence[str]) -> Plan:
         """Plan for given coordinates, exactly as many as the mobility; compiled once.
@@ -151,23 +115,6 @@ class Mechanism:
         if given == self.drives:
             self.forward = plan
 
-    def _bound(self, limit: Limit, index: int) -> Bound:
-        if limit.kind == "distance":
-            a, b = (self.graph.node(point) for point in limit.items)
-            coordinate = Coordinate("-".join(limit.items), "distance", "length", node=a, other=b)
-        elif limit.kind == "angle":
-            coordinate = Coordinate(
-                "-".join(limit.items), "angle", "angle", body=limit.items[1], reference=limit.items[0]
-            )
-        else:
-            coordinate = self.coordinate(limit.items[0])
-        return Bound(coordinate, limit.minimum, limit.maximum, limit.label or f"limits.{index}")
-
-    def margins(self, configuration: Configuration) -> list[tuple[str, Value]]:
-        """Named margins of all limits: positive inside (see `mechdesign.mechanism.limits`)."""
-        places = {**self.nominal, **configuration.places}
-        return [margin for bound in self.bounds for margin in bound.margins(configuration, places)]
-
     def linearize(self, configuration: Configuration) -> Linearization:
         """Loop equations of the drives' groups at a configuration, for derivatives of any kind."""
         return Linearization(self.forward.structure, self.geometry, configuration)
@@ -199,8 +146,8 @@ class Mechanism:
         configuration = plan.configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
         if not configuration.valid:
             pose = list(zip(plan.structure.given, given, strict=True))
-            raise closing.cannot_assemble(self, state, pose)
-        closing.check_regular(self, configuration)
+            raise closing.cannot_assemble(self, plan, state, pose)
+        closing.check_regular(self, plan, configuration)
         return configuration
 
     def solve(self, pose: Mapping[str, ArrayLike], places: Mapping[str, ArrayLike] | None = None) -> Pose:

@@ -1,4 +1,4 @@
-"""Names of the groups that a mechanism is solved in: dyads by their joints in order (RRR, RRP, RPR, PRP, RPP)."""
+"""Joints in words, and the groups that a mechanism is solved in: dyads by their joints (RRR, RRP, RPR, PRP, RPP)."""
 
 from __future__ import annotations
 
@@ -21,6 +21,27 @@ class Chain:
     letters: str
     pins: tuple[str, ...]
     slides: tuple[str, ...]
+
+
+def joints_in_words(description: Description, graph: Graph) -> list[str]:
+    """Every joint with the links it joins."""
+    holders: dict[str, list[str]] = {}
+    for body, point in graph.points:
+        if ":" not in point:
+            link = body.removesuffix(":rod")
+            if link not in holders.setdefault(point, []):
+                holders[point].append(link)
+    clamps = [joint.point for joint in description.joints.values() if isinstance(joint, Fixed)]
+    found = [
+        f"revolute {point} ({', '.join(links)})"
+        for point, links in holders.items()
+        if len(links) - clamps.count(point) > 1
+    ]
+    found += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
+    for name, joint in description.joints.items():
+        links = joint.links if isinstance(joint, Fixed) else (joint.line.link, getattr(joint, "slider", joint.point))
+        found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(links)})")
+    return found
 
 
 def placed_before(graph: Graph, structure: Structure) -> list[set[str]]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,14 +14,12 @@ from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import Start, follow, unknowns_of
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.mechanism.structure import Structure
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.mechanism import Mechanism
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
@@ -39,8 +36,8 @@ class Plan:
         Assembly mode of each group as drawn; 0 for groups that have none.
     """
 
-    def __init__(self, mechanism: Mechanism, structure: Structure, modes: Sequence[int]) -> None:
-        self.mechanism = mechanism
+    def __init__(self, core: Core, structure: Structure, modes: Sequence[int]) -> None:
+        self.core = core
         self.structure = structure
         self.modes = tuple(modes)
         self.iterative = any(group.form == "newton" for group in structure.groups)
@@ -48,8 +45,16 @@ class Plan:
     @cached_property
     def change_points(self) -> ChangePoints | None:
         """Where the motion passes from one assembly to another, if the study lets it (``branch: follow``)."""
-        wanted = self.mechanism.description.branch == "follow"
-        return ChangePoints(self) if wanted and len(self.structure.given) == 1 and any(self.modes) else None
+        if self.core.description.branch != "follow" or len(self.structure.given) != 1 or not any(self.modes):
+            return None
+        (coordinate,) = self.structure.given
+        period = 2 * np.pi if coordinate.quantity == "angle" else max(self.core.size, 1e-300)
+        sketch = float(self.core.sketch_configuration.value(coordinate))
+        return ChangePoints(self.structure.groups, self.modes, sketch, period, self._closures)
+
+    def _closures(self, values: Value, modes: Sequence[Value]) -> list[Value]:
+        """Closures of the first groups, in the order of solution, at values of the one given coordinate."""
+        return self.run([values], self.core.geometry.nominal, None, modes).closures
 
     def modes_at(self, given: Sequence[Value]) -> Sequence[Value]:
         """Assembly mode of each group at given values: as drawn, or changed at change points that are followed."""
@@ -66,12 +71,12 @@ class Plan:
         enough: float = CONVERGED,
     ) -> State:
         """Solve all groups, in the assembly as drawn unless `modes` says another."""
-        state = start_state(self.mechanism.graph, self.structure, vectors, given)
-        size = self.mechanism.size if self.iterative else 1.0
+        state = start_state(self.core.graph, self.structure, vectors, given)
+        size = self.core.size if self.iterative else 1.0
         return run(state, self.modes if modes is None else modes, guess, given, size, steps, enough)
 
     def _start(self, at: Configuration | None) -> Start:
-        at = self.mechanism.sketch_configuration if at is None else at
+        at = self.core.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
         guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides, at.nodes)
         state = self.run(given, at.vectors, guess)
@@ -81,7 +86,7 @@ class Plan:
         """Rotations of a solved pose's classes, and of those that stand for given distances."""
         extra = []
         for position, (_, k) in enumerate(self.structure.spans):
-            edge = self.structure.edges[len(self.mechanism.graph.edges) + position]
+            edge = self.structure.edges[len(self.core.graph.edges) + position]
             extra.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
         return [*at.rotations, *extra]
 
@@ -123,7 +128,8 @@ class Plan:
         if chunks.too_large(shape):
             if self.change_points is not None:
                 self.change_points.cover(values[0])
-            return chunks.solve(self, values, dims, shape, start, limits, jobs)
+            solve = partial(self.solve_at_once, limits=limits)
+            return chunks.solve(solve, self.core.geometry, values, dims, shape, start, jobs, small=self.iterative)
         return self.solve_at_once(values, dims, shape, start, limits)
 
     def solve_at_once(
@@ -135,7 +141,7 @@ class Plan:
         limits: bool,
     ) -> Configuration:
         """`solve` without chunks, for arrays of floats that broadcast to `shape`."""
-        vectors = self.mechanism.geometry.vectors(dims)
+        vectors = self.core.geometry.vectors(dims)
         reached: NDArray[np.bool_] | None = None
         guess: Guess | None = None
         if self.iterative:
@@ -155,7 +161,7 @@ class Plan:
         shape: tuple[int, ...],
         begin: Start,
     ) -> tuple[Guess, NDArray[np.bool_]]:
-        geometry = self.mechanism.geometry
+        geometry = self.core.geometry
 
         def flat(value: Value) -> Value:
             value = np.asarray(value)
@@ -177,8 +183,8 @@ class Plan:
                 begin.map(some),
                 [some(v) for v in given],
                 {name: some(v) for name, v in places.items()},
-                self.mechanism.nominal,
-                self.mechanism.size,
+                self.core.nominal,
+                self.core.size,
                 count if rows is None else len(rows),
             )
 
@@ -212,7 +218,7 @@ class Plan:
         reached: NDArray[np.bool_] | None,
         limits: bool,
     ) -> Configuration:
-        graph = self.mechanism.graph
+        graph = self.core.graph
         with np.errstate(invalid="ignore"):
             open_: Value = np.zeros((), dtype=bool)
             for group in self.structure.groups:
@@ -246,11 +252,11 @@ class Plan:
         configuration = Configuration(
             graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims)
         )
-        if limits and self.mechanism.bounds:
+        if limits and self.core.bounds:
             with np.errstate(invalid="ignore"):
-                values = {**self.mechanism.nominal, **dims}
-                for bound in self.mechanism.bounds:
-                    slack = LIMIT_ROUNDING * bound.scale(self.mechanism.size)
+                values = {**self.core.nominal, **dims}
+                for bound in self.core.bounds:
+                    slack = LIMIT_ROUNDING * bound.scale(self.core.size)
                     for _, margin in bound.margins(configuration, values):
                         outside = np.broadcast_to(margin, shape) < -slack
                         reason[outside & (reason == Reason.OK)] = Reason.LIMIT
@@ -260,5 +266,5 @@ class Plan:
         if coordinate.kind in ("x", "y"):
             return np.real(state.nodes[coordinate.node])
         if coordinate.kind == "angle":
-            return np.real(state.rotations[self.mechanism.graph.bodies[coordinate.body][0]])
+            return np.real(state.rotations[self.core.graph.bodies[coordinate.body][0]])
         return 0.0

@@ -54,7 +54,7 @@ def turning_point(
     """
     guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides, near.nodes)
     angles = plan.structure.given[k].quantity == "angle"
-    scale = 1.0 if angles else plan.mechanism.size
+    scale = 1.0 if angles else plan.core.size
     found = []
     for index in guess:
         fold = _Fold(plan, given, k, near, guess, index)
@@ -77,7 +77,7 @@ class _Fold:
         self.guess = guess
         angles, slides = guess[index]
         self.start = np.array([*map(float, angles), *map(float, slides)])
-        size = plan.mechanism.size
+        size = plan.core.size
         self.weights = np.array([1.0] * len(angles) + [size] * len(slides))
         matrix, _, _ = self.system(self.start, given[k])
         left, _, right = np.linalg.svd(matrix)
@@ -86,10 +86,10 @@ class _Fold:
     @quiet
     def system(self, y: Array, s: float) -> tuple[Array, Array, State]:
         """Matrix and errors of the group's equations, lengths in parts of the mechanism's size."""
-        plan, size, count = self.plan, self.plan.mechanism.size, len(self.group.angles)
+        plan, size, count = self.plan, self.plan.core.size, len(self.group.angles)
         given = [np.asarray(v) for v in self.given]
         given[self.k] = np.asarray(s)
-        state = start_state(plan.mechanism.graph, plan.structure, self.near.vectors, given)
+        state = start_state(plan.core.graph, plan.structure, self.near.vectors, given)
         run(state, plan.modes_at(given)[: self.index], self.guess, given, size)
         set_unknowns(state, self.group, list(y[:count]), list(y[count:]))
         rows, right = equations(state, self.group, given)
@@ -123,4 +123,4 @@ class _Fold:
         given = [np.asarray(v) for v in self.given]
         given[self.k] = np.asarray(value)
         modes = self.plan.modes_at(given)
-        return value, run(state, modes, self.guess, given, self.plan.mechanism.size, begin=self.index + 1)
+        return value, run(state, modes, self.guess, given, self.plan.core.size, begin=self.index + 1)

@@ -9,6 +9,7 @@ import pytest
 from helpers.studies import study_of
 
 from mechdesign.errors import MechanismError, StudyError
+from mechdesign.mechanism.describe import describe
 from mechdesign.mechanism.rigidity import null_space, separated
 
 GROUND = "ground: {O: [0, 0], D: [100, 0], M: [50, 0]}"
@@ -36,7 +37,7 @@ def told(*arguments: str, **named: str) -> str:
 
 
 def described(*arguments: str, **named: str) -> list[str]:
-    return study_of(study(*arguments, **named)).mechanism.describe().splitlines()
+    return describe(study_of(study(*arguments, **named)).mechanism).splitlines()
 
 
 @pytest.mark.parametrize("drives", ["[crank]", "[]"])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import CHUNK, dimensions, radians, starts
+from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.plan import Plan
@@ -55,7 +56,8 @@ def continuous(
     together = begins // line == ends // line
     moved = wrap(angles[:, ends] - angles[:, begins])
     neighbours = together & (ends == begins + 1)
-    plan = study.mechanism.plan(group.names)
+    mechanism = study.mechanism
+    plan = mechanism.plan(group.names)
     given = [
         np.asarray(radians(study, c, v), dtype=float)
         for c, v in zip(plan.structure.given, group.columns(), strict=True)
@@ -63,7 +65,9 @@ def continuous(
     parts = _parts(plan, given, begins, ends)
     coarse = np.flatnonzero(neighbours & ((parts > 1) | (np.abs(moved) >= SURE).any(axis=0)))
     if len(coarse):
-        moved[:, coarse] = _on_the_way(plan, coordinates, poses, given, begins[coarse], ends[coarse], parts[coarse])
+        moved[:, coarse] = _on_the_way(
+            mechanism, plan, coordinates, poses, given, begins[coarse], ends[coarse], parts[coarse]
+        )
     turns = np.round((angles[:, begins] + moved - angles[:, ends]) / (2 * np.pi))
     turns = np.concatenate([np.zeros((len(angles), 1)), np.where(together, turns, 0.0)], axis=1)
     total = np.cumsum(turns, axis=1)
@@ -84,7 +88,7 @@ def _parts(plan: Plan, given: Sequence[Array], begins: NDArray[np.intp], ends: N
     """In how many parts (a power of two) each step is made, so that what is given moves little in each."""
     longest = np.ones(len(begins))
     for coordinate, values in zip(plan.structure.given, given, strict=True):
-        step = {"angle": STEP, "length": PART * plan.mechanism.size}.get(coordinate.quantity)
+        step = {"angle": STEP, "length": PART * plan.core.size}.get(coordinate.quantity)
         if step:
             longest = np.maximum(longest, np.abs(values[ends] - values[begins]) / step)
     # A step that is just one part must not become two by rounding.
@@ -93,7 +97,7 @@ def _parts(plan: Plan, given: Sequence[Array], begins: NDArray[np.intp], ends: N
 
 
 def _on_the_way(
-    plan: Plan, coordinates: Sequence[Coordinate], poses: Poses, given: Sequence[Array],
+    mechanism: Mechanism, plan: Plan, coordinates: Sequence[Coordinate], poses: Poses, given: Sequence[Array],
     begins: NDArray[np.intp], ends: NDArray[np.intp], parts: NDArray[np.intp],
 ) -> Array:  # fmt: skip
     """How far each angle turns between pairs of poses, shape (angles, pairs); nearest where the way does not close."""
@@ -109,7 +113,7 @@ def _on_the_way(
             way = np.linspace(0.0, 1.0, count + 1)
             between = [v[begins[pairs], None] * (1 - way) + v[ends[pairs], None] * way for v in given]
             rows = begins[pairs, None]
-            start = starts(plan.mechanism, poses, rows) if plan.iterative else None
+            start = starts(mechanism, poses, rows) if plan.iterative else None
             configuration = plan.solve(between, dimensions(poses, rows), start=start, limits=False)
             shape = configuration.shape
             angles = np.stack([np.broadcast_to(configuration.value(c), shape) for c in coordinates])

@@ -157,7 +157,7 @@ class _Sweep:
     @cached_property
     def start(self) -> Configuration:
         """The poses."""
-        start = starts(self.plan.mechanism, self.poses, self.index) if self.plan.iterative else None
+        start = starts(self.study.mechanism, self.poses, self.index) if self.plan.iterative else None
         return self._solve(self.given, self.index, start)
 
     def _solve(self, given: Sequence[Array], index: NDArray[np.intp], start: Configuration | None) -> Configuration:

@@ -255,6 +255,7 @@ def _settings(
             settings.append(
                 Setting(
                     int(row),
+                    mechanism,
                     mechanism.forward if given else forward_plan(mechanism, pose),
                     pose,
                     drives[k].tolist(),

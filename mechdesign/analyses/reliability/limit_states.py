@@ -41,9 +41,7 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
         configuration = solve(setting, made)
         errors, valid = errors_of(setting, made, count)
         names, slopes = _slopes(sources, u)
-        by_name = derivatives(
-            setting.plan.mechanism, configuration, setting.channels, names, setting.rates, setting.elastic
-        )
+        by_name = derivatives(setting.mechanism, configuration, setting.channels, names, setting.rates, setting.elastic)
         by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes)
         found, steep = [], []
         for margin, weights in _margins(setting, errors):

@@ -13,7 +13,7 @@ from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
 from mechdesign.analyses.reliability.first_order import Channel, Rates, nominal_values
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
 from mechdesign.analyses.reliability.sources import Made, Sources
-from mechdesign.mechanism import Configuration
+from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value, wrap
 from mechdesign.mechanism.plan import Plan
 from mechdesign.parallel import map_chunks
@@ -39,6 +39,8 @@ class Setting:
     ----------
     pose : int
         Row of the pose; names its streams.
+    plan : Plan
+        That of the drives, in the assembly of the pose.
     nominal : Configuration
         Solved pose of the nominal mechanism.
     drives : sequence of float
@@ -58,6 +60,7 @@ class Setting:
     """
 
     pose: int
+    mechanism: Mechanism
     plan: Plan
     nominal: Configuration
     drives: Sequence[float]
@@ -224,14 +227,14 @@ def solve(setting: Setting, made: Made) -> Configuration:
     """Made mechanisms with the drives at the pose, and their errors."""
     given: list[Value] = [
         value + made.drives[name] if name in made.drives else value
-        for name, value in zip(setting.plan.mechanism.drives, setting.drives, strict=True)
+        for name, value in zip(setting.mechanism.drives, setting.drives, strict=True)
     ]
     return setting.plan.solve(given, made.places, start=setting.nominal, limits=False)
 
 
 def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], NDArray[np.bool_]]:
     """Errors (value minus nominal) of each channel for made mechanisms, and which of them are assembled."""
-    mechanism, solved = setting.plan.mechanism, solve(setting, made)
+    mechanism, solved = setting.mechanism, solve(setting, made)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         values = nominal_values(mechanism, solved, setting.channels, setting.rates)
     errors = []

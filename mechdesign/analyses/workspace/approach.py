@@ -130,7 +130,7 @@ class Approach:
         return [z.real, z.imag, *self.held]
 
     def _vectors(self, sizes: Mapping[str, Floats]) -> Vectors:
-        return self.plan.mechanism.geometry.vectors(sizes)
+        return self.plan.core.geometry.vectors(sizes)
 
     def _guess(self, table: Floats) -> Guess:
         """Rows of a table as angles and slides by group."""
@@ -151,7 +151,7 @@ class Approach:
 
     def _scale(self, table: Floats) -> Floats:
         """What changes of the unknowns are measured by: radians, and the mechanism's size or a length beyond it."""
-        size = self.plan.mechanism.size
+        size = self.plan.core.size
         rows = [
             angle
             for group in self.plan.structure.groups if group.form == "newton"

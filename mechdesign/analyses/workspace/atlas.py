@@ -86,7 +86,7 @@ class Atlas:
 
         There are none where the mechanism cannot be brought from its sketch to the held values.
         """
-        sketch = plan.mechanism.sketch_configuration
+        sketch = plan.core.sketch_configuration
         origin = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
         given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, held)]
         first = plan.solve(given, limits=False)
@@ -106,7 +106,7 @@ class Atlas:
     @property
     def spacing(self) -> float:
         """Distance of neighbouring poses."""
-        return SPACING * self.plan.mechanism.size
+        return SPACING * self.plan.core.size
 
     def solve(self, z: Complex, places: Mapping[str, Value]) -> tuple[Configuration, Floats]:
         """The mechanism with its point at `z`, and how far it is from where assemblies meet: its grip.
@@ -200,7 +200,7 @@ class Atlas:
         for stage in range(1, STAGES + 1):
             between = {}
             for name, value in sizes.items():
-                begin = self.plan.mechanism.nominal.get(name, 0.0)
+                begin = self.plan.core.nominal.get(name, 0.0)
                 between[name] = begin + (stage / STAGES) * (value[design] - begin)
             z = self.origin + self.spacing * lattice
             table, grip = self.approach.corrected(z, between, table, 0.0, np.ones(z.shape, dtype=bool))
@@ -251,7 +251,7 @@ class Atlas:
 
     def _slopes(self, lattice: Complex, sizes: Mapping[str, Floats], table: Floats) -> Floats:
         """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
-        h = STEP * self.plan.mechanism.size
+        h = STEP * self.plan.core.size
         z = self.origin + self.spacing * lattice
         found = []
         for step in (h, 1j * h):
@@ -263,14 +263,14 @@ class Atlas:
 
     def _within(self, state: State, sizes: Mapping[str, Floats], shape: tuple[int, ...]) -> Flags:
         """Which poses are within the study's limits."""
-        mechanism, found = self.plan.mechanism, np.ones(shape, dtype=bool)
+        mechanism, found = self.plan.core, np.ones(shape, dtype=bool)
         for _, margin in mechanism.margins(self._told(state, sizes, shape)):
             found &= np.asarray(margin) >= 0
         return found
 
     def _told(self, state: State, places: Mapping[str, Value], shape: tuple[int, ...]) -> Configuration:
         """A state as a configuration, whether it was reached or not."""
-        graph, vectors = self.plan.mechanism.graph, self.plan.mechanism.geometry.vectors(places)
+        graph, vectors = self.plan.core.graph, self.plan.core.geometry.vectors(places)
         return Configuration(
             graph, vectors, shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros(shape, dtype=np.int8), places,
@@ -278,7 +278,7 @@ class Atlas:
 
     def _open(self, state: State, shape: tuple[int, ...]) -> Flags:
         """Where a leg does not reach, or has no length."""
-        lengths = [state.slides[slide] for slide in self.plan.mechanism.graph.telescopic]
+        lengths = [state.slides[slide] for slide in self.plan.core.graph.telescopic]
         found = np.zeros(shape, dtype=bool)
         for margin in (*state.closures, *lengths):
             found |= ~(np.asarray(margin) > 0)

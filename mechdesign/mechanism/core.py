@@ -1,0 +1,69 @@
+"""What a plan solves: the compiled graph and geometry of a mechanism, its limits, and where solutions start from."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from mechdesign.mechanism import coordinates as names
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.graph import Graph, build_graph
+from mechdesign.mechanism.limits import Bound
+from mechdesign.mechanism.model import Description, Limit
+from mechdesign.mechanism.rigidity import Equations
+from mechdesign.mechanism.sketch import Sketch, locate
+
+
+class Core:
+    """Graph, geometry and limits of a mechanism; `sketch_configuration` is its sketch, once that is assembled."""
+
+    sketch_configuration: Configuration
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        self.graph: Graph = build_graph(description)
+        self.geometry = Geometry(self.graph, description.places)
+        self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
+        self.sketch: Sketch = locate(description, self.graph, self.geometry)
+        self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
+
+    @cached_property
+    def size(self) -> float:
+        """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only."""
+        return max(
+            [abs(complex(w)) for w in self.geometry.nominal.w] + [abs(x) for x in self.sketch.nodes if x] + [0.0]
+        )
+
+    @property
+    def equations(self) -> Equations:
+        """All equations at once, to tell what is wrong with a mechanism."""
+        return Equations(self.graph, self.geometry, self.size or 1.0)
+
+    def coordinate(self, name: str) -> Coordinate:
+        """Look a coordinate up by name.
+
+        Raises
+        ------
+        MechanismError
+            If there is none of that name.
+        """
+        return names.resolve(name, self.description, self.graph)
+
+    def margins(self, configuration: Configuration) -> list[tuple[str, Value]]:
+        """Named margins of all limits: positive inside (see `mechdesign.mechanism.limits`)."""
+        places = {**self.nominal, **configuration.places}
+        return [margin for bound in self.bounds for margin in bound.margins(configuration, places)]
+
+    def _bound(self, limit: Limit, index: int) -> Bound:
+        if limit.kind == "distance":
+            a, b = (self.graph.node(point) for point in limit.items)
+            coordinate = Coordinate("-".join(limit.items), "distance", "length", node=a, other=b)
+        elif limit.kind == "angle":
+            coordinate = Coordinate(
+                "-".join(limit.items), "angle", "angle", body=limit.items[1], reference=limit.items[0]
+            )
+        else:
+            coordinate = self.coordinate(limit.items[0])
+        return Bound(coordinate, limit.minimum, limit.maximum, limit.label or f"limits.{index}")
