@@ -23,6 +23,8 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
             label = study_label(study)
             if not options.quiet:
                 terminal.emit(f"{label}: {study.name}\n{study.mechanism.describe()}\n")
+            for warning in study.warnings:
+                terminal.say(f"warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS)
             if options.plots:
                 from mechdesign.report.writer import write_sketch

@@ -142,7 +142,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         raise
     if journal is not None:
         journal.discard()
-    warnings = list(result.warnings)
+    warnings = [*map(str, study.warnings), *result.warnings]
     if asked.animate and writer.ANIMATION not in files:
         warnings.append("no animation: it needs a sweep of one coordinate or a path")
     code = 3 if result.failed else 0 if all(verdict.met for verdict in verdicts) else 1
