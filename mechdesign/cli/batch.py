@@ -11,6 +11,7 @@ from mechdesign.cli.execution import COMMANDS, Answer, Owners, answer, load_stud
 from mechdesign.cli.failure import INTERRUPTED, explain
 from mechdesign.cli.options import Options
 from mechdesign.errors import StudyError
+from mechdesign.threads import one_thread
 
 if TYPE_CHECKING:
     from mechdesign.results import Table
@@ -35,6 +36,7 @@ def questions(study: Study) -> tuple[str, ...]:
     return tuple(asked) or ("kinematics",)
 
 
+@one_thread()
 def run(paths: Sequence[Path], options: Options, junit: Path | None = None) -> int:
     """Answer every question of the studies; returns the exit code, the highest of them all.
 

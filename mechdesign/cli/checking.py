@@ -9,8 +9,10 @@ from mechdesign.cli import terminal
 from mechdesign.cli.execution import COMMANDS, Owners, load_study, study_label
 from mechdesign.cli.failure import explain
 from mechdesign.cli.options import Options
+from mechdesign.threads import one_thread
 
 
+@one_thread()
 def check_studies(paths: Sequence[Path | None], options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     from mechdesign.report.requirements import foresee

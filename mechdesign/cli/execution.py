@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from mechdesign.cli import terminal
 from mechdesign.cli.options import Options
+from mechdesign.threads import one_thread
 
 if TYPE_CHECKING:
     from mechdesign.journal import Journal
@@ -239,6 +240,7 @@ def tell(given: Answer, options: Options) -> None:
     terminal.say(f"{given.study}: {given.command}: {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 
 
+@one_thread()
 def ask(path: Path | None, command: str, options: Options) -> int:
     """One command from end to end; returns its exit code."""
     study = load_study(path, options)

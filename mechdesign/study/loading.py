@@ -34,6 +34,7 @@ from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.targets import Target
 from mechdesign.study.units import Units, units_from
 from mechdesign.study.workspace_models import WorkspaceSection
+from mechdesign.threads import one_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +159,7 @@ def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | No
     return load_bytes(content, file, overrides, seed)
 
 
+@one_thread()
 def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), seed: int | None = None) -> Study:
     """Load a study from the bytes of a file; see `load`."""
     if seed is not None and seed < 0:
