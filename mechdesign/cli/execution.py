@@ -210,9 +210,19 @@ def _judged_and_written(
     directory: Path, study: Study, result: Result, asked: Asked
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts and the names of the files."""
+    from mechdesign.analyses.look import LONG
+    from mechdesign.errors import StudyError
     from mechdesign.report import requirements, writer
 
-    verdicts = requirements.judge(result, study.requirements, problem=study.problem, freedom=study.mechanism.mobility)
+    try:
+        verdicts = requirements.judge(
+            result, study.requirements, problem=study.problem, freedom=study.mechanism.mobility
+        )
+    except StudyError:
+        if result.command in LONG:
+            # What took long is not lost to a requirement that names a row it has not.
+            writer.write(directory, study, result, (), asked)
+        raise
     return verdicts, writer.write(directory, study, result, verdicts, asked)
 
 
