@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from mechdesign.results import Result, Table
 
-
 MOST_VALUES = 12
 """Values of a column that a message names."""
 
