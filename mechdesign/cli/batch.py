@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import COMMANDS, Answer, Owners, answer, load_study, study_label, tell
-from mechdesign.cli.failure import INTERRUPTED, explain
+from mechdesign.cli.failure import INTERRUPTED
 from mechdesign.cli.options import Options
-from mechdesign.errors import StudyError
+from mechdesign.errors import StudyError, explain
 from mechdesign.threads import one_thread
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import COMMANDS, Owners, load_study, study_label
-from mechdesign.cli.failure import explain
 from mechdesign.cli.options import Options
+from mechdesign.errors import explain
 from mechdesign.threads import one_thread
 
 
@@ -35,8 +35,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
                 directory = options.out or Path("results") / label / "check"
                 if options.out is not None and len(paths) > 1:
                     directory /= label
-                drawing = write_sketch(directory, study)
-                terminal.say(f"{label}: the sketch as understood is in {drawing}", quiet=options.quiet)
+                terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
         except Exception as error:
             code, message = explain(error)
             terminal.say(message)

@@ -136,16 +136,13 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         terminal.say(f"{study_label(study)}: {command}: {interrupt}")
         raise
     try:
-        verdicts, files = _judged_and_written(directory, study, result, asked)
+        verdicts, undrawn = _judged_and_written(directory, study, result, asked)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
         raise
     if journal is not None:
         journal.discard()
-    warnings = [*map(str, study.warnings), *result.warnings]
-    if asked.animate and writer.ANIMATION not in files:
-        warnings.append("no animation: it needs a sweep of one coordinate or a path")
     code = 3 if result.failed else 0 if all(verdict.met for verdict in verdicts) else 1
     return Answer(
         study=study_label(study),
@@ -153,7 +150,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         directory=directory,
         exit_code=code,
         rows=len(result.main),
-        warnings=warnings,
+        warnings=[*map(str, study.warnings), *result.warnings, *undrawn],
         failed=result.failed,
         verdicts=verdicts,
         seconds=time.perf_counter() - begun,
@@ -209,7 +206,7 @@ def _main_table(directory: Path) -> Table:
 def _judged_and_written(
     directory: Path, study: Study, result: Result, asked: Asked
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
-    """Judge a result by the study's requirements and write it; the verdicts and the names of the files."""
+    """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     from mechdesign.analyses.look import LONG
     from mechdesign.errors import StudyError
     from mechdesign.report import requirements, writer
