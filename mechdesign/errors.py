@@ -5,8 +5,10 @@ Each class maps to one exit code of the command line (`exit_code`).
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -77,3 +79,17 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, result: Result) -> None:
         self.result = result
         super().__init__(result.interrupted)
+
+
+def explain(error: Exception) -> tuple[int, str]:
+    """Exit code and message of an exception; what nobody foresaw asks to be reported."""
+    if isinstance(error, MechdesignError):
+        return error.exit_code, str(error)
+    if isinstance(error, MemoryError):
+        return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
+    frames = [
+        frame for frame in traceback.extract_tb(error.__traceback__) if "mechdesign" in Path(frame.filename).parts
+    ]
+    place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
+    detail = " ".join(str(error).split())
+    return 4, f"internal error: {type(error).__name__}: {detail}{place}; please report it, with the study"

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 from mechdesign.results import Result, Table
 
+MOST_VALUES = 12
+"""Values of a column that a message names."""
+
 
 class UnknownColumnError(Exception):
     """A column that the result has not, or one of words."""
@@ -27,12 +30,15 @@ class Chosen:
         All rows; absolute values where these are judged.
     counts : ndarray of bool, shape (rows,)
         Which of them count.
+    missing : str
+        Where none counts because the table never has what was asked for: what it has instead.
     """
 
     table: Table
     column: str
     values: NDArray[np.float64]
     counts: NDArray[np.bool_]
+    missing: str = ""
 
 
 def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:
@@ -49,7 +55,8 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
     UnknownColumnError
         If there is no such column, or it holds words.
     """
-    table, column, counts = _locate(result, path)
+    table, column, rows = _locate(result, path)
+    counts = rows
     values = np.asarray(table[column])
     if values.dtype.kind not in "fiub":
         raise UnknownColumnError(
@@ -60,7 +67,8 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
             raise UnknownColumnError(_unknown("where", name, table.names))
         counts = counts & _equal(table[name], wanted)
     numbers = values.astype(float)
-    return Chosen(table, column, np.abs(numbers) if absolute else numbers, counts)
+    missing = "" if counts.any() else _missing(table, rows, where)
+    return Chosen(table, column, np.abs(numbers) if absolute else numbers, counts, missing)
 
 
 def worst(values: NDArray[np.float64], counts: NDArray[np.bool_], *, largest: bool) -> NDArray[np.float64]:
@@ -94,6 +102,33 @@ def _unknown(where: str, name: str, known: Iterable[str]) -> str:
     close = get_close_matches(name, names, n=1)
     hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(names)}"
     return f"{where}: no column {name!r}; {hint}"
+
+
+def _missing(table: Table, rows: NDArray[np.bool_], where: Mapping[str, Any]) -> str:
+    """Why none of some rows is one of `where`; nothing where that only hangs on how it came out (valid or not)."""
+    named = {name: wanted for name, wanted in where.items() if table[name].dtype.kind != "b"}
+    together = rows
+    for name, wanted in named.items() if rows.any() else ():
+        equal = _equal(table[name], wanted)
+        if not (rows & equal).any():
+            return f"no row of {table.name} has {name} {wanted}; {_present(table[name][rows], wanted)}"
+        together = together & equal
+    words = ", ".join(f"{name} {wanted}" for name, wanted in named.items())
+    return f"no row of {table.name} has {words} at once" if rows.any() and not together.any() else ""
+
+
+def _present(values: NDArray[Any], wanted: object) -> str:
+    """The values of a column in words: all of few, the ends and the nearest of many numbers."""
+    number = values.dtype.kind in "fiub"
+    known = list(dict.fromkeys((values[np.isfinite(values)] if number else values).tolist()))
+    if not number and (close := get_close_matches(str(wanted), known, n=1)):
+        return f"did you mean {close[0]!r}?"
+    if number and len(known) > MOST_VALUES and isinstance(wanted, (int, float)):
+        nearest = min(known, key=lambda value: abs(value - wanted))
+        return f"there are {min(known):.12g} to {max(known):.12g}, {nearest:.12g} the nearest"
+    shown = [f"{value:.12g}" if isinstance(value, float) else str(value) for value in known[:MOST_VALUES]]
+    rest = ", ..." * (len(known) > MOST_VALUES)
+    return f"there {'is' if len(known) == 1 else 'are'} {', '.join(shown) or 'none'}{rest}"
 
 
 def _equal(values: NDArray[Any], wanted: object) -> NDArray[np.bool_]:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import COMMANDS, Answer, Owners, answer, load_study, study_label, tell
-from mechdesign.cli.failure import INTERRUPTED, explain
+from mechdesign.cli.failure import INTERRUPTED
 from mechdesign.cli.options import Options
-from mechdesign.errors import StudyError
+from mechdesign.errors import StudyError, explain
+from mechdesign.threads import one_thread
 
 if TYPE_CHECKING:
     from mechdesign.results import Table
@@ -35,6 +36,7 @@ def questions(study: Study) -> tuple[str, ...]:
     return tuple(asked) or ("kinematics",)
 
 
+@one_thread()
 def run(paths: Sequence[Path], options: Options, junit: Path | None = None) -> int:
     """Answer every question of the studies; returns the exit code, the highest of them all.
 

@@ -7,10 +7,12 @@ from pathlib import Path
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import COMMANDS, Owners, load_study, study_label
-from mechdesign.cli.failure import explain
 from mechdesign.cli.options import Options
+from mechdesign.errors import explain
+from mechdesign.threads import one_thread
 
 
+@one_thread()
 def check_studies(paths: Sequence[Path | None], options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     from mechdesign.mechanism.describe import describe
@@ -24,6 +26,8 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
             label = study_label(study)
             if not options.quiet:
                 terminal.emit(f"{label}: {study.name}\n{describe(study.mechanism)}\n")
+            for warning in study.warnings:
+                terminal.say(f"warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS)
             if options.plots:
                 from mechdesign.report.writer import write_sketch
@@ -32,8 +36,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
                 directory = options.out or Path("results") / label / "check"
                 if options.out is not None and len(paths) > 1:
                     directory /= label
-                drawing = write_sketch(directory, study)
-                terminal.say(f"{label}: the sketch as understood is in {drawing}", quiet=options.quiet)
+                terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
         except Exception as error:
             code, message = explain(error)
             terminal.say(message)

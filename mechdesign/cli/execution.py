@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from mechdesign.cli import terminal
 from mechdesign.cli.options import Options
+from mechdesign.threads import one_thread
 
 if TYPE_CHECKING:
     from mechdesign.journal import Journal
@@ -135,16 +136,13 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         terminal.say(f"{study_label(study)}: {command}: {interrupt}")
         raise
     try:
-        verdicts, files = _judged_and_written(directory, study, result, asked)
+        verdicts, undrawn = _judged_and_written(directory, study, result, asked)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
         raise
     if journal is not None:
         journal.discard()
-    warnings = list(result.warnings)
-    if asked.animate and writer.ANIMATION not in files:
-        warnings.append("no animation: it needs a sweep of one coordinate or a path")
     code = 3 if result.failed else 0 if all(verdict.met for verdict in verdicts) else 1
     return Answer(
         study=study_label(study),
@@ -152,7 +150,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         directory=directory,
         exit_code=code,
         rows=len(result.main),
-        warnings=warnings,
+        warnings=[*map(str, study.warnings), *result.warnings, *undrawn],
         failed=result.failed,
         verdicts=verdicts,
         seconds=time.perf_counter() - begun,
@@ -208,10 +206,20 @@ def _main_table(directory: Path) -> Table:
 def _judged_and_written(
     directory: Path, study: Study, result: Result, asked: Asked
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
-    """Judge a result by the study's requirements and write it; the verdicts and the names of the files."""
+    """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
+    from mechdesign.analyses.look import LONG
+    from mechdesign.errors import StudyError
     from mechdesign.report import requirements, writer
 
-    verdicts = requirements.judge(result, study.requirements, problem=study.problem, freedom=study.mechanism.mobility)
+    try:
+        verdicts = requirements.judge(
+            result, study.requirements, problem=study.problem, freedom=study.mechanism.mobility
+        )
+    except StudyError:
+        if result.command in LONG:
+            # What took long is not lost to a requirement that names a row it has not.
+            writer.write(directory, study, result, (), asked)
+        raise
     return verdicts, writer.write(directory, study, result, verdicts, asked)
 
 
@@ -239,6 +247,7 @@ def tell(given: Answer, options: Options) -> None:
     terminal.say(f"{given.study}: {given.command}: {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 
 
+@one_thread()
 def ask(path: Path | None, command: str, options: Options) -> int:
     """One command from end to end; returns its exit code."""
     study = load_study(path, options)

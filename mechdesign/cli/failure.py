@@ -3,32 +3,14 @@
 from __future__ import annotations
 
 import sys
-import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import typer
 
+from mechdesign.errors import explain
+
 INTERRUPTED = 130
-
-
-def explain(error: Exception) -> tuple[int, str]:
-    """Exit code and message of an exception; what nobody foresaw asks to be reported."""
-    from mechdesign.errors import MechdesignError
-
-    if isinstance(error, MechdesignError):
-        return error.exit_code, str(error)
-    if isinstance(error, MemoryError):
-        return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
-    place = ""
-    frames = [
-        frame for frame in traceback.extract_tb(error.__traceback__) if "mechdesign" in Path(frame.filename).parts
-    ]
-    if frames:
-        place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})"
-    detail = " ".join(str(error).split())
-    return 4, f"internal error: {type(error).__name__}: {detail}{place}; please report it, with the study"
 
 
 @contextmanager

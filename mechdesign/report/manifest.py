@@ -58,7 +58,7 @@ def compose(study: Study, result: Result, verdicts: Sequence[Verdict], files: Ma
     """The manifest of a result whose files have these SHA-256."""
     content = origin(study, result.command, asked) | {
         "counts": plain(dict(result.counts)),
-        "warnings": list(result.warnings),
+        "warnings": [*(f"{warning.key}: {warning.message}" for warning in study.warnings), *result.warnings],
         "failed": result.failed,
         **({"interrupted": result.interrupted} if result.interrupted else {}),
         "requirements": [plain(asdict(verdict)) for verdict in verdicts],

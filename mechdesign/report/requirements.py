@@ -91,7 +91,8 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
         if command not in judged:
             continue
         try:
-            judge(look(study, command), study.requirements, problem=study.problem)
+            # Of so few designs some rows may be missing that all of them have.
+            judge(look(study, command), study.requirements, problem=study.problem, whole=command != "optimize")
         except AssemblyError:
             # The answer itself will tell.
             continue
@@ -107,11 +108,12 @@ def judge(
     *,
     problem: Callable[[str, str, int], Problem] = _unplaced,
     freedom: int = 1,
+    whole: bool = True,
 ) -> tuple[Verdict, ...]:
     """Verdicts on the requirements that concern this result, in the order of the study.
 
     The worst row counts: the smallest value for `at_least`, the largest for `at_most`; nan is not met, nor is a
-    requirement that no row answers.
+    requirement that no row answers because none came out valid.
 
     Parameters
     ----------
@@ -119,11 +121,14 @@ def judge(
         From a message, ``requirements`` and a number to a mistake with its place, as `mechdesign.study.Study.problem`.
     freedom : int
         How many numbers make a pose: the mobility.
+    whole : bool
+        Whether the result has all its rows; if not, rows that are missing are no mistake.
 
     Raises
     ------
     StudyError
-        If a requirement names a column that the result has not, or one of words. Every such mistake in one go.
+        If a requirement names a column that the result has not, or one of words, or a row that its table never has.
+        Every such mistake in one go.
     """
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
@@ -131,7 +136,7 @@ def judge(
         if command_of(requirement) != result.command:
             continue
         try:
-            verdicts.append(_judge(result, requirement, freedom))
+            verdicts.append(_judge(result, requirement, freedom, whole))
         except UnknownColumnError as error:
             problems.append(problem(str(error), "requirements", index))
     if problems:
@@ -139,12 +144,14 @@ def judge(
     return tuple(verdicts)
 
 
-def _judge(result: Result, requirement: Requirement, freedom: int) -> Verdict:
+def _judge(result: Result, requirement: Requirement, freedom: int, whole: bool) -> Verdict:
     path = requirement.result.partition(".")[2]
     chosen = choose(result, path, requirement.where or {}, absolute=requirement.abs)
     table, name, values = chosen.table, chosen.column, chosen.values
     words = _words(requirement)
     rows = np.flatnonzero(chosen.counts)
+    if chosen.missing and whole:
+        raise UnknownColumnError(chosen.missing)
     if not rows.size:
         return Verdict(words, met=False, worst=float("nan"), place="no row of " + table.name)
     undefined = rows[np.isnan(values[rows])]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -9,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mechdesign.errors import OutputError
+from mechdesign.errors import OutputError, explain
 from mechdesign.files import replace
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Asked
@@ -18,12 +19,11 @@ from mechdesign.report.tables import csv_blocks
 from mechdesign.results import Result
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from mechdesign.study import Study
 
 MECHANISM = "mechanism.png"
 ANIMATION = "motion.gif"
+FIGURES = "mechdesign.report.figures"
 
 
 def check_writable(directory: Path) -> None:
@@ -46,11 +46,11 @@ def check_writable(directory: Path) -> None:
 
 
 def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Asked) -> tuple[str, ...]:
-    """Write a result into a directory and return the names of the files.
+    """Write a result into a directory and return what is to be told of its pictures: those that could not be drawn.
 
-    Each file appears whole or not at all; of an interrupted computation no pictures are drawn. The manifest comes
-    last; files of an older result that the new one does not have are removed, so that the directory never shows two
-    results at once.
+    Each file appears whole or not at all. The tables come first, with a manifest that vouches for them alone: whatever
+    becomes of the pictures, they are there. Of an interrupted computation no pictures are drawn. Files of an older
+    result that the new one does not have are removed, so that the directory never shows two results at once.
 
     Raises
     ------
@@ -61,18 +61,23 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
         f"{table.name}.csv": map(str.encode, csv_blocks(table)) for table in result.tables.values()
     }
     files |= {name: (text.encode(),) for name, text in result.files.items()}
-    if asked.plots and not result.interrupted:
-        files |= {name: (data,) for name, data in pictures(study, result, animate=asked.animate).items()}
     stale = manifest.recorded_files(manifest.read(directory) or {}).keys() - files.keys()
+    warnings: tuple[str, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)
         digests = {name: replace(directory / name, blocks) for name, blocks in files.items()}
         for name in stale:
             (directory / name).unlink(missing_ok=True)
-        replace(directory / manifest.NAME, [manifest.compose(study, result, verdicts, digests, asked)])
+        tables = dataclasses.replace(asked, plots=False, animate=False)
+        replace(directory / manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
+        if asked.plots and not result.interrupted:
+            drawn, warnings = pictures(study, result, animate=asked.animate)
+            digests |= {name: replace(directory / name, [data]) for name, data in drawn.items()}
+            told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
+            replace(directory / manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
-    return (*files, manifest.NAME)
+    return warnings
 
 
 def write_text(path: Path, text: str) -> None:
@@ -86,8 +91,8 @@ def write_text(path: Path, text: str) -> None:
     _write(path, text.encode())
 
 
-def write_sketch(directory: Path, study: Study) -> Path:
-    """Draw the sketch as it is understood into a directory, as `MECHANISM`; returns the file.
+def write_sketch(directory: Path, study: Study) -> str:
+    """Draw the sketch as it is understood into a directory, as `MECHANISM`; says where it is, or why there is none.
 
     Raises
     ------
@@ -98,31 +103,52 @@ def write_sketch(directory: Path, study: Study) -> Path:
     from mechdesign.report.figures.mechanism import sketch_figure
 
     check_writable(directory)
-    with style.context():
-        data = style.to_png(sketch_figure(study))
     path = directory / MECHANISM
+    try:
+        with style.context():
+            data = style.to_png(sketch_figure(study))
+    except Exception as error:
+        return f"warning: {_undrawn(MECHANISM, explain(error)[1])}"
     _write(path, data)
-    return path
+    return f"the sketch as understood is in {path}"
 
 
-def pictures(study: Study, result: Result, *, animate: bool = False) -> dict[str, bytes]:
-    """Pictures of a result: those of its command, the mechanism, and the motion as a GIF if it is one."""
+def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    """Pictures of a result: those of its command, the mechanism, and the motion as a GIF if it is one.
+
+    Returns
+    -------
+    pictures : dict of str to bytes
+        By the names of their files.
+    warnings : tuple of str
+        Those that could not be drawn, and why.
+    """
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
-    from mechdesign.report.figures.rendering import Drawing, render
+    from mechdesign.report.figures.rendering import Drawing, Gallery, render
 
     with style.context():
-        figures: dict[str, Figure] = import_module(f"mechdesign.report.figures.{result.command}").figures(study, result)
+        gallery = Gallery()
+        # What all pictures of a command share may fail too.
+        gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
         drawings: dict[str, Drawing] = {
-            f"{name}.png": partial(style.to_png, figure) for name, figure in figures.items()
+            f"{name}.png": partial(style.to_png, figure) for name, figure in gallery.items()
         }
         drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study))
         if animate:
             from mechdesign.report.figures.animation import animation
 
             drawings[ANIMATION] = lambda: animation(study)
-        # What cannot be animated gives no bytes.
-        return {name: data for name, data in render(drawings).items() if data}
+        drawn, failed = render(drawings)
+    warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
+    if drawn.get(ANIMATION) == b"":
+        del drawn[ANIMATION]
+        warnings.append("no animation: it needs a sweep of one coordinate or a path")
+    return drawn, tuple(warnings)
+
+
+def _undrawn(name: str, why: str) -> str:
+    return f"picture {name} could not be drawn: {why}"
 
 
 def _write(path: Path, data: bytes) -> None:

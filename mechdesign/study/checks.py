@@ -226,6 +226,10 @@ class Checker:
             path: Path = (*root, "elastic", link)
             self.known(link, self.names.moving, "moving link", path, at_key=True)
             self.known(profile, section.sections, "section", path)
+        for profile in section.sections:
+            if profile not in section.elastic.values():
+                others = [other for other in section.sections if other != profile]
+                self.reporter.unused((*root, "sections", profile), "section", others)
         for drive in section.actuators:
             path = (*root, "actuators", drive)
             if self.known(drive, self.names.drives, "drive", path, at_key=True):

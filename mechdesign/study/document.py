@@ -56,6 +56,8 @@ class Document:
         Mistakes of writing that leave the rest readable: duplicate keys, expressions split at a comma.
     spoiled : set of paths
         Parts in which such a mistake was found, where further complaints would only repeat it.
+    added : set of paths
+        Entries that the text does not have: an override made them.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Document:
     values: dict[Path, Mark] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     spoiled: set[Path] = field(default_factory=set)
+    added: set[Path] = field(default_factory=set)
 
 
 def dotted(path: Sequence[str | int]) -> str:
@@ -250,7 +253,8 @@ class _Builder:
 
 def parse_value(text: str, name: str) -> Document:
     """Read the value of an override, which may be empty."""
-    return read(text.encode(), name) if text.strip() else Document(name, None)
+    # What the terminal could not decode is told as not UTF-8, as it would be in a file.
+    return read(text.encode(errors="surrogateescape"), name) if text.strip() else Document(name, None)
 
 
 def plain(data: Any) -> Any:

@@ -34,6 +34,7 @@ from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.targets import Target
 from mechdesign.study.units import Units, units_from
 from mechdesign.study.workspace_models import WorkspaceSection
+from mechdesign.threads import one_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,8 @@ class Study:
         The gate.
     targets : mapping of str to Target
         What outputs should be, by the coordinate or point.
+    warnings : tuple of Problem
+        What is likely a mistake, such as a parameter that nothing uses.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Study:
     stiffness: StiffnessSection | None
     requirements: tuple[Requirement, ...]
     targets: Mapping[str, Target]
+    warnings: tuple[Problem, ...] = ()
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -155,6 +159,7 @@ def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | No
     return load_bytes(content, file, overrides, seed)
 
 
+@one_thread()
 def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), seed: int | None = None) -> Study:
     """Load a study from the bytes of a file; see `load`."""
     if seed is not None and seed < 0:
@@ -196,6 +201,7 @@ def load_document(
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(context.parameters, formulas)
     parts = checks.check(parts, builder.names, parameters, reporter, path.parent)
+    _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
     pose_checks.check_poses(parts, mechanism, reporter, path.parent, 2.0 * math.pi / context.units.angle_factor)
@@ -225,6 +231,7 @@ def load_document(
         stiffness=parts.get("stiffness"),
         requirements=parts["requirements"],
         targets=parts["targets"],
+        warnings=tuple(reporter.warnings),
     )
 
 
@@ -291,6 +298,23 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
             with contextlib.suppress(ValidationError):
                 parts[key] = _adapter(key).validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts
+
+
+def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Context, reporter: Reporter) -> None:
+    """Note parameters that no number, design variable or varying dimension of the study uses."""
+    if reporter.problems:
+        # What was wrong may have been what uses them.
+        return
+    optimize, reliability = parts.get("optimize"), parts.get("reliability")
+    used = context.used.union(optimize.variables if optimize else (), reliability.dimensions if reliability else ())
+    for name, formula in reversed([*parameters.formulas.items()]):
+        # A parameter may use those above it.
+        if name in used:
+            used |= formula.names
+    for name in parameters.nominal:
+        if name not in used:
+            others = [other for other in parameters.nominal if other != name]
+            reporter.unused(("mechanism", "parameters", name), "parameter", others)
 
 
 @cache

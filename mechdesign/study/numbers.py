@@ -36,11 +36,20 @@ class Context:
         Nominal values, nan where one is wrong.
     below : collection of str
         Parameters that are not known yet.
+    used : set of str
+        Gathers the names in expressions that were read.
     """
 
     units: Units = field(default_factory=Units)
     parameters: Mapping[str, float] = field(default_factory=dict)
     below: Collection[str] = ()
+    used: set[str] = field(default_factory=set)
+
+    def expression(self, text: str) -> Expression:
+        """Parse an expression in the study's units and note the names in it."""
+        found = Expression.parse(text, self.units.angle_factor)
+        self.used.update(found.names)
+        return found
 
 
 @dataclass(frozen=True)
@@ -128,7 +137,7 @@ def _read_text(text: str, context: Context, kind: str | None) -> Value:
             if not math.isfinite(number):
                 raise failure(f"{text!r} is too large a number")
             return Value(number, None, measure(text)[1])
-        expression = Expression.parse(text, context.units.angle_factor)
+        expression = context.expression(text)
         for name in sorted(expression.names - set(context.parameters)):
             raise failure(f"unknown name {name!r} in {shown(text)}{_known_names(name, context)}")
         result = expression.evaluate(context.parameters)
@@ -180,7 +189,7 @@ class Reader:
     def _deferred(self, raw: Any, context: Context) -> Expression:
         try:
             if isinstance(raw, str) and not QUANTITY.fullmatch(raw):
-                return Expression.parse(raw, context.units.angle_factor)
+                return context.expression(raw)
         except ExpressionError as error:
             raise failure(str(error)) from None
         return Expression.parse(repr(read_number(raw, context, self.kind).nominal))

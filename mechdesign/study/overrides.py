@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
 from mechdesign.errors import Problem, StudyError
 from mechdesign.study.document import Document, Mark, Path, dotted, parse_value
+from mechdesign.study.numbers import suggestion
 from mechdesign.study.reporter import LIST_FORM, schema_keys
 from mechdesign.study.sections import StudyFile
+
+MAX_LENGTH = 1000
+"""Longest dotted name accepted: nothing that a person writes comes near it."""
+_INDEX = re.compile(r"[0-9]{1,9}")
 
 
 def apply(document: Document, overrides: Sequence[str]) -> None:
@@ -29,18 +35,23 @@ def _apply(document: Document, text: str) -> None:
     segments = name.strip().split(".")
     if not separator or not all(segments):
         raise StudyError([Problem("an override is <dotted name>=<value>", file=label)])
+    if len(name) > MAX_LENGTH:
+        raise StudyError([Problem(f"a name longer than {MAX_LENGTH} characters", file=label)])
     parsed = parse_value(value, label)
     if parsed.problems:
         raise StudyError(parsed.problems)
     if not isinstance(document.data, dict):
         return
-    holder, path = _descend(document, segments, label)
+    holder, path = _descend(document, segments, label, making=parsed.data is not None)
     key: Any = path[-1]
-    if isinstance(holder, list) and key == len(holder):
-        holder.append(parsed.data)
-    elif isinstance(holder, dict) and parsed.data is None:
+    there = _has(holder, key)
+    if isinstance(holder, dict) and parsed.data is None:
         # Nothing takes the entry away: `--set kinematics.sweep=` makes room for other poses.
+        if not there and key not in schema_keys(StudyFile, path[:-1]):
+            raise StudyError([Problem(f"there is no {dotted(path)} to take away{suggestion(key, holder)}", file=label)])
         holder.pop(key, None)
+    elif isinstance(holder, list) and not there:
+        holder.append(parsed.data)
     else:
         holder[key] = parsed.data
     mark = Mark(label)
@@ -49,10 +60,16 @@ def _apply(document: Document, text: str) -> None:
             del known[old]
     document.keys[path] = document.values[path] = mark
     document.spoiled = {place for place in document.spoiled if place[: len(path)] != path}
+    if not there:
+        document.added.add(path)
 
 
-def _descend(document: Document, segments: list[str], label: str) -> tuple[Any, Path]:
-    """Find the mapping or list to change and the path of the entry; mappings on the way are made as needed."""
+def _has(data: Any, key: Any) -> bool:
+    return key < len(data) if isinstance(data, list) else key in data
+
+
+def _descend(document: Document, segments: list[str], label: str, *, making: bool) -> tuple[Any, Path]:
+    """Find the mapping or list to change and the path of the entry; mappings on the way are made where wanted."""
     data: Any = document.data
     path: list[str | int] = []
     rest = list(segments)
@@ -62,12 +79,14 @@ def _descend(document: Document, segments: list[str], label: str) -> tuple[Any, 
         key: Any = segment
         if not rest:
             return data, tuple(path)
-        inner = data[key] if isinstance(data, list) or key in data else None
+        inner = data[key] if _has(data, key) else None
         if inner is None:
             inner = {}
-            data[key] = inner
-            document.keys.setdefault(tuple(path), Mark(label))
-            document.values[tuple(path)] = Mark(label)
+            if making:
+                data[key] = inner
+                document.keys.setdefault(tuple(path), Mark(label))
+                document.values[tuple(path)] = Mark(label)
+                document.added.add(tuple(path))
         if not isinstance(inner, dict | list):
             raise StudyError([Problem(f"{dotted(path)} is neither a mapping nor a list", file=label)])
         data = inner
@@ -75,7 +94,7 @@ def _descend(document: Document, segments: list[str], label: str) -> tuple[Any, 
 
 def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> tuple[str | int, list[str]]:
     if isinstance(data, list):
-        index = LIST_FORM.get(rest[0], int(rest[0]) if rest[0].isdigit() else -1)
+        index = LIST_FORM.get(rest[0], int(rest[0]) if _INDEX.fullmatch(rest[0]) else -1)
         if not 0 <= index <= len(data) or (index == len(data) and len(rest) > 1):
             raise StudyError([Problem(f"{dotted(path)} is a list of {len(data)}; it has no {rest[0]!r}", file=label)])
         return index, rest[1:]

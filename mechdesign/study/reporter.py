@@ -29,19 +29,36 @@ class Reporter:
     def __init__(self, document: Document) -> None:
         self.document = document
         self.problems: list[Problem] = list(document.problems)
+        self.warnings: list[Problem] = []
 
     def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Note a problem at a path of the data; paths through the long form of a short form are understood."""
         found = self.written(path)
         if any(found[: len(part)] == part for part in self.document.spoiled):
             return
+        problem = self._placed(found, message, at_key)
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+    def warn(self, path: Sequence[str | int], message: str) -> None:
+        """Note what is likely a mistake, though the study can be answered, at a key of the data."""
+        self.warnings.append(self._placed(self.written(path), message, True))
+
+    def unused(self, path: Path, what: str, others: Iterable[str]) -> None:
+        """Note a named thing that nothing uses: one that an override brought in is a name misspelt."""
+        name = path[-1]
+        if path in self.document.added:
+            hint = suggestion(str(name), others)
+            self.report(path, f"the study has no {what} {name!r}, and nothing uses one{hint}", at_key=True)
+        else:
+            self.warn(path, f"nothing uses {what} {name!r}")
+
+    def _placed(self, found: Path, message: str, at_key: bool) -> Problem:
         known = self._nearest(found)
         mark = self.document.values[known]
         if (at_key or known != found) and known in self.document.keys:
             mark = self.document.keys[known]
-        problem = mark.problem(message, dotted(found))
-        if problem not in self.problems:
-            self.problems.append(problem)
+        return mark.problem(message, dotted(found))
 
     def done(self) -> None:
         """Raise all problems, in the order of the text.

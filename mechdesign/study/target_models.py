@@ -65,7 +65,7 @@ class _TargetValue:
 
 def _expression(text: str, context: Context) -> Expression:
     try:
-        expression = Expression.parse(text, context.units.angle_factor)
+        expression = context.expression(text)
         if not expression.names:
             expression.evaluate({})
     except ExpressionError as error:

@@ -31,6 +31,7 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
         folder = tmp_path / command
         manifest = json.loads((folder / "manifest.json").read_text())
         assert not manifest["failed"]
+        assert not any("could not be drawn" in warning for warning in manifest["warnings"])
         files = {path.name for path in folder.iterdir()}
         assert files == {*manifest["files"], "manifest.json"}
         assert "mechanism.png" in files

@@ -126,6 +126,37 @@ def test_a_requirement_that_names_no_column_is_told_before_anything_is_computed(
 
 
 @pytest.mark.parametrize(
+    ("study", "command", "requirement", "told"),
+    [
+        (FOUR_BAR, "kinematics", "extremes.range, where: {output: rocker.angel}", "did you mean 'rocker.angle'"),
+        (FOUR_BAR, "kinematics", "rocker.angle, where: {crank: 0.25}", "there are 0 to 360, 0 the nearest"),
+        (ARM, "reliability", "reliability, where: {method: monte_karlo}", "has method monte_karlo; "),
+        (ARM, "reliability", "moments.sigma, where: {output: P.z}", "did you mean 'P."),
+    ],
+)
+def test_a_requirement_of_rows_that_never_are_is_told(folder, invoke, study, command, requirement, told) -> None:
+    (folder / "study.yaml").write_text(f"{study}requirements:\n  - {{result: {command}.{requirement}, at_least: 1}}\n")
+    for arguments in ([command], ["run"], ["check"]):
+        done = invoke(*arguments, "study.yaml", "--no-plots")
+        assert done.exit_code == 2, done.output
+        assert f"study.yaml:{study.count(chr(10)) + 2}:5: requirements.0: no row of " in done.stderr
+        assert told in done.stderr
+    assert not (folder / "results/study" / command).exists()
+
+
+def test_designs_are_not_lost_to_a_requirement_of_a_row_that_never_is(folder, invoke) -> None:
+    study = ARM[: ARM.index("reliability:")] + "kinematics: {poses: [{t1: 30, t2: 60}], outputs: [P]}\n"
+    study += "optimize: {variables: {upper.length: {from: 5, to: 9, step: 1}}, maximize: kinematics.P.x}\n"
+    study += "requirements: [{result: optimize.designs.kinematics.P.x, where: {upper.length: 20}, at_least: 1}]\n"
+    (folder / "study.yaml").write_text(study)
+    assert invoke("check", "study.yaml", "--no-plots").exit_code == 0
+    done = invoke("optimize", "study.yaml", "--no-plots")
+    assert done.exit_code == 2
+    assert "no row of designs has upper.length 20; there are 5, 6, 7, 8, 9" in done.stderr
+    assert len((folder / "results/study/optimize/designs.csv").read_text().splitlines()) == 6
+
+
+@pytest.mark.parametrize(
     ("variable", "message"),
     [
         ("{from: 9, to: 5, step: 1}", "no value lies between 'from' and 'to'"),

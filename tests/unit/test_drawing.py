@@ -1,5 +1,7 @@
 """Drawings of mechanisms: what is in them, where, and the same bytes twice."""
 
+import time
+
 import numpy as np
 import pytest
 from matplotlib.patches import PathPatch
@@ -7,6 +9,7 @@ from matplotlib.patches import PathPatch
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.labels import Label, paper, place_labels
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.scene import hull, pose
 
@@ -104,3 +107,37 @@ def test_hull_of_a_plate_and_of_a_bar():
     assert set(hull([0, 4, 4 + 4j, 4j, 2 + 2j])) == {0, 4, 4 + 4j, 4j}
     assert hull([3 + 3j, 1 + 1j, 2 + 2j]) == [1 + 1j, 3 + 3j]
     assert hull([1j, 1j]) == [1j]
+
+
+def test_many_names_are_placed_in_time_that_grows_with_their_number():
+    def seconds(count):
+        with style.context():
+            axes = style.new_figure(8, 8).add_subplot()
+            axes.set(xlim=(-1, 1), ylim=(-1, 1))
+            places = np.sqrt(np.arange(count) / count) * np.exp(2.4j * np.arange(count))
+            labels = [Label(f"P{k}", (place,), "black") for k, place in enumerate(places)]
+            begun = time.process_time()
+            place_labels(axes, labels, paper(axes, np.repeat(places, 9)), order=3)
+            assert len(axes.texts) == count
+            return time.process_time() - begun
+
+    # The bound is 20 times what it takes; each name against all others took 33 s.
+    assert seconds(800) < 20
+
+
+def test_names_go_where_least_is_covered():
+    with style.context():
+        axes = style.new_figure(4, 4).add_subplot()
+        axes.set(xlim=(-1, 1), ylim=(-1, 1))
+        (origin,) = paper(axes, np.array([0j]))
+        # Everything around the point is taken, but for what lies below it.
+        x, y = np.meshgrid(np.linspace(-60, 60, 31), np.linspace(-60, 60, 31))
+        around = np.column_stack([x.ravel(), y.ravel()])
+        free = (np.abs(around[:, 0]) < 20) & (around[:, 1] < -3)
+        place_labels(axes, [Label("O", (0j,), "black"), Label("P", (0j,), "black")], origin + around[~free], order=3)
+        first, second = (text.xyann for text in axes.texts)
+        assert first[1] < -6
+        assert abs(first[0]) < 15
+        assert second[1] < -6
+        boxes = [text.get_window_extent() for text in axes.texts]
+        assert not boxes[0].overlaps(boxes[1])

@@ -67,8 +67,36 @@ def test_where_chooses_rows_by_number_and_word(where, worst):
     assert given.worst == worst
 
 
-def test_no_row_is_not_met():
-    assert not verdict(Asked("kinematics.mu", where={"theta": 91}, at_least=1), mu=[50.0, 39.0, 60.0]).met
+@pytest.mark.parametrize(
+    ("where", "told"),
+    [
+        ({"theta": 91}, "no row of motion has theta 91; there are 0, 90, 180"),
+        ({"kind": "mont_carlo"}, "no row of motion has kind mont_carlo; did you mean 'monte_carlo'?"),
+        ({"kind": "zzz"}, "no row of motion has kind zzz; there are first_order, monte_carlo"),
+        ({"kind": "first_order", "theta": 180}, "no row of motion has kind first_order, theta 180 at once"),
+        ({"theta": "91 deg"}, "no row of motion has theta 91 deg; there are 0, 90, 180"),
+        ({"none": 3}, "no row of motion has none 3; there are none"),
+    ],
+)
+def test_rows_that_never_are_are_mistakes_of_the_study(where, told):
+    columns = {"kind": ["first_order", "first_order", "monte_carlo"], "none": [np.nan] * 3}
+    with pytest.raises(StudyError) as caught:
+        verdict(Asked("kinematics.mu", where=where, at_least=1), mu=[50.0, 39.0, 60.0], **columns)
+    assert told in str(caught.value)
+    assert "requirements.0" in str(caught.value)
+
+
+def test_the_nearest_of_many_rows_is_told():
+    given = Table("motion", (Column("theta", np.linspace(0, 360, 73)), Column("mu", np.ones(73))))
+    with pytest.raises(StudyError, match="there are 0 to 360, 35 the nearest"):
+        judge(Result("kinematics", {"motion": given}), [Asked("kinematics.mu", where={"theta": 36}, at_least=1)])
+
+
+def test_no_valid_row_is_not_met():
+    asked = Asked("kinematics.mu", where={"valid": 1, "theta": 90}, at_least=1)
+    assert not verdict(asked, mu=[50.0, np.nan, 60.0], valid=[True, False, True]).met
+    empty = Table("motion", tuple(Column(name, np.zeros(0)) for name in ("theta", "valid", "mu")))
+    assert not judge(Result("kinematics", {"motion": empty}), [asked])[0].met
 
 
 def test_columns_of_other_tables_and_names_with_dots():

@@ -75,3 +75,78 @@ def test_wrong_overrides(load, override, message):
         load(override)
     assert str(caught.value).startswith(f"--set {override}")
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["mechanism.parameters.R=99"], "the study has no parameter 'R', and nothing uses one; did you mean 'r'?"),
+        (["mechanism.parameters.nosuch=99"], "the study has no parameter 'nosuch', and nothing uses one"),
+        (["mechanism.parameters.nosuch.x=99"], "a parameter's name is letters"),
+        (["mechanism.parameters.a=1", "mechanism.parameters.b=2*a"], "the study has no parameter 'a'"),
+        (["stiffness.at=B", "stiffness.sections.tube={E: 2e5, diameter: 9}"], "the study has no section 'tube'"),
+        (["kinematics.sweeep="], "there is no kinematics.sweeep to take away; did you mean 'sweep'?"),
+        (["mechanism.sketch.Q="], "there is no mechanism.sketch.Q to take away"),
+    ],
+)
+def test_what_an_override_adds_for_nothing(load, overrides, message):
+    with pytest.raises(StudyError) as caught:
+        load(*overrides)
+    assert str(caught.value).startswith(f"--set {overrides[0]}") or len(overrides) > 1
+    assert message in str(caught.value)
+
+
+def test_what_an_override_adds_and_something_uses(load):
+    study = load("mechanism.parameters.k=2", "mechanism.parameters.half=r/k", "mechanism.links.rocker.length=2*half*k")
+    assert study.mechanism.description.places["rocker.length"].nominal == 60
+    assert study.warnings == ()
+    assert load("mechanism.parameters.k=2", "optimize={variables: {k: {from: 1, to: 2, number: 3}}, minimize: [area]}")
+
+
+def test_taking_away_what_may_stand_there_and_does_not(load):
+    study = load("stiffness.loads=", "kinematics.poses=")
+    assert study.stiffness is None
+    assert study.kinematics is not None
+
+
+USES = [
+    "mechanism.links.rocker.length=u",
+    "mechanism.sketch.B.1=u",
+    "mechanism.limits=[{distance: [A, D], max: u}]",
+    "mechanism.targets={B.x: u*theta}",
+    "mechanism.targets={B.x: [[0, 3], [9, u]]}",
+    "kinematics.sweep.theta.to=u",
+    "kinematics.rates.theta=u",
+    "reliability.dimensions.u=0.1",
+    "reliability.dimensions.rod.length.tolerance=u",
+    "reliability.samples=u*10",
+    "stiffness={at: B, loads: [[u, 0]]}",
+    "optimize={variables: {u: {from: 1, to: 2, number: 3}}, minimize: [area]}",
+    "optimize={variables: {r: {from: 1, to: u, number: 3}}, minimize: [area]}",
+    "requirements=[{result: kinematics.B.x, at_least: u}]",
+    "mechanism.parameters.r=u/2",
+]
+
+
+@pytest.mark.parametrize("use", ["name=x", *USES])
+def test_a_parameter_that_nothing_uses_is_told(use, tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(STUDY.replace("{r: 30}", "{u: 60, r: 30}"))
+    told = [str(warning) for warning in mechdesign.load(path, [use]).warnings]
+    assert told == ([] if use in USES else [f"{path}:2:16: mechanism.parameters.u: nothing uses parameter 'u'"])
+
+
+@pytest.mark.parametrize("text", ["²", "99999999999999999999", "٣", "-1", "1e3", "", " "])
+def test_odd_places_in_a_list(text, load):
+    with pytest.raises(StudyError):
+        load(f"mechanism.links.rocker.{text}=3")
+
+
+@pytest.mark.parametrize(
+    "override",
+    ["\udcff=3", "name=\udcff", "a\n.b=3", "x" * 100_000 + "=1", ".".join("a" * 3000) + "=1", "seed=\x00", "=", "."],
+)
+def test_odd_overrides(override, load):
+    with pytest.raises(StudyError) as caught:
+        load(override)
+    assert len(str(caught.value)) < 2000

@@ -21,11 +21,13 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.threads import one_thread
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
 
 
+@one_thread()
 def kinematics(
     study: Study,
     *,

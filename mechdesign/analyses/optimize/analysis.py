@@ -23,6 +23,7 @@ from mechdesign.journal import Journal
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
+from mechdesign.threads import one_thread
 
 # Numbers of rows that a search keeps.
 MOST_KEPT = 10_000_000
@@ -30,6 +31,7 @@ MOST_REASONS = 10
 Compute = Callable[[Iterable[Batch]], Iterator[Evaluated]]
 
 
+@one_thread()
 def optimize(
     study: Study,
     *,

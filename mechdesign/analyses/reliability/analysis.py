@@ -30,6 +30,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.threads import one_thread
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +40,7 @@ _BLOCK = 2048
 _DENSITIES = 12
 
 
+@one_thread()
 def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Errors of a study's outputs from its tolerances and clearances.
 

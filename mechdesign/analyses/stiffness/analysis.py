@@ -33,6 +33,7 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.threads import one_thread
 
 CHUNK = 8192
 # Wrenches (of unit size) nearer to dependence than this are told: the answer hangs on rounding and on tolerances.
@@ -65,6 +66,7 @@ class Asked:
     length: float
 
 
+@one_thread()
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Stiffness of a body or a pin at every pose of the study.
 

@@ -38,6 +38,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.workspace_models import Over
+from mechdesign.threads import one_thread
 
 ROOTLESS = (
     "without a closed form of the inverse problem the workspace grows from the sketch, and with the held values the "
@@ -45,6 +46,7 @@ ROOTLESS = (
 )
 
 
+@one_thread()
 def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Reachable region of a point: indices (GII, GRI, SUI), local indices on a grid, and the boundary.
 

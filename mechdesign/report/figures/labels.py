@@ -54,26 +54,31 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: NDArray[np.floa
     """
     window = paper(axes, np.array([complex(axes.get_xlim()[0], axes.get_ylim()[0]),
                                    complex(axes.get_xlim()[1], axes.get_ylim()[1])]))  # fmt: skip
-    taken: list[tuple[float, float, float, float]] = []
+    obstacles = obstacles[np.argsort(obstacles[:, 0])]
+    taken, count = np.empty((len(labels), 4)), 0
     for label in labels:
         half = np.array([_LETTER * label.size * len(label.text), 0.85 * label.size]) / 2
-        best: tuple[float, complex, NDArray[np.float64]] | None = None
+        offsets, strains = _offsets(label, half)
+        # Only what is within reach of some place can be covered.
+        reach = np.abs(offsets).max(axis=0) + half + 2
+        best: tuple[float, complex, NDArray[np.float64], NDArray[np.float64]] | None = None
         for rank, anchor in enumerate(label.anchors):
             origin = paper(axes, np.array([anchor]))[0]
-            places = _offsets(label, half)
-            # Only what is within reach of some place can be covered.
-            reach = np.max([np.abs(offset) for offset, _ in places], axis=0) + half + 1
-            near = obstacles[(np.abs(obstacles - origin) <= reach).all(axis=1)]
-            for offset, strain in places:
-                box = (*(origin + offset - half), *(origin + offset + half))
-                cost = strain + 0.4 * rank + _cost(box, near, taken, window)
-                if best is None or cost < best[0]:
-                    best = cost, anchor, offset
+            first, last = np.searchsorted(obstacles[:, 0], origin[0] + reach[0] * np.array([-1, 1]))
+            near = obstacles[first:last]
+            near = near[np.abs(near[:, 1] - origin[1]) <= reach[1]]
+            written = taken[:count]
+            low, high = origin - reach, origin + reach
+            written = written[((written[:, :2] < high) & (written[:, 2:] > low)).all(axis=1)]
+            boxes = np.column_stack([origin + offsets - half, origin + offsets + half])
+            costs = strains + 0.4 * rank + _costs(boxes, near, written, window)
+            k = int(np.argmin(costs))
+            if best is None or costs[k] < best[0]:
+                best = float(costs[k]), anchor, offsets[k], boxes[k]
         if best is None or (label.optional and best[0] > 4.0):
             continue
-        _, anchor, offset = best
-        origin = paper(axes, np.array([anchor]))[0]
-        taken.append((*(origin + offset - half), *(origin + offset + half)))
+        _, anchor, offset, box = best
+        taken[count], count = box, count + 1
         axes.annotate(
             label.text, (anchor.real, anchor.imag), xytext=tuple(offset), textcoords="offset points", ha="center",
             va="center", color=label.color, fontsize=label.size, fontstyle="italic" if label.italic else "normal",
@@ -89,9 +94,9 @@ def paper(axes: Axes, places: NDArray[np.complex128]) -> NDArray[np.float64]:
     return np.asarray(pixels, dtype=float) * 72 / figure.dpi
 
 
-def _offsets(label: Label, half: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
-    """Where the middle of the text may stand from its anchor (points), and how much each displeases."""
-    found = []
+def _offsets(label: Label, half: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where the middle of the text may stand from its anchor (points), shape (n, 2), and how much each displeases."""
+    places, strains = [], []
     preferred = math.pi / 4 if label.heading is None else label.heading
     for stretch, strain in ((1.0, 0.0), (1.8, 0.6), (2.8, 1.4)):
         for k in range(_DIRECTIONS):
@@ -101,28 +106,25 @@ def _offsets(label: Label, half: NDArray[np.float64]) -> list[tuple[NDArray[np.f
             place = label.reach * stretch * np.array([toward.real, toward.imag])
             # The text's nearest edge, not its middle, keeps the distance.
             place += half * np.clip(1.3 * np.array([toward.real, toward.imag]), -1, 1)
-            found.append((place, strain + turned * (0.5 if label.heading is None else 2.0)))
-    return found
+            places.append(place)
+            strains.append(strain + turned * (0.5 if label.heading is None else 2.0))
+    return np.array(places), np.array(strains)
 
 
-def _cost(
-    box: tuple[float, ...],
+def _costs(
+    boxes: NDArray[np.float64],
     obstacles: NDArray[np.float64],
-    taken: Sequence[tuple[float, float, float, float]],
+    taken: NDArray[np.float64],
     window: NDArray[np.float64],
-) -> float:
-    left, low, right, high = box
-    inside = (
-        (obstacles[:, 0] > left - 1) & (obstacles[:, 0] < right + 1)
-        & (obstacles[:, 1] > low - 1) & (obstacles[:, 1] < high + 1)
-    )  # fmt: skip
-    cost = 0.8 * float(np.count_nonzero(inside))
-    for other in taken:
-        wide = min(right, other[2]) - max(left, other[0]) + 2
-        tall = min(high, other[3]) - max(low, other[1]) + 1
-        if wide > 0 and tall > 0:
-            cost += 20 + wide * tall
+) -> NDArray[np.float64]:
+    """What each of some boxes (left, low, right, high; a row each) would cover, and how far it leaves the window."""
+    left, low, right, high = boxes.T[:, :, None]
+    x, y = obstacles.T
+    inside = (x > left - 1) & (x < right + 1) & (y > low - 1) & (y < high + 1)
+    wide = np.minimum(right, taken[:, 2]) - np.maximum(left, taken[:, 0]) + 2
+    tall = np.minimum(high, taken[:, 3]) - np.maximum(low, taken[:, 1]) + 1
+    over = np.where((wide > 0) & (tall > 0), 20 + wide * tall, 0.0)
     (x0, y0), (x1, y1) = window
-    if left < x0 or right > x1 or low < y0 or high > y1:
-        cost += 40
-    return cost
+    outside = (left < x0) | (right > x1) | (low < y0) | (high > y1)
+    found: NDArray[np.float64] = 0.8 * inside.sum(axis=1) + over.sum(axis=1) + 40 * outside[:, 0]
+    return found

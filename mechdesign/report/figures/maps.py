@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.regions import Floats, Grid, Region, keys, loci, outline, sheet
+from mechdesign.report.figures.rendering import Gallery
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
@@ -34,14 +35,17 @@ MOST = 6
 CLEAR = (5.0, 18.0)
 
 
-def map_figures(study: Study, found: Sequence[Region]) -> dict[str, Figure]:
+def map_figures(study: Study, found: Sequence[Region]) -> Gallery:
     """One map an index of the table of local indices; of many regions a few, spread evenly.
 
     There is none of an index that is infinite everywhere.
     """
     shown = [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST)).astype(int))]
     names = [name for name in index_columns(found[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
-    return {name: _map(study, shown, name) for name in names}
+    maps = Gallery()
+    for name in names:
+        maps.add(name, _map, study, shown, name)
+    return maps
 
 
 def index_columns(region: Region) -> list[str]:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
-
 from mechdesign.report.figures.designs import designs_of
 from mechdesign.report.figures.fronts import front_figure
 from mechdesign.report.figures.optimum import optimum_figure
 from mechdesign.report.figures.parallel import convergence, parallel_axes
+from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scores import goal_maps, score_curves, score_surface
 from mechdesign.results import Result
 
@@ -20,22 +19,22 @@ if TYPE_CHECKING:
 FEWEST = 9
 
 
-def figures(study: Study, result: Result) -> dict[str, Figure]:
+def figures(study: Study, result: Result) -> Gallery:
     """``CPI`` (the score over the variables), ``indices``, ``designs``, ``pareto``, ``convergence`` and ``optimum``."""
     assert study.optimize is not None
     designs = designs_of(study, result)
-    found: dict[str, Figure] = {}
+    found = Gallery()
     if len(designs.names) == 2 and len(designs.table) >= FEWEST:
-        found["CPI"] = score_surface(designs)
+        found.add("CPI", score_surface, designs)
         if len(designs.goals) > 1:
-            found["indices"] = goal_maps(designs)
+            found.add("indices", goal_maps, designs)
     else:
-        found["CPI"] = score_curves(designs)
+        found.add("CPI", score_curves, designs)
     if len(designs.names) > 2:
-        found["designs"] = parallel_axes(designs)
+        found.add("designs", parallel_axes, designs)
     if "pareto" in result.tables:
-        found["pareto"] = front_figure(designs, result.tables["pareto"])
+        found.add("pareto", front_figure, designs, result.tables["pareto"])
     if study.optimize.method == "search":
-        found["convergence"] = convergence(designs)
-    found["optimum"] = optimum_figure(study, designs)
+        found.add("convergence", convergence, designs)
+    found.add("optimum", optimum_figure, study, designs)
     return found

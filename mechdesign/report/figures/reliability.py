@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.report.figures.densities import density_figures
@@ -16,50 +15,51 @@ from mechdesign.report.figures.errors.panels import along
 from mechdesign.report.figures.errors.simulations import convergence_figure, histogram_figure, trend_figure
 from mechdesign.report.figures.errors.sweeps import sweep_figures
 from mechdesign.report.figures.planes import plane
+from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 
-def figures(study: Study, result: Result) -> dict[str, Figure]:
+def figures(study: Study, result: Result) -> Gallery:
     """Whatever the result holds enough of to draw."""
     poses, tables = study.poses("reliability"), result.tables
     swept, over = along(study, poses), plane(study, poses, study.reliability)
-    found: dict[str, Figure] = {}
+    found = Gallery()
     if swept is not None:
-        found |= sweep_figures(study, tables["moments"], swept)
+        found.add("of errors along the motion", sweep_figures, study, tables["moments"], swept)
     if over is not None:
-        found |= map_figures(study, result, over)
+        found.add("of errors over the poses", map_figures, study, result, over)
     few = poses.listed or (over is None and poses.count <= MOST_LISTED)
     if "reliability" in tables and (few or swept is not None):
-        found["reliability"] = estimate_figure(study, tables["reliability"], poses, swept)
-    found |= _sampled(study, result, poses)
-    found["contributions"] = contributions_figure(study, tables["contributions"], poses)
+        found.add("reliability", estimate_figure, study, tables["reliability"], poses, swept)
+    found.add("of samples", _sampled, study, result, poses)
+    found.add("contributions", contributions_figure, study, tables["contributions"], poses)
     if "allocation" in tables:
-        found["allocation"] = allocation_figure(study, tables["allocation"])
+        found.add("allocation", allocation_figure, study, tables["allocation"])
     return found
 
 
-def _sampled(study: Study, result: Result, poses: Poses) -> dict[str, Figure]:
+def _sampled(study: Study, result: Result, poses: Poses) -> Gallery:
     """Pictures of the tables that only methods which draw samples give."""
     tables, moments = result.tables, result.tables["moments"]
-    found: dict[str, Figure] = {}
+    found = Gallery()
     # The tables are of the first method that samples errors; the moments hold its name.
     method = next((name for name in moments["method"].tolist() if LOOKS[name].simulated), None)
     if method is None:
         return found
     if "density" in tables:
         _, where = _pose(study, poses, tables["density"])
-        found |= density_figures(study, tables["density"], moments, where, LOOKS[method].words)
+        found.add("density", density_figures, study, tables["density"], moments, where, LOOKS[method].words)
     if "histogram" in tables:
         _, where = _pose(study, poses, tables["histogram"])
-        found["histogram"] = histogram_figure(study, tables["histogram"], where, method)
+        found.add("histogram", histogram_figure, study, tables["histogram"], where, method)
     if "convergence" in tables:
         pose, where = _pose(study, poses, tables["convergence"])
-        found["convergence"] = convergence_figure(tables["convergence"], moments, pose, where, method)
+        found.add("convergence", convergence_figure, tables["convergence"], moments, pose, where, method)
     if "estimate" in tables:
         pose, where = _pose(study, poses, tables["estimate"])
-        found["estimate"] = trend_figure(tables["estimate"], tables["reliability"], pose, where)
+        found.add("estimate", trend_figure, tables["estimate"], tables["reliability"], pose, where)
     return found
 
 

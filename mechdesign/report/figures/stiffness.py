@@ -15,6 +15,7 @@ from mechdesign.report.figures.drawing import draw_mechanism, link_colors
 from mechdesign.report.figures.framing import equal_canvas
 from mechdesign.report.figures.labels import place_labels
 from mechdesign.report.figures.planes import Plane, map_sheet, plane
+from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, pose
 from mechdesign.report.figures.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
 from mechdesign.results import Result
@@ -24,26 +25,20 @@ MOST_DIRECTIONS = 4
 _COIL = 0.17  # length of a coil over the size of the mechanism
 
 
-def figures(study: Study, result: Result) -> dict[str, Figure]:
+def figures(study: Study, result: Result) -> Gallery:
     """``springs`` (first pose), ``directions`` (a few poses), and over many poses ``stiffness``, curves or a map."""
-    found: dict[str, Figure] = {}
-    springs = _springs(study)
-    if springs is not None:
-        found["springs"] = springs
-    for name, figure in (("deflections", deflections(study)), ("free", free_motion(study, result))):
-        if figure is not None:
-            found[name] = figure
-    directions = _directions(study, result)
-    if directions is not None:
-        found["directions"] = directions
+    found = Gallery()
+    found.add("springs", _springs, study)
+    found.add("deflections", deflections, study)
+    found.add("free", free_motion, study, result)
+    found.add("directions", _directions, study, result)
     poses = study.poses("stiffness")
     if not poses.listed and poses.count > 2:
         over = plane(study, poses, study.stiffness)
         if over is not None:
-            found["stiffness"] = _map(study, result, over)
-        curves = _curves(study, result) if len(poses.grid) == 1 else None
-        if curves is not None:
-            found["stiffness"] = curves
+            found.add("stiffness", _map, study, result, over)
+        if len(poses.grid) == 1:
+            found.add("stiffness", _curves, study, result)
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from mechdesign.report.figures.maps import map_figures
 from mechdesign.report.figures.point_paths import path_figures
 from mechdesign.report.figures.ranges import range_figures
 from mechdesign.report.figures.regions import ROOM, Region, curves, fill, keys, loci, outline, regions, sheet
+from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result, Table
 
 if TYPE_CHECKING:
@@ -27,7 +29,7 @@ SIDES = {"inner": style.BLUE, "outer": style.VERMILION}
 DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
 
 
-def figures(study: Study, result: Result) -> dict[str, Figure]:
+def figures(study: Study, result: Result) -> Mapping[str, Figure]:
     """A map of each local index, the boundary with poses, the largest shapes inside, the drives along the boundary.
 
     Where several values of held coordinates are asked for, maps show them side by side and the others the first. Of a
@@ -40,12 +42,12 @@ def figures(study: Study, result: Result) -> dict[str, Figure]:
     found = regions(study, result)
     if not found:
         return {}
-    drawn = {**map_figures(study, found), "workspace": workspace_figure(study, found[0])}
-    shapes = inscribed_figure(study, result, found)
-    if shapes is not None:
-        drawn["inscribed"] = shapes
+    drawn = Gallery()
+    drawn.add("of indices", map_figures, study, found)
+    drawn.add("workspace", workspace_figure, study, found[0])
+    drawn.add("inscribed", inscribed_figure, study, result, found)
     if len(found[0].boundary):
-        drawn["drives"] = _drives(study, found[0].boundary)
+        drawn.add("drives", _drives, study, found[0].boundary)
     return drawn
 
 

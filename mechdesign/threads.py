@@ -1,0 +1,53 @@
+"""Linear algebra on one thread: the last digits of a long sum depend on how many threads share it."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+# Read by a library of linear algebra when it is loaded: SciPy's may be so in the middle of a computation.
+_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+_lock = threading.Lock()
+_inside = 0
+_outside = ExitStack()
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Results of what is computed inside do not depend on how many threads linear algebra may use.
+
+    The limit is that of the process, and of those forked from it. What was set before comes back with the last of
+    those inside, so that they may be nested, and overlap where several threads compute.
+    """
+    global _inside
+    with _lock:
+        if not _inside:
+            _limit()
+        _inside += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _inside -= 1
+            if not _inside:
+                _outside.close()
+
+
+def _limit() -> None:
+    # Here, for a command's help needs neither.
+    from threadpoolctl import threadpool_limits
+
+    _outside.callback(_restore, {name: os.environ.get(name) for name in _VARIABLES})
+    os.environ.update(dict.fromkeys(_VARIABLES, "1"))
+    _outside.enter_context(threadpool_limits(1, user_api="blas"))
+
+
+def _restore(values: dict[str, str | None]) -> None:
+    for name, value in values.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value

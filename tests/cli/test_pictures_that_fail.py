@@ -1,0 +1,85 @@
+"""A picture that cannot be drawn costs neither tables nor other pictures, and is told by its name."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+import os
+
+import pytest
+
+STUDY = "slider.yaml"
+TABLES = {"motion.csv", "extremes.csv"}
+PICTURES = {"motion.png", "paths.png", "mechanism.png", "motion.gif"}
+
+
+def failing(*arguments, **options):
+    raise RuntimeError("no   such\nfont")
+
+
+@pytest.mark.parametrize(
+    ("module", "function", "lost", "name"),
+    [
+        ("figures.kinematics", "curves_figure", "motion.png", "motion"),
+        ("figures.kinematics", "paths_figure", "paths.png", "paths"),
+        ("figures.mechanism", "mechanism_figure", "mechanism.png", "mechanism.png"),
+        ("figures.animation", "animation", "motion.gif", "motion.gif"),
+        ("figures.kinematics", "figures", "motion.png paths.png", "of kinematics"),
+    ],
+)
+def test_one_picture_fails(folder, invoke, monkeypatch, module, function, lost, name):
+    monkeypatch.setattr(importlib.import_module(f"mechdesign.report.{module}"), function, failing)
+    done = invoke("kinematics", STUDY, "--animate")
+    assert done.exit_code == 0, done.output
+    (told,) = [line for line in done.stderr.splitlines() if "could not be drawn" in line]
+    assert told.startswith(f"warning: picture {name} could not be drawn: internal error: RuntimeError: no such font")
+    assert "no animation" not in done.stderr
+    out = folder / "results/slider/kinematics"
+    files = {path.name for path in out.iterdir()} - {"manifest.json"}
+    assert files >= TABLES
+    assert files & PICTURES == PICTURES - set(lost.split())
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert manifest["warnings"] == [told.removeprefix("warning: ")]
+    assert manifest["files"] == {each: hashlib.sha256((out / each).read_bytes()).hexdigest() for each in files}
+
+
+def test_every_picture_fails(folder, invoke, monkeypatch):
+    from mechdesign.report.figures import style
+
+    invoke("kinematics", STUDY)
+    monkeypatch.setattr(style, "to_png", failing)
+    done = invoke("kinematics", STUDY)
+    assert done.exit_code == 0
+    for name in ("motion.png", "paths.png", "mechanism.png"):
+        assert f"picture {name} could not be drawn" in done.stderr
+    # Those of the older result are not left beside the new tables.
+    assert not {path.name for path in (folder / "results/slider/kinematics").iterdir()} & PICTURES
+
+
+def test_check_tells_a_drawing_that_fails(folder, invoke, monkeypatch):
+    from mechdesign.report.figures import mechanism
+
+    monkeypatch.setattr(mechanism, "sketch_figure", failing)
+    done = invoke("check", STUDY)
+    assert done.exit_code == 0
+    assert "warning: picture mechanism.png could not be drawn: internal error: RuntimeError" in done.stderr
+
+
+def test_tables_stand_when_the_process_ends_among_the_pictures(folder, invoke, monkeypatch):
+    from mechdesign.report.figures import kinematics
+
+    def interrupt(*arguments):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(kinematics, "curves_figure", interrupt)
+        assert invoke("run", STUDY).exit_code == 130
+    out = folder / "results/slider/kinematics"
+    assert {path.name for path in out.iterdir()} >= TABLES
+    before = os.stat(out / "motion.csv").st_ino
+    # They are whole for who wants tables alone, and computed again for who wants pictures too.
+    assert "not computed again" in invoke("run", STUDY, "--resume", "--no-plots").stderr
+    assert "not computed again" not in invoke("run", STUDY, "--resume").stderr
+    assert os.stat(out / "motion.csv").st_ino != before
+    assert (out / "motion.png").exists()

@@ -1,0 +1,68 @@
+"""The same bytes however many threads linear algebra may use."""
+
+import contextlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg  # noqa: F401 - its library of linear algebra is another than NumPy's
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import mechdesign
+from mechdesign.report.tables import to_csv
+from mechdesign.threads import one_thread
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+def texts(command, study, **options):
+    result = getattr(mechdesign, command)(mechdesign.load(study), **options)
+    return {name: to_csv(table) for name, table in result.tables.items()} | dict(result.files)
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "jobs"), [("workspace", "two_rpr", 1), ("optimize", "gallery/path_synthesis", 2)]
+)
+def test_tables_do_not_depend_on_threads(command, name, jobs):
+    study = CONFIGS / f"{name}.yaml"
+    found = []
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            found.append(texts(command, study, jobs=jobs))
+    assert found[0] == found[1]
+
+
+def test_files_do_not_depend_on_threads(tmp_path):
+    study = CONFIGS / "two_rpr.yaml"
+    code = "from mechdesign.cli.app import main; main()"
+    for threads in ("1", "2"):
+        arguments = ["workspace", str(study), "--quiet", "--out", str(tmp_path / threads)]
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": threads}
+        subprocess.run([sys.executable, "-c", code, *arguments], env=environment, check=True, capture_output=True)
+    ours, theirs = ({file.name: file.read_bytes() for file in (tmp_path / n).iterdir()} for n in ("1", "2"))
+    assert ours == theirs
+    assert any(name.endswith(".png") for name in ours)
+
+
+def numbers():
+    return {each["filepath"]: each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+
+def test_what_was_set_before_comes_back(monkeypatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    np.zeros(1)
+    with threadpool_limits(2, user_api="blas"):
+        before = numbers()
+        assert set(before.values()) == {2}
+        with one_thread():
+            with contextlib.suppress(ZeroDivisionError), one_thread():
+                raise ZeroDivisionError
+            assert set(numbers().values()) == {1}
+            assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+        assert numbers() == before
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "7"
+    assert "MKL_NUM_THREADS" not in os.environ
