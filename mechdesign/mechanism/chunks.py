@@ -73,7 +73,7 @@ def solve(
 
     for _ in map_chunks(fill, range(length, count, length), jobs):
         pass
-    return whole.configuration(plan, dims, shape)
+    return whole.configuration(plan, values, dims, shape)
 
 
 class _Whole:
@@ -93,7 +93,9 @@ class _Whole:
                 if np.ndim(array):
                     array[some] = value
 
-    def configuration(self, plan: Plan, dims: Mapping[str, Value], shape: tuple[int, ...]) -> Configuration:
+    def configuration(
+        self, plan: Plan, given: Sequence[Value], dims: Mapping[str, Value], shape: tuple[int, ...]
+    ) -> Configuration:
         reason = self.reason.reshape(shape)
         nodes, rotations, slides, closures = (
             [v.reshape(shape) if np.ndim(v) else v for v in kind] for kind in self.parts
@@ -106,7 +108,10 @@ class _Whole:
             )
         vectors = plan.mechanism.geometry.vectors(dims)
         graph = plan.mechanism.graph
-        return Configuration(graph, vectors, shape, nodes, rotations, slides, closures, reason, dict(dims))
+        return Configuration(
+            graph, vectors, shape, nodes, rotations, slides, closures, reason, dict(dims), plan.turns(given, dims),
+            plan.counted,
+        )  # fmt: skip
 
 
 def _arrays(configuration: Configuration) -> tuple[Sequence[Value], ...]:

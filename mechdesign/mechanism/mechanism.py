@@ -26,6 +26,7 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import Equations
 from mechdesign.mechanism.sketch import Sketch, assembly_modes, drawn_value, locate, roots_as_drawn
 from mechdesign.mechanism.structure import Undetermined, compile_structure
+from mechdesign.mechanism.turns import angles_of
 
 # Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).
 TIE_ROUNDING = 1e-9
@@ -161,12 +162,38 @@ class Mechanism:
             )
         else:
             coordinate = self.coordinate(limit.items[0])
-        return Bound(coordinate, limit.minimum, limit.maximum, limit.label or f"limits.{index}")
+        label = limit.label or f"limits.{index}"
+        return Bound(coordinate, limit.minimum, limit.maximum, label, limit.kind == "drive")
 
     def margins(self, configuration: Configuration) -> list[tuple[str, Value]]:
         """Named margins of all limits: positive inside (see `mechdesign.mechanism.limits`)."""
         places = {**self.nominal, **configuration.places}
         return [margin for bound in self.bounds for margin in bound.margins(configuration, places)]
+
+    def turns(self, places: Mapping[str, Value], *, drawn: bool = False) -> dict[str, Value]:
+        """Values that angles lie within half a turn of (see `mechdesign.mechanism.turns`): drives within their limits.
+
+        Parameters
+        ----------
+        drawn : bool
+            Whether the other angles of drives and expressions are told near those of the sketch.
+        """
+        near: dict[str, Value] = dict(self._drawn_angles) if drawn else {}
+        sizes = {**self.nominal, **places}
+        for bound in self.bounds:
+            near |= bound.turn(sizes)
+        return near
+
+    @cached_property
+    def counting(self) -> tuple[Coordinate, ...]:
+        """Coordinates of the limits that depend on the turns of angles."""
+        return tuple(bound.coordinate for bound in self.bounds if bound.counts(self.nominal))
+
+    @cached_property
+    def _drawn_angles(self) -> dict[str, float]:
+        named = [self.coordinate(name) for name in (*self.drives, *self.description.measures)]
+        found = angles_of([*named, *(bound.coordinate for bound in self.bounds)])
+        return {key: float(self.sketch_configuration.value(angle)) for key, angle in found.items()}
 
     def linearize(self, configuration: Configuration) -> Linearization:
         """Loop equations of the drives' groups at a configuration, for derivatives of any kind."""

@@ -146,7 +146,17 @@ class Plan:
             # What the path came near to must be a pose, and of the same assembly.
             for converged, determinant, sign in zip(state.converged, state.determinants, begin.signs, strict=True):
                 reached = reached & converged & (np.sign(determinant) == sign)
-        return self.configuration(state, shape, dims, vectors, reached, limits)
+        return self.configuration(state, shape, dims, vectors, reached, limits, values)
+
+    def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
+        """What angles are told near where no motion says more: those given as given, drives within their limits."""
+        near = self.mechanism.turns(dims)
+        return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+
+    @cached_property
+    def counted(self) -> frozenset[str]:
+        """Angles whose turns are given."""
+        return frozenset(c.name for c in self.structure.given if c.kind == "angle")
 
     def _follow(
         self,
@@ -211,7 +221,9 @@ class Plan:
         vectors: Vectors,
         reached: NDArray[np.bool_] | None,
         limits: bool,
+        given: Sequence[Value] | None = None,
     ) -> Configuration:
+        """A state with the reason of each pose; angles that are given keep their turns where `given` has the values."""
         graph = self.mechanism.graph
         with np.errstate(invalid="ignore"):
             open_: Value = np.zeros((), dtype=bool)
@@ -244,17 +256,22 @@ class Plan:
             rotations = [hide(u, lost) for u in rotations]
             slides = [hide(s, lost) for s in slides]
         configuration = Configuration(
-            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims)
-        )
-        if limits and self.mechanism.bounds:
-            with np.errstate(invalid="ignore"):
-                values = {**self.mechanism.nominal, **dims}
-                for bound in self.mechanism.bounds:
-                    slack = LIMIT_ROUNDING * bound.scale(self.mechanism.size)
-                    for _, margin in bound.margins(configuration, values):
-                        outside = np.broadcast_to(margin, shape) < -slack
-                        reason[outside & (reason == Reason.OK)] = Reason.LIMIT
+            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims),
+            self.turns(given or (), dims), frozenset() if given is None else self.counted,
+        )  # fmt: skip
+        if limits:
+            self.judge(configuration)
         return configuration
+
+    def judge(self, configuration: Configuration) -> None:
+        """Note in the reasons of solved poses where they are outside the study's limits."""
+        reason, places = configuration.reason, {**self.mechanism.nominal, **configuration.places}
+        with np.errstate(invalid="ignore"):
+            for bound in self.mechanism.bounds:
+                slack = LIMIT_ROUNDING * bound.scale(self.mechanism.size)
+                for _, margin in bound.margins(configuration, places):
+                    outside = np.broadcast_to(margin, configuration.shape) < -slack
+                    reason[outside & (reason == Reason.OK)] = Reason.LIMIT
 
     def _given_value(self, state: State, coordinate: Coordinate) -> Value:
         if coordinate.kind in ("x", "y"):
