@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.continuity import CHUNK, continuous
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.turns import TURN, angles_of
 from mechdesign.mechanism.variant import drawn
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
-# Poses solved at once: their arrays stay within some megabytes, however long the sweep.
-CHUNK = 65536
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +54,13 @@ def in_study_units(study: Study, coordinate: Coordinate, value: Value) -> Value:
     return value / study.units.angle_factor if coordinate.quantity == "angle" else value
 
 
-def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
+def solve_poses(study: Study, poses: Poses, wanted: Sequence[Coordinate] = ()) -> Iterator[SolvedPoses]:
     """Solve each group of poses with the plan of its coordinates, at most `CHUNK` poses at a time.
+
+    What a pose gives keeps its turns. Drives that are found lie within their limits. Where the poses are those of a
+    motion or a grid, the other angles of the wanted coordinates and of the study's limits, in expressions too, are
+    followed along it from a first value in (-180, 180] deg, a drive's from the sketch's; of listed poses each is in
+    (-180, 180] deg.
 
     Raises
     ------
@@ -62,13 +70,31 @@ def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
     mechanism: Mechanism = study.mechanism
     for group in poses.groups:
         plan = mechanism.plan(group.names)
-        whole = [radians(study, c, v) for c, v in zip(plan.structure.given, group.columns(), strict=True)]
-        for begin in range(0, len(group.rows), CHUNK):
-            given = [values[begin : begin + CHUNK] for values in whole]
-            rows = group.rows[begin : begin + CHUNK]
-            start = starts(mechanism, poses, rows) if plan.iterative else None
-            configuration = plan.solve(given, dimensions(poses, rows), start=start)
-            known: dict[str, Value] = dict(zip(group.names, given, strict=True))
+        given = [
+            np.asarray(radians(study, c, v), dtype=float)
+            for c, v in zip(plan.structure.given, group.columns(), strict=True)
+        ]
+        pieces = [slice(begin, begin + CHUNK) for begin in range(0, len(group.rows), CHUNK)]
+        solved = None
+        near: dict[str, Array] = {}
+        angles = [] if poses.listed else _followed(mechanism, plan, wanted)
+        if angles:
+            values = np.empty((len(angles), len(group.rows)))
+            for piece in pieces:
+                solved = _solve(mechanism, plan, poses, [v[piece] for v in given], group.rows[piece])
+                for row, angle in zip(values, angles, strict=True):
+                    row[piece] = solved.value(angle)
+            values = continuous(poses, plan, given, angles, values, partial(_solve, mechanism, plan, poses))
+            near = {angle.name: row for angle, row in zip(angles, values, strict=True)}
+            near |= {name: _begun(study, poses, name, near[name]) for name in mechanism.drives if name in near}
+        for piece in pieces:
+            rows = group.rows[piece]
+            if solved is None or len(pieces) > 1:
+                solved = _solve(mechanism, plan, poses, [v[piece] for v in given], rows)
+            told = {**solved.near, **{name: values[piece] for name, values in near.items()}}
+            configuration = replace(solved, near=told, counted=solved.counted | near.keys())
+            plan.judge(configuration)
+            known: dict[str, Value] = {name: values[piece] for name, values in zip(group.names, given, strict=True)}
             drives = tuple(
                 np.broadcast_to(
                     known[name] if name in known else configuration.value(mechanism.coordinate(name)),
@@ -77,6 +103,43 @@ def solve_poses(study: Study, poses: Poses) -> Iterator[SolvedPoses]:
                 for name in mechanism.drives
             )
             yield SolvedPoses(rows, group.names, configuration, drives)
+
+
+def _solve(
+    mechanism: Mechanism, plan: Plan, poses: Poses, given: Sequence[Array], rows: NDArray[np.intp]
+) -> Configuration:
+    """Poses at or near some rows, not yet judged by the limits."""
+    start = starts(mechanism, poses, rows) if plan.iterative else None
+    return plan.solve(given, dimensions(poses, rows), start=start, limits=False)
+
+
+def _followed(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) -> list[Coordinate]:
+    """Angles whose turns only the motion tells: not those given, nor drives whose limits leave them one turn."""
+    settled = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
+    settled -= {coordinate.name for coordinate in mechanism.counting}
+    found = angles_of([*wanted, *mechanism.counting])
+    return [angle for name, angle in found.items() if name not in plan.counted | settled]
+
+
+def _begun(study: Study, poses: Poses, drive: str, values: Array) -> Array:
+    """A drive's values in each design in the turn that leaves it within its limits, else near the sketch's value."""
+    mechanism = study.mechanism
+    drawn = float(mechanism.sketch_configuration.value(mechanism.coordinate(drive)))
+    found = values.reshape(poses.designs, -1).copy()
+    for design, row in enumerate(found):
+        known = row[np.isfinite(row)]
+        if not len(known):
+            continue
+        turns = np.round((drawn - known[0]) / TURN)
+        sizes = mechanism.nominal | {name: v[design * len(row)] for name, v in poses.places.items()}
+        for low, high in (bound.ends(sizes) for bound in mechanism.bounds if bound.drive and bound.of_angle
+                          and bound.coordinate.name == drive):  # fmt: skip
+            # All of the motion if it fits, or else its begin.
+            for some in (known[:1], known):
+                fewest, most = np.ceil((low - some.min()) / TURN), np.floor((high - some.max()) / TURN)
+                turns = np.clip(turns, fewest, most) if fewest <= most else turns
+        row += TURN * turns
+    return found.ravel()
 
 
 def dimensions(poses: Poses, rows: NDArray[np.intp]) -> dict[str, Value]:

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
-from mechdesign.mechanism.geometry import Geometry, Vectors
-from mechdesign.mechanism.graph import Graph
 from mechdesign.memory import keep_freed_memory
 from mechdesign.parallel import map_chunks, worker_count
 
@@ -24,6 +22,9 @@ MANY = 131072
 def too_large(shape: tuple[int, ...]) -> bool:
     """Whether a batch is worth dividing."""
     return int(np.prod(shape, dtype=np.int64)) > CHUNK
+
+
+Parts = tuple[Sequence[Value], Sequence[Value], Sequence[Value], Sequence[Value], NDArray[np.int8]]
 
 
 class AtOnce(Protocol):
@@ -40,7 +41,6 @@ class AtOnce(Protocol):
 
 def solve(
     at_once: AtOnce,
-    geometry: Geometry,
     values: Sequence[Value],
     dims: Mapping[str, Value],
     shape: tuple[int, ...],
@@ -48,8 +48,11 @@ def solve(
     jobs: int | None,
     *,
     small: bool,
-) -> Configuration:
-    """A large batch chunk by chunk; the same result, whatever `jobs`. `small` chunks suit iterations."""
+) -> Parts:
+    """Nodes, rotations, slides, closures, reasons of a large batch, solved by chunks; the same, whatever `jobs`.
+
+    `small` chunks suit iterations.
+    """
     keep_freed_memory()
     count = int(np.prod(shape, dtype=np.int64))
 
@@ -85,7 +88,7 @@ def solve(
 
     for _ in map_chunks(fill, range(length, count, length), jobs):
         pass
-    return whole.configuration(first.graph, geometry.vectors(dims), dims, shape)
+    return whole.reshaped(shape)
 
 
 class _Whole:
@@ -105,9 +108,7 @@ class _Whole:
                 if np.ndim(array):
                     array[some] = value
 
-    def configuration(
-        self, graph: Graph, vectors: Vectors, dims: Mapping[str, Value], shape: tuple[int, ...]
-    ) -> Configuration:
+    def reshaped(self, shape: tuple[int, ...]) -> Parts:
         reason = self.reason.reshape(shape)
         nodes, rotations, slides, closures = (
             [v.reshape(shape) if np.ndim(v) else v for v in kind] for kind in self.parts
@@ -118,7 +119,7 @@ class _Whole:
             nodes, rotations, slides = (
                 [v if np.ndim(v) else hide(v, lost) for v in kind] for kind in (nodes, rotations, slides)
             )
-        return Configuration(graph, vectors, shape, nodes, rotations, slides, closures, reason, dict(dims))
+        return nodes, rotations, slides, closures, reason
 
 
 def _arrays(configuration: Configuration) -> tuple[Sequence[Value], ...]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -13,6 +13,7 @@ from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.turns import angles_of, nearest
 
 
 class Reason(IntEnum):
@@ -46,6 +47,10 @@ class Configuration:
         Positive inside the range in which each group closes, zero at its limits.
     reason : int8 array of `shape`
         See `Reason`.
+    near : mapping of str to arrays
+        Values that angles are told within half a turn of, by name; the others are told in (-pi, pi].
+    counted : frozenset of str
+        Those of them whose turns count: given, or followed along a motion.
     """
 
     graph: Graph
@@ -57,6 +62,8 @@ class Configuration:
     closures: Sequence[Value]
     reason: NDArray[np.int8]
     places: Mapping[str, Value]
+    near: Mapping[str, Value] = field(default_factory=dict)
+    counted: frozenset[str] = frozenset()
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -80,7 +87,7 @@ class Configuration:
 
     @quiet
     def value(self, coordinate: Coordinate) -> Value:
-        """Value of a coordinate (angles in radians, in (-pi, pi])."""
+        """Value of a coordinate (angles in radians, within half a turn of what they are `near`)."""
         if coordinate.kind == "x":
             return self.nodes[coordinate.node].real
         if coordinate.kind == "y":
@@ -91,7 +98,9 @@ class Configuration:
             return np.sqrt(norm2(self.nodes[coordinate.other] - self.nodes[coordinate.node]))
         if coordinate.kind == "angle":
             turn = self.body_rotation(coordinate.body)
-            return angle_of(turn * np.conj(self.body_rotation(coordinate.reference)))
+            angle = angle_of(turn * np.conj(self.body_rotation(coordinate.reference)))
+            near = self.near.get(coordinate.name)
+            return angle if near is None else nearest(angle, near)
         assert coordinate.expression is not None
         return coordinate.expression.evaluate(self.user_values(coordinate))
 
@@ -103,6 +112,14 @@ class Configuration:
             part.name: self.value(part) / unit if part.quantity == "angle" else self.value(part)
             for part in coordinate.parts
         }
+
+    def beside(self, other: Configuration, coordinates: Iterable[Coordinate]) -> Configuration:
+        """The same poses, the angles of some coordinates on the branch of another configuration.
+
+        Where a turn is given it stays.
+        """
+        near = {k: other.value(angle) for k, angle in angles_of(coordinates).items() if k not in self.counted}
+        return replace(self, near={**self.near, **near})
 
     def take(self, index: NDArray[np.intp] | int | tuple[int, ...] | tuple[NDArray[np.intp], ...]) -> Configuration:
         """Poses of a flat batch by index (shape (n,) or scalar)."""
@@ -119,7 +136,8 @@ class Configuration:
         return Configuration(
             self.graph, vectors, np.shape(reason), [pick(x) for x in self.nodes], [pick(u) for u in self.rotations],
             [pick(s) for s in self.slides], [pick(c) for c in self.closures], np.asarray(reason),
-            {name: pick(v) for name, v in self.places.items()},
+            {name: pick(v) for name, v in self.places.items()}, {key: pick(v) for key, v in self.near.items()},
+            self.counted,
         )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 
 from mechdesign.mechanism import coordinates as names
@@ -14,6 +15,7 @@ from mechdesign.mechanism.limits import Bound
 from mechdesign.mechanism.model import Description, Limit
 from mechdesign.mechanism.rigidity import Equations
 from mechdesign.mechanism.sketch import Sketch, locate
+from mechdesign.mechanism.turns import angles_of
 
 
 class Core:
@@ -56,6 +58,31 @@ class Core:
         places = {**self.nominal, **configuration.places}
         return [margin for bound in self.bounds for margin in bound.margins(configuration, places)]
 
+    def turns(self, places: Mapping[str, Value], *, drawn: bool = False) -> dict[str, Value]:
+        """Values that angles lie within half a turn of (see `mechdesign.mechanism.turns`): drives within their limits.
+
+        Parameters
+        ----------
+        drawn : bool
+            Whether the other angles of drives and expressions are told near those of the sketch.
+        """
+        near: dict[str, Value] = dict(self._drawn_angles) if drawn else {}
+        sizes = {**self.nominal, **places}
+        for bound in self.bounds:
+            near |= bound.turn(sizes)
+        return near
+
+    @cached_property
+    def counting(self) -> tuple[Coordinate, ...]:
+        """Coordinates of the limits that depend on the turns of angles."""
+        return tuple(bound.coordinate for bound in self.bounds if bound.counts(self.nominal))
+
+    @cached_property
+    def _drawn_angles(self) -> dict[str, float]:
+        named = [self.coordinate(name) for name in (*self.description.drives, *self.description.measures)]
+        found = angles_of([*named, *(bound.coordinate for bound in self.bounds)])
+        return {key: float(self.sketch_configuration.value(angle)) for key, angle in found.items()}
+
     def _bound(self, limit: Limit, index: int) -> Bound:
         if limit.kind == "distance":
             a, b = (self.graph.node(point) for point in limit.items)
@@ -66,4 +93,5 @@ class Core:
             )
         else:
             coordinate = self.coordinate(limit.items[0])
-        return Bound(coordinate, limit.minimum, limit.maximum, limit.label or f"limits.{index}")
+        label = limit.label or f"limits.{index}"
+        return Bound(coordinate, limit.minimum, limit.maximum, label, limit.kind == "drive")

@@ -128,8 +128,11 @@ class Plan:
         if chunks.too_large(shape):
             if self.change_points is not None:
                 self.change_points.cover(values[0])
-            solve = partial(self.solve_at_once, limits=limits)
-            return chunks.solve(solve, self.core.geometry, values, dims, shape, start, jobs, small=self.iterative)
+            parts = chunks.solve(
+                partial(self.solve_at_once, limits=limits), values, dims, shape, start, jobs, small=self.iterative
+            )
+            vectors, near = self.core.geometry.vectors(dims), self.turns(values, dims)
+            return Configuration(self.core.graph, vectors, shape, *parts, dict(dims), near, self.counted)
         return self.solve_at_once(values, dims, shape, start, limits)
 
     def solve_at_once(
@@ -152,7 +155,17 @@ class Plan:
             # What the path came near to must be a pose, and of the same assembly.
             for converged, determinant, sign in zip(state.converged, state.determinants, begin.signs, strict=True):
                 reached = reached & converged & (np.sign(determinant) == sign)
-        return self.configuration(state, shape, dims, vectors, reached, limits)
+        return self.configuration(state, shape, dims, vectors, reached, limits, values)
+
+    def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
+        """What angles are told near where no motion says more: those given as given, drives within their limits."""
+        near = self.core.turns(dims)
+        return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+
+    @cached_property
+    def counted(self) -> frozenset[str]:
+        """Angles whose turns are given."""
+        return frozenset(c.name for c in self.structure.given if c.kind == "angle")
 
     def _follow(
         self,
@@ -217,7 +230,9 @@ class Plan:
         vectors: Vectors,
         reached: NDArray[np.bool_] | None,
         limits: bool,
+        given: Sequence[Value] | None = None,
     ) -> Configuration:
+        """A state with the reason of each pose; angles that are given keep their turns where `given` has the values."""
         graph = self.core.graph
         with np.errstate(invalid="ignore"):
             open_: Value = np.zeros((), dtype=bool)
@@ -250,17 +265,22 @@ class Plan:
             rotations = [hide(u, lost) for u in rotations]
             slides = [hide(s, lost) for s in slides]
         configuration = Configuration(
-            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims)
-        )
-        if limits and self.core.bounds:
-            with np.errstate(invalid="ignore"):
-                values = {**self.core.nominal, **dims}
-                for bound in self.core.bounds:
-                    slack = LIMIT_ROUNDING * bound.scale(self.core.size)
-                    for _, margin in bound.margins(configuration, values):
-                        outside = np.broadcast_to(margin, shape) < -slack
-                        reason[outside & (reason == Reason.OK)] = Reason.LIMIT
+            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims),
+            self.turns(given or (), dims), frozenset() if given is None else self.counted,
+        )  # fmt: skip
+        if limits:
+            self.judge(configuration)
         return configuration
+
+    def judge(self, configuration: Configuration) -> None:
+        """Note in the reasons of solved poses where they are outside the study's limits."""
+        reason, places = configuration.reason, {**self.core.nominal, **configuration.places}
+        with np.errstate(invalid="ignore"):
+            for bound in self.core.bounds:
+                slack = LIMIT_ROUNDING * bound.scale(self.core.size)
+                for _, margin in bound.margins(configuration, places):
+                    outside = np.broadcast_to(margin, configuration.shape) < -slack
+                    reason[outside & (reason == Reason.OK)] = Reason.LIMIT
 
     def _given_value(self, state: State, coordinate: Coordinate) -> Value:
         if coordinate.kind in ("x", "y"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.golden import lowest
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.turns import angles_of
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -85,6 +86,8 @@ def extremes(
     if swept is not None:
         some = np.array([asked is None or name in asked for name in names])
         design, which = np.nonzero(moving & some)
+        needed = [mechanism.coordinate(name) for name in targets.needed(study, poses)] if errors else []
+        near = {name: radians(study, c, arrays[name]) for name, c in angles_of([*outputs, *needed]).items()}
         for k, sign in enumerate((1, -1)):
             for of_errors in (False, True):
                 mine = (which >= len(outputs)) == of_errors
@@ -92,7 +95,7 @@ def extremes(
                 if not mine.any():
                     continue
                 # Targets may be known within the sweep only.
-                sweep = _Sweep(study, poses, swept, index[k][lanes], full_turn[lanes[0]] & (not of_errors))
+                sweep = _Sweep(study, poses, swept, index[k][lanes], full_turn[lanes[0]] & (not of_errors), near)
                 sampled = found[k][lanes]
                 if of_errors:
                     found[k][lanes] = _refined_errors(sweep, errors, lanes[1] - len(outputs), arrays, sign, sampled)
@@ -131,6 +134,8 @@ class _Sweep:
         The pose.
     full_turn : ndarray of bool, shape (lanes,)
         Whether the ends of the sweep are one pose.
+    near : mapping of str to ndarray, shape (poses,)
+        Angles of the motion (radians): those beside a pose are on its branch.
     """
 
     study: Study
@@ -138,6 +143,7 @@ class _Sweep:
     swept: str
     index: NDArray[np.intp]
     full_turn: NDArray[np.bool_]
+    near: Mapping[str, Array]
 
     @cached_property
     def plan(self) -> Plan:
@@ -168,7 +174,9 @@ class _Sweep:
         """Some lanes with the swept coordinate elsewhere, in the study's units."""
         given = [values[lane] for values in self.given]
         given[self.swept_at] = place
-        return self._solve(given, self.index[lane], self.start.take(lane))
+        found = self._solve(given, self.index[lane], self.start.take(lane))
+        near = {name: values[self.index[lane]] for name, values in self.near.items() if name not in found.counted}
+        return replace(found, near={**found.near, **near})
 
     def beside(self) -> tuple[Array, Array]:
         """The swept coordinate at the poses before and after, in rising order; at an end, the pose itself."""
@@ -227,12 +235,9 @@ def _refined(sweep: _Sweep, outputs: Sequence[Coordinate], which: NDArray[np.int
     begin, end = ends.min(), ends.max()
     around = np.where(place < begin, place + 2 * np.pi, np.where(place > end, place - 2 * np.pi, place))
     place = np.where(sweep.full_turn, around, place)
-    turn = 2 * np.pi / study.units.angle_factor
     place = np.asarray(in_study_units(study, drive, place))
     angular = np.array([output.quantity == "angle" for output in outputs])[which]
     value = np.where(angular, value / study.units.angle_factor, value)
-    # Continuous with the poses beside it.
-    value = np.where(angular, value + turn * np.round((sampled[:, 0] - value) / turn), value)
     return np.where(turns[:, None], np.stack([value, place], axis=1), sampled)
 
 
@@ -259,9 +264,6 @@ def _refined_errors(
             value = held.get(c.name)
             if value is None:
                 value = np.broadcast_to(np.asarray(in_study_units(study, c, solved.value(c))), place.shape)
-                if c.quantity == "angle":
-                    # Continuous with the pose itself.
-                    value = value + turn * np.round((arrays[c.name][sweep.index] - value) / turn)
             values[c.name] = value
         own = np.full(place.shape, np.nan)
         for found in targets.errors(study, poses, values, sweep.index, between=True):

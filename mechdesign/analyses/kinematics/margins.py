@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,9 +51,15 @@ class Margins:
     ----------
     swept : str
         The one coordinate of the group of poses that moves; the others are held at their first value.
+    near : mapping of str to ndarray, shape (poses,)
+        Angles at the poses (radians), without jumps: elsewhere they are told on this branch.
+    counted : bool
+        Whether limits count the turns of angles that are swept or followed.
     """
 
-    def __init__(self, study: Study, poses: PoseGroup, swept: str) -> None:
+    def __init__(
+        self, study: Study, poses: PoseGroup, swept: str, near: Mapping[str, Floats], *, counted: bool = True
+    ) -> None:
         self.mechanism: Mechanism = study.mechanism
         self.plan = self.mechanism.plan(poses.names)
         self.which = poses.names.index(swept)
@@ -63,6 +70,8 @@ class Margins:
         ]
         self.at: Floats = columns[self.which]
         self.held = [float(column[0]) for column in columns]
+        self.near = {name: values for name, values in near.items() if name not in poses.names}
+        self.counted = counted
         graph, structure = self.mechanism.graph, self.plan.structure
         known = {slide for slide, _ in structure.known_slides}
         closing = closing_groups(structure.groups)
@@ -90,7 +99,20 @@ class Margins:
         """The mechanism at values of the swept coordinate (radians or length)."""
         given: list[Value] = list(self.held)
         given[self.which] = place
-        return self.plan.solve(given, start=start, limits=limits)
+        found = self.plan.solve(given, start=start, limits=False)
+        near = {name: self._between(values, place) for name, values in self.near.items()}
+        counted = found.counted | near.keys() if self.counted else frozenset()
+        found = replace(found, near={**found.near, **near}, counted=counted)
+        if limits:
+            self.plan.judge(found)
+        return found
+
+    def _between(self, values: Floats, place: Floats) -> Floats:
+        known = np.flatnonzero(np.isfinite(values))
+        known = known[np.argsort(self.at[known], kind="stable")]
+        if not len(known):
+            return np.full(place.shape, np.nan)
+        return np.asarray(np.interp(place, self.at[known], values[known]))
 
     def start(self, place: Floats) -> Configuration | None:
         """Poses that groups without a closed form may be continued from; None where every group has one."""

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
-from mechdesign.analyses.kinematics.continuity import continuous
 from mechdesign.analyses.kinematics.rates import DriveRates, inverse_rates
 from mechdesign.analyses.kinematics.smoothing import through_change_points
 from mechdesign.analyses.kinematics.targets import Error, errors, needed
@@ -20,6 +19,7 @@ from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
+from mechdesign.mechanism.turns import angles_of
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column
 from mechdesign.study import Poses, Study
@@ -61,7 +61,8 @@ class Asked:
     square : bool
         Whether the study lists as many outputs as drives.
     watched : list of Coordinate
-        All whose values are needed: drives, outputs, and what targets depend on.
+        All whose values are needed: drives, outputs, what targets depend on, and the angles in the expressions of
+        these and of limits.
     of_given : bool
         Whether rates and accelerations are those of the given coordinates rather than of the drives.
     """
@@ -98,6 +99,7 @@ def asked(study: Study) -> Asked:
     for target in study.targets.values():
         shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
     names = dict.fromkeys([*mechanism.drives, *shown, *needed(study, poses)])
+    watched = {name: mechanism.coordinate(name) for name in names}
     rates = {*section.rates, *section.accelerations}
     return Asked(
         study,
@@ -106,7 +108,7 @@ def asked(study: Study) -> Asked:
         list(shown.values()),
         listed,
         section.outputs is not None and len(listed) == len(mechanism.drives),
-        [mechanism.coordinate(name) for name in names],
+        list((watched | angles_of([*watched.values(), *mechanism.counting])).values()),
         not rates <= set(mechanism.drives),
     )
 
@@ -146,15 +148,12 @@ class Motion:
         """Take up poses that give the same coordinates."""
         study, rows, configuration = self.asked.study, solved.rows, solved.configuration
         self.reason[rows] = configuration.reason
-        values = dict(zip(study.mechanism.drives, solved.drives, strict=True))
         for coordinate in self.asked.watched:
             if coordinate.name in solved.given:
                 # As the study gives it, not there and back through radians; also where the pose fails.
                 self.put(coordinate.name, rows, self.asked.poses.values[coordinate.name][rows])
             else:
-                value = values.get(coordinate.name)
-                value = configuration.value(coordinate) if value is None else value
-                self.put(coordinate.name, rows, in_study_units(study, coordinate, value))
+                self.put(coordinate.name, rows, in_study_units(study, coordinate, configuration.value(coordinate)))
         linear = study.mechanism.linearize(configuration)
         assembled = configuration.valid | np.equal(configuration.reason, int(Reason.LIMIT))
         conditioning = np.where(assembled, regularity(linear), np.nan)
@@ -289,12 +288,9 @@ def move(question: Asked, progress: Progress = NULL) -> Motion:
     """
     study, poses = question.study, question.poses
     motion = Motion(question, reason=np.zeros(poses.count, dtype=np.int8))
-    for solved in solve_poses(study, poses):
+    for solved in solve_poses(study, poses, question.watched):
         motion.fill(solved)
         progress.update(len(solved.rows))
     through_change_points(motion)
-    if not poses.listed:
-        turning = [c for c in question.watched if c.quantity == "angle" and c.name not in poses.names]
-        motion.arrays |= continuous(study, poses, turning, motion.arrays)
     motion.errors = list(errors(study, poses, motion.arrays, np.arange(poses.count)))
     return motion

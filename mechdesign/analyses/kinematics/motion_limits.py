@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.boundaries import Boundary, ChangePoint, boundaries
 from mechdesign.analyses.kinematics.margins import Margins
-from mechdesign.analyses.poses import in_study_units
+from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.turns import angles_of
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup
@@ -59,7 +60,9 @@ def motion_limits(
         Their values over all poses, in the study's units.
     """
     mechanism = study.mechanism
-    margins = Margins(study, group, swept)
+    angles = angles_of([*outputs, *mechanism.counting])
+    near = {name: radians(study, c, arrays[name][group.rows]) for name, c in angles.items()}
+    margins = Margins(study, group, swept, near)
     ends, changes = boundaries(margins, reason[group.rows] == Reason.OK)
     unit = study.units.label(mechanism.quantity(swept))
     places = as_given(study, margins, group.values[swept], [end.place for end in ends], [end.row for end in ends])
@@ -68,11 +71,10 @@ def motion_limits(
         Column("kind", np.array([end.cause.kind for end in ends], dtype=str), "", "what ends the motion"),
         Column("joint", np.array([end.cause.joint for end in ends], dtype=str), "", "where"),
     ]
-    rows = [int(group.rows[end.row]) for end in ends]
     columns += [
         Column(
             output.name,
-            _values(study, output, arrays[output.name], ends, rows),
+            _values(study, output, ends),
             study.units.label(output.quantity),
             f"{output.name} at the limit",
         )
@@ -108,19 +110,10 @@ def as_given(
     return found
 
 
-def _values(
-    study: Study, output: Coordinate, motion: NDArray[np.float64], ends: list[Boundary], rows: list[int]
-) -> NDArray[np.float64]:
-    """An output at the limits; angles continuous with the pose beside it."""
-    turn = 2 * np.pi / study.units.angle_factor
-    found = []
-    for end, row in zip(ends, rows, strict=True):
-        value = np.nan
-        if end.configuration is not None:
-            value = float(in_study_units(study, output, end.configuration.value(output)))
-        if output.quantity == "angle" and np.isfinite(motion[row]) and np.isfinite(value):
-            value += turn * round((motion[row] - value) / turn)
-        found.append(value)
+def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> NDArray[np.float64]:
+    """An output at the limits."""
+    poses = [end.configuration for end in ends]
+    found = [np.nan if pose is None else float(in_study_units(study, output, pose.value(output))) for pose in poses]
     return np.array(found, dtype=float)
 
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechdesign.analyses.poses import in_study_units, solve_poses
+from mechdesign.analyses.poses import in_study_units, radians, solve_poses
+from mechdesign.mechanism.turns import angles_of
 from mechdesign.study.poses import PoseGroup, Poses
 
 if TYPE_CHECKING:
@@ -46,16 +47,16 @@ def through_change_points(motion: Motion) -> None:
     values = (group.values[name][rows][:, None] + steps).ravel()
     beside = Poses((PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),))
     around = type(motion)(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
+    each = np.repeat(rows, len(STEPS))
     for solved in solve_poses(study, beside):
-        around.fill(solved)
-    angles = {c.name for c in question.watched if c.quantity == "angle"}
-    turn = 2 * np.pi / study.units.angle_factor
+        near = {angle: radians(study, c, motion.arrays[angle][each[solved.rows]])
+                for angle, c in angles_of(question.watched).items() if angle != name}  # fmt: skip
+        configuration = replace(solved.configuration, near={**solved.configuration.near, **near})
+        around.fill(replace(solved, configuration=configuration))
     good = around.valid.reshape(-1, len(STEPS)).all(axis=1)
     for column, array in motion.arrays.items():
         if column in (name, "conditioning"):
             continue
         table = around.arrays[column].reshape(-1, len(STEPS))
-        if column in angles:
-            table = np.unwrap(table, period=turn, axis=1)
         array[rows[good]] = (table @ WEIGHTS)[good]
     motion.smooth[rows[good]] = True

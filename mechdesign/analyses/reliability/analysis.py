@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.kinematics.continuity import continuous
-from mechdesign.analyses.poses import judge_failures, solve_poses
+from mechdesign.analyses.poses import in_study_units, judge_failures, solve_poses
 from mechdesign.analyses.reliability import sobol, tables
 from mechdesign.analyses.reliability.allocation import Allocated, allocate
 from mechdesign.analyses.reliability.assembly import forward_plan
@@ -103,7 +102,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         if not found:
             raise
         interrupted = "interrupted: "
-    centres = _in_order(study, poses, question, nominal)
+    centres = _in_study_units(study, question, nominal)
     answer = tables.Answer(study, poses, question, nominal.reason, centres, linear, found, first, indices)
     counts = {"poses": poses.count}
     done = [sums for each in found for sums in each.sums.values()]
@@ -153,7 +152,7 @@ def first_order_tables(
     linear = first_order(study, nominal, question, sources, elastic)
     settings = _settings(study, nominal, question, linear, elastic, listed=False)
     task = Task(settings, sources, linear, len(question.channels), poses.count, 0, 0, 0, None, 1, NULL)
-    centres, first = _in_order(study, poses, question, nominal), analytic(task)
+    centres, first = _in_study_units(study, question, nominal), analytic(task)
     answer = tables.Answer(study, poses, question, nominal.reason, centres, linear, [first], first)
     made = {"moments": tables.moments, "contributions": tables.contributions}
     if question.limited:
@@ -184,7 +183,7 @@ class NominalPoses:
         reason = np.zeros(poses.count, dtype=np.int8)
         values = np.full((len(question.channels), poses.count), np.nan)
         groups = []
-        for solved in solve_poses(study, poses):
+        for solved in solve_poses(study, poses, [channel.coordinate for channel in question.channels]):
             configuration = solved.configuration
             reason[solved.rows] = configuration.reason
             found = nominal_values(study.mechanism, configuration, question.channels, question.rates)
@@ -276,16 +275,8 @@ def _settings(
     return sorted(settings, key=lambda setting: setting.pose)
 
 
-def _in_order(study: Study, poses: Poses, question: Question, nominal: NominalPoses) -> Floats:
-    """Nominal values in study units, shape (channels, poses); angles without jumps along a sweep."""
-    values = nominal.values.copy()
-    for row, channel in zip(values, question.channels, strict=True):
-        if channel.coordinate.quantity == "angle":
-            row /= study.units.angle_factor
-    if not poses.listed:
-        turning = {c.coordinate.name: (row, c.coordinate) for row, c in zip(values, question.channels, strict=True)
-                   if c.order == 0 and c.coordinate.quantity == "angle"}  # fmt: skip
-        rows = {name: row for name, (row, _) in turning.items()}
-        for name, row in continuous(study, poses, [c for _, c in turning.values()], rows).items():
-            rows[name][:] = row
-    return values
+def _in_study_units(study: Study, question: Question, nominal: NominalPoses) -> Floats:
+    """Nominal values in study units, shape (channels, poses)."""
+    return np.stack([
+        in_study_units(study, c.coordinate, row) for c, row in zip(question.channels, nominal.values, strict=True)
+    ])  # fmt: skip

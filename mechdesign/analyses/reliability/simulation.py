@@ -14,7 +14,7 @@ from mechdesign.analyses.reliability.first_order import Channel, Rates, nominal_
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
 from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.mechanism import Configuration, Mechanism
-from mechdesign.mechanism.algebra import Value, wrap
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.plan import Plan
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import Progress
@@ -224,12 +224,13 @@ def _trend(errors: Sequence[Floats], valid: NDArray[np.bool_], within: NDArray[n
 
 
 def solve(setting: Setting, made: Made) -> Configuration:
-    """Made mechanisms with the drives at the pose, and their errors."""
+    """Made mechanisms with the drives at the pose, and their errors; angles on the branch of the nominal pose."""
     given: list[Value] = [
         value + made.drives[name] if name in made.drives else value
         for name, value in zip(setting.mechanism.drives, setting.drives, strict=True)
     ]
-    return setting.plan.solve(given, made.places, start=setting.nominal, limits=False)
+    solved = setting.plan.solve(given, made.places, start=setting.nominal, limits=False)
+    return solved.beside(setting.nominal, [channel.coordinate for channel in setting.channels])
 
 
 def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], NDArray[np.bool_]]:
@@ -239,11 +240,8 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], N
         values = nominal_values(mechanism, solved, setting.channels, setting.rates)
     errors = []
     bent = None if setting.elastic is None else setting.elastic.errors(made.loads, count)
-    for k, (channel, value, centre) in enumerate(zip(setting.channels, values, setting.centres, strict=True)):
-        error = np.broadcast_to(value - centre if bent is None else value - centre + bent[k], (count,))
-        if channel.order == 0 and channel.coordinate.quantity == "angle":
-            error = wrap(error)
-        errors.append(error)
+    for k, (value, centre) in enumerate(zip(values, setting.centres, strict=True)):
+        errors.append(np.broadcast_to(value - centre if bent is None else value - centre + bent[k], (count,)))
     return errors, np.broadcast_to(solved.valid, (count,))
 
 

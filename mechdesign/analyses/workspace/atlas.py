@@ -274,6 +274,7 @@ class Atlas:
         return Configuration(
             graph, vectors, shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros(shape, dtype=np.int8), places,
+            self.plan.core.turns(places, drawn=True) | self.plan.turns([0.0, 0.0, *self.approach.held], places),
         )  # fmt: skip
 
     def _open(self, state: State, shape: tuple[int, ...]) -> Flags:
@@ -303,10 +304,11 @@ def _shaped(found: Configuration, shape: tuple[int, ...]) -> Configuration:
         value = np.asarray(value)
         return value if value.ndim == 0 else value.reshape(shape)
 
-    return Configuration(
-        found.graph, found.vectors, shape, [shaped(node) for node in found.nodes],
-        [shaped(turn) for turn in found.rotations], [shaped(slide) for slide in found.slides],
-        [shaped(closure) for closure in found.closures], found.reason.reshape(shape), found.places,
+    return replace(
+        found, shape=shape, nodes=[shaped(node) for node in found.nodes],
+        rotations=[shaped(turn) for turn in found.rotations], slides=[shaped(slide) for slide in found.slides],
+        closures=[shaped(closure) for closure in found.closures], reason=found.reason.reshape(shape),
+        near={name: shaped(value) for name, value in found.near.items()},
     )  # fmt: skip
 
 

@@ -70,6 +70,7 @@ class Field:
         return Configuration(
             graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros((), dtype=np.int8), places,
+            self.mechanism.turns(places, drawn=True) | self.plan.turns(given, places),
         )  # fmt: skip
 
     @property

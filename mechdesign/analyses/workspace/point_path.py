@@ -156,7 +156,9 @@ def _pieces(study: Study, drive: str) -> tuple[Margins, list[Piece]]:
         number = POSES + 1
     place = np.linspace(low, high, number) / (unit if turning else 1.0)
     group = PoseGroup((drive,), {drive: place}, np.arange(number))
-    margins = Margins(study, group, drive)
+    # The whole path is wanted, however many turns the limits leave the drive.
+    near = {name: np.full(number, value) for name, value in mechanism.turns({}, drawn=True).items()}
+    margins = Margins(study, group, drive, near, counted=False)
     valid = margins.solve(margins.at).valid
     ends = boundaries(margins, valid)[0]
     if not valid.any() and not ends:

@@ -146,17 +146,19 @@ def outlines(regions: Sequence[tuple[Study, Question, Sequence[Patch]]]) -> list
 def _drives(
     question: Question, z: NDArray[np.complex128], within: NDArray[np.complex128], sides: NDArray[np.intp]
 ) -> list[Floats]:
-    """Drives on the boundary, or just inside where rounding opens the mechanism; angles continuous along each side.
+    """Drives on the boundary, or just inside where rounding opens the mechanism.
 
-    Of the turns of an angle that is shown which is nearest to the sketch.
+    Angles lie within the drive's limits; where it has none they are continuous along each side, in the turn that is
+    nearest to the sketch.
     """
+    mechanism = question.field.mechanism
     exact, near = question.field.configuration(z, {}), question.field.configuration(within, {})
     found = []
-    for drive in question.field.mechanism.forward.structure.given:
+    for drive in mechanism.forward.structure.given:
         here, beside = (np.broadcast_to(c.value(drive), z.shape) for c in (exact, near))
         values = np.where(np.isfinite(here), here, beside)
-        if drive.quantity == "angle":
-            drawn = float(question.field.mechanism.sketch_configuration.value(drive))
+        if drive.quantity == "angle" and drive.name not in mechanism.turns({}):
+            drawn = float(mechanism.sketch_configuration.value(drive))
             parts = [np.unwrap(part) for part in np.split(values, sides)]
             turns = [2 * np.pi * np.round((np.mean(part) - drawn) / (2 * np.pi)) for part in parts]
             values = np.concatenate([part - turn for part, turn in zip(parts, turns, strict=True)])
