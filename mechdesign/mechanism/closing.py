@@ -15,6 +15,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.redundancy import owners_of
 from mechdesign.mechanism.rigidity import CLOSED, Vector
 from mechdesign.mechanism.sketch import KEY
@@ -48,10 +49,11 @@ def cannot_assemble(mechanism: Mechanism, state: State, given: Sequence[tuple[Co
             return told
     where, mend = open_group(state, equations.gaps(x))
     if not plan.iterative:
+        drawn = Plan(mechanism, plan.structure, plan.modes, follows=False)
         for k, (coordinate, _) in enumerate(given):
 
             def valid(sweep: NDArray[np.float64], k: int = k) -> Value:
-                return plan.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
+                return drawn.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
 
             found = closing_range(valid, coordinate, mechanism.size, unit)
             if found:

@@ -37,19 +37,24 @@ class Plan:
     ----------
     modes : sequence of int
         Assembly mode of each group as drawn; 0 for groups that have none.
+    follows : bool
+        Whether motions may pass change points where the study lets them. They do so from the assembled sketch, so not
+        while there is none.
     """
 
-    def __init__(self, mechanism: Mechanism, structure: Structure, modes: Sequence[int]) -> None:
+    def __init__(
+        self, mechanism: Mechanism, structure: Structure, modes: Sequence[int], *, follows: bool = True
+    ) -> None:  # fmt: skip
         self.mechanism = mechanism
         self.structure = structure
         self.modes = tuple(modes)
+        self.follows = follows and mechanism.description.branch == "follow"
         self.iterative = any(group.form == "newton" for group in structure.groups)
 
     @cached_property
     def change_points(self) -> ChangePoints | None:
         """Where the motion passes from one assembly to another, if the study lets it (``branch: follow``)."""
-        wanted = self.mechanism.description.branch == "follow"
-        return ChangePoints(self) if wanted and len(self.structure.given) == 1 and any(self.modes) else None
+        return ChangePoints(self) if self.follows and len(self.structure.given) == 1 and any(self.modes) else None
 
     def modes_at(self, given: Sequence[Value]) -> Sequence[Value]:
         """Assembly mode of each group at given values: as drawn, or changed at change points that are followed."""

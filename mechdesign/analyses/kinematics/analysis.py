@@ -6,8 +6,10 @@ import dataclasses
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics import targets
+from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.extremes import extremes
 from mechdesign.analyses.kinematics.loops import loop_tables
 from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry, move
@@ -69,14 +71,16 @@ def kinematics(
     motion = move(question, progress)
     warnings, failed = judge_failures(study, poses, motion.reason)
     warnings += _conditioning(motion) + _stalled(motion) + targets.gaps(study, motion.errors, poses, motion.valid)
-    tables = {"motion": motion_table(motion), "extremes": extremes_table(motion)}
+    tables = {"motion": motion_table(motion)}
     swept, limits = swept_of(poses), None
     if swept is not None:
         group, reason = poses.groups[0], motion.reason
         limits = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
-        tables["limits"] = limits.table
         warnings += limits.warnings
-    tables |= loop_tables(study, poses, limits)
+    tables["extremes"], _ = extremes_table(motion, limits.ends if limits is not None else ())
+    if limits is not None:
+        tables["limits"] = limits.table
+    tables |= loop_tables(study, poses, motion.valid, limits)
     if motion.errors:
         tables["targets"] = targets_table(motion)
     if question.square:
@@ -120,11 +124,15 @@ def motion_table(motion: Motion) -> Table:
     return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
 
 
-def extremes_table(motion: Motion, names: Collection[str] | None = None) -> Table:
+def extremes_table(
+    motion: Motion, ends: Sequence[Boundary] = (), names: Collection[str] | None = None
+) -> tuple[Table, NDArray[np.bool_]]:  # fmt: skip
     """Smallest and largest values, exact for some outputs or all; see `kinematics.extremes.extremes`."""
     question, poses = motion.asked, motion.asked.poses
-    swept = swept_of(poses)
-    return extremes(question.study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason, names)
+    return extremes(
+        question.study, question.outputs, motion.errors, motion.arrays, poses, swept_of(poses), motion.reason, ends,
+        names,
+    )  # fmt: skip
 
 
 def targets_table(motion: Motion) -> Table:
