@@ -26,6 +26,8 @@ from mechdesign.study.poses import Poses
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
+# What a step of a motion may lead beside its rates, as a part of it.
+ASTRAY = 1e-3
 
 
 def kinematics(
@@ -70,7 +72,7 @@ def kinematics(
     progress.start(poses.count, "poses")
     motion = move(question, progress)
     warnings, failed = judge_failures(study, poses, motion.reason)
-    warnings += _conditioning(motion) + _stalled(motion) + targets.gaps(study, motion.errors, poses, motion.valid)
+    warnings += _conditioning(motion) + _stalled(motion) + _astray(motion) + targets.gaps(study, motion.errors, poses, motion.valid)
     tables = {"motion": motion_table(motion)}
     swept, limits = swept_of(poses), None
     if swept is not None:
@@ -177,6 +179,28 @@ def _conditioning(motion: Motion) -> list[str]:
         poses = "1 pose is" if count == 1 else f"{count} poses are"
         return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"]
     return []
+
+
+def _astray(motion: Motion) -> list[str]:
+    """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
+    study, section, poses = motion.asked.study, motion.asked.section, motion.asked.poses
+    if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
+        return []
+    sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
+    unit = [1 / sizes.get(study.mechanism.quantity(name), 1.0) for name in poses.names]
+    way = np.array([np.diff(poses.values[name]) * u for name, u in zip(poses.names, unit, strict=True)])
+    rates = np.array([section.rates.get(name, 0.0) * u for name, u in zip(poses.names, unit, strict=True)])
+    if not rates.any():
+        return []
+    ahead = rates / np.linalg.norm(rates)
+    off = np.linalg.norm(way - ahead[:, None] * (ahead @ way), axis=0) > ASTRAY * np.linalg.norm(way, axis=0)
+    if not off.any():
+        return []
+    return [
+        f"{np.count_nonzero(off)} of {len(off)} steps of the motion do not go where the rates of "
+        f"{', '.join(poses.names)} lead: velocities and accelerations there are those of the rates, not of the motion "
+        "drawn; 'speed' gives those of a point along its path"
+    ]
 
 
 def _stalled(motion: Motion) -> list[str]:
