@@ -48,10 +48,11 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
             return told
     where, mend = open_group(state, equations.gaps(x))
     if not plan.iterative:
+        drawn = Plan(core, plan.structure, plan.modes, follows=False)
         for k, (coordinate, _) in enumerate(given):
 
             def valid(sweep: NDArray[np.float64], k: int = k) -> Value:
-                return plan.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
+                return drawn.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
 
             found = closing_range(valid, coordinate, core.size, unit)
             if found:

@@ -18,11 +18,12 @@ from typing import Literal
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross
+from mechdesign.mechanism.algebra import Value, cross, norm2
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Fixed, Prismatic, Slot
+from mechdesign.mechanism.rates import Rates
 
 Kind = Literal["four-bar", "slider-crank", "inverted slider-crank"]
 
@@ -158,9 +159,12 @@ class FourBar:
         """Vector from the frame to where the coupler pushes the input (`end` 0) or the output (3); across a slide."""
         if self.slide == end:
             return self._across(configuration, end)
+        return self._pin(configuration, self._tip(end)) - self._pin(configuration, end)
+
+    def _tip(self, end: int) -> int:
+        """The joint at which the coupler pushes the body of joint `end`; the far one where the near one is a slide."""
         near, far = (1, 2) if end == 0 else (2, 1)
-        tip = far if self.slide == near else near
-        return self._pin(configuration, tip) - self._pin(configuration, end)
+        return far if self.slide == near else near
 
     def squareness(self, configuration: Configuration, end: int) -> tuple[Value, Value]:
         """Sine and cosine of the angle from the arm of the input (`end` 0) or output (3) to the coupler's action."""
@@ -168,6 +172,20 @@ class FourBar:
         product = action * np.conj(arm)
         size = np.abs(product)
         return product.imag / size, product.real / size
+
+    def turning(self, configuration: Configuration, rates: Rates) -> Value:
+        """Derivative along `rates` of the angle from the output's arm to the coupler's action (radians)."""
+        return self._turn(configuration, rates, None) - self._turn(configuration, rates, 3)
+
+    def _turn(self, configuration: Configuration, rates: Rates, end: int | None) -> Value:
+        """Derivative of the direction of the action, or of the arm at `end`."""
+        across = self.slide if (self.slide in (1, 2) if end is None else self.slide == end) else -1
+        if across >= 0:
+            return rates.angles[configuration.graph.edges[self.joints[across].edge].frame]
+        tail, head = (1, 2) if end is None else (3, self._tip(3))
+        span = self._pin(configuration, head) - self._pin(configuration, tail)
+        change = rates.nodes[self.joints[head].node] - rates.nodes[self.joints[tail].node]
+        return cross(span, change) / norm2(span)
 
     def transmission(self, configuration: Configuration) -> Value:
         """Transmission angle, the acute angle between coupler and output (radians, 0 to pi/2).

@@ -34,18 +34,22 @@ class Plan:
     ----------
     modes : sequence of int
         Assembly mode of each group as drawn; 0 for groups that have none.
+    follows : bool
+        Whether motions may pass change points where the study lets them. They do so from the assembled sketch, so not
+        while there is none.
     """
 
-    def __init__(self, core: Core, structure: Structure, modes: Sequence[int]) -> None:
+    def __init__(self, core: Core, structure: Structure, modes: Sequence[int], *, follows: bool = True) -> None:
         self.core = core
         self.structure = structure
         self.modes = tuple(modes)
+        self.follows = follows and core.description.branch == "follow"
         self.iterative = any(group.form == "newton" for group in structure.groups)
 
     @cached_property
     def change_points(self) -> ChangePoints | None:
         """Where the motion passes from one assembly to another, if the study lets it (``branch: follow``)."""
-        if self.core.description.branch != "follow" or len(self.structure.given) != 1 or not any(self.modes):
+        if not self.follows or len(self.structure.given) != 1 or not any(self.modes):
             return None
         (coordinate,) = self.structure.given
         period = 2 * np.pi if coordinate.quantity == "angle" else max(self.core.size, 1e-300)

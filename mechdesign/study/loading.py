@@ -122,16 +122,17 @@ class Study:
         StudyError
             Where nothing sensible can be assumed.
         """
+        turn = 2.0 * math.pi / self.units.angle_factor
         for name in dict.fromkeys((section, "kinematics")):
             asked: PoseSection | None = getattr(self, name)
             if asked is not None and asked.at_nodes:
                 return self._nodes
             if asked is not None:
                 folder = self.path.parent if self.path else pathlib.Path()
-                found = poses.expand(asked, folder)
+                found = poses.expand(asked, folder, turn)
                 if found is not None:
                     return found
-        return poses.default(self.mechanism.description, 2.0 * math.pi / self.units.angle_factor)
+        return poses.default(self.mechanism.description, turn)
 
 
 def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:

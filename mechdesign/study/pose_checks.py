@@ -53,12 +53,19 @@ def _given(
 
 
 def rates(checker: Checker, command: str, section: KinematicsSection | ReliabilitySection) -> None:
-    """Check that rates and accelerations are those of drives, or (kinematics) of all coordinates that poses give."""
+    """Check that rates and accelerations are those of drives, or of all coordinates that the poses give.
+
+    Along a motion that other coordinates give, drives have no rates of their own: they follow from the motion.
+    """
     _given(checker, section.rates, (command, "rates"), _RATE_KINDS)
     _given(checker, section.accelerations, (command, "accelerations"), _ACCELERATION_KINDS)
     drives = checker.names.drives
-    given = _sets(checker, section) if isinstance(section, KinematicsSection) else []
+    source = _source(checker, section)
+    given = _sets(checker, source)
     one = given[0] if len(given) == 1 else set()
+    if section.speed is not None:
+        _speed(checker, command, section, source)
+        return
     parts = (("rates", section.rates), ("accelerations", section.accelerations))
     of_given = any(name in one and name not in drives for _, values in parts for name in values)
     for key, values in parts:
@@ -77,6 +84,49 @@ def rates(checker: Checker, command: str, section: KinematicsSection | Reliabili
         if missing:
             message = f"{', '.join(missing)} missing: {key} are those of all coordinates that the poses give"
             checker.reporter.report((command, key), message, at_key=True)
+        if values and not of_given and len(drives) > 1 and one and not one <= set(drives) and _moves(source):
+            others = ", ".join(sorted(one))
+            message = (
+                f"rates of drives that do not change are not those of this motion, which {others} give: say 'speed', "
+                f"of a point along its path, or the {key} of {others}; those of the drives follow from them"
+            )
+            checker.reporter.report((command, key), message, at_key=True)
+
+
+def _speed(
+    checker: Checker, command: str, section: KinematicsSection | ReliabilitySection, source: PoseSection
+) -> None:  # fmt: skip
+    for key in ("rates", "accelerations"):
+        if getattr(section, key):
+            checker.reporter.report(
+                (command, key), f"'speed' and {key!r} are both given; a path is passed at one of them", at_key=True
+            )
+    path = source.path
+    if path is None:
+        message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"
+        checker.reporter.report((command, "speed"), message, at_key=True)
+        return
+    named = set(path)
+    points = [name for name in path if name in checker.names.owners]
+    points += [n[:-2] for n in path if n.endswith(".x") and f"{n[:-2]}.y" in named and n[:-2] not in points]
+    if len(points) != 1:
+        which = " and ".join(points) or "no point"
+        message = f"a speed is that of one point along its path, and this path is that of {which}; give 'rates' instead"
+        checker.reporter.report((command, "speed"), message, at_key=True)
+
+
+def _source(checker: Checker, section: PoseSection) -> PoseSection:
+    """The section that gives the poses of another: itself, or kinematics."""
+    if any(part is not None for part in (section.poses, section.sweep, section.path)):
+        return section
+    kinematics: PoseSection | None = checker.parts.get("kinematics")
+    return section if kinematics is None else kinematics
+
+
+def _moves(section: PoseSection) -> bool:
+    """Whether the poses follow one another: a path, or a sweep of one coordinate."""
+    moving = [s for s in (section.sweep or {}).values() if s.number != 1 and s.from_ != s.to]
+    return section.path is not None or len(moving) == 1
 
 
 def _of_nodes(checker: Checker) -> list[str]:
@@ -120,7 +170,7 @@ def check_poses(
             key = next((key for key in ("poses", "sweep", "path") if getattr(section, key) is not None), None)
         if key is not None and isinstance(section, PoseSection):
             try:
-                found = poses.expand(section, folder)
+                found = poses.expand(section, folder, turn)
             except StudyError as error:
                 reporter.report((command, key), str(error))
                 continue
@@ -130,6 +180,8 @@ def check_poses(
             except MechanismError as error:
                 place: Path = (command, key, int(group.rows[0])) if key == "poses" else (command, str(key))
                 reporter.report(place, str(error))
+        if found is not None and not found.slopes and getattr(section, "speed", None) is not None:
+            reporter.report((command, "speed"), "the path's point does not move: it has no direction", at_key=True)
         if command == "kinematics" and wanted:
             try:
                 assumed = found or poses.default(mechanism.description, turn)

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema
 
 from mechdesign.study.models import Model
 from mechdesign.study.numbers import (
     NUMBER_FORM,
-    Context,
     CoordinateName,
     Number,
     OrShort,
     Whole,
     failure,
     or_short,
-    read_number,
 )
+from mechdesign.study.path_models import Path
 
 
 class Sweep(Model):
@@ -48,40 +47,6 @@ class Sweep(Model):
         return or_short(schema, handler, NUMBER_FORM)
 
 
-class _PathValues:
-    """A path's values: a list of numbers or of [x, y], the name of a CSV file, or a number that is held."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"type": ["array", "string", "object", "number"]}
-
-    @staticmethod
-    def _validate(raw: Any, info: ValidationInfo) -> str | tuple[Any, ...]:
-        context = info.context or Context()
-        if isinstance(raw, dict) and set(raw) == {"file"} and isinstance(raw["file"], str):
-            return str(raw["file"])
-        if isinstance(raw, str) and raw.lower().endswith((".csv", ".txt", ".dat")):
-            return raw
-        if not isinstance(raw, list):
-            return (read_number(raw, context).nominal,)
-        values: list[Any] = []
-        for index, item in enumerate(raw):
-            try:
-                if isinstance(item, list) and len(item) == 2:
-                    values.append(tuple(read_number(part, context).nominal for part in item))
-                else:
-                    values.append(read_number(item, context).nominal)
-            except PydanticCustomError as error:
-                raise failure(f"entry {index}: {error.message()}") from None
-        if not values:
-            raise failure("an empty path")
-        if len({isinstance(value, tuple) for value in values}) > 1:
-            raise failure("a path is a list of [x, y] (of a point) or a list of numbers, not a mixture")
-        return tuple(values)
-
-
 def _poses(raw: Any) -> Any:
     if raw == "workspace":
         return ()
@@ -101,7 +66,7 @@ class PoseSection(Model):
         | None
     ) = None
     sweep: dict[CoordinateName, Sweep] | None = None
-    path: dict[CoordinateName, Annotated[str | tuple[Any, ...], _PathValues()]] | None = None
+    path: dict[CoordinateName, Path] | None = None
 
     @property
     def at_nodes(self) -> bool:

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description
+from mechdesign.study import courses
+from mechdesign.study.path_models import Path as PathModel
 from mechdesign.study.pose_models import PoseSection, Sweep
 
 MAX_POSES = 10_000_000
@@ -62,6 +64,11 @@ class Poses:
         Where designs differ from the study's own: dimensions (lengths, radians), and parameters in the study's units.
     motion : bool
         Whether one design passes them one after the other: a sweep along one coordinate, or a path.
+    closed : bool
+        Whether the motion goes on from the last pose to the first.
+    slopes, bends : mapping of str to ndarray, shape (count,)
+        Along the path of a point, first and second derivative of every coordinate given by the path's length, in the
+        study's units; nan where the path has no direction.
     """
 
     groups: tuple[PoseGroup, ...]
@@ -72,6 +79,9 @@ class Poses:
     places: Mapping[str, Floats] = field(default_factory=dict)
     parameters: Mapping[str, Floats] = field(default_factory=dict)
     motion: bool = False
+    closed: bool = False
+    slopes: Mapping[str, Floats] = field(default_factory=dict)
+    bends: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -105,7 +115,10 @@ def stacked(poses: Poses, designs: int, places: Mapping[str, ArrayLike], paramet
         for group in poses.groups
     )
     count = poses.count * designs
-    return Poses(groups, count, poses.listed, poses.grid, designs, each(places), each(parameters))
+    slopes, bends = ({name: np.tile(v, designs) for name, v in part.items()} for part in (poses.slopes, poses.bends))
+    return Poses(
+        groups, count, poses.listed, poses.grid, designs, each(places), each(parameters), slopes=slopes, bends=bends
+    )
 
 
 def sweep_values(sweep: Sweep) -> Floats:
@@ -125,8 +138,8 @@ def sweep_values(sweep: Sweep) -> Floats:
     return sweep.from_ + sweep.step * np.arange(math.floor(steps) + 1, dtype=np.float64)
 
 
-def expand(section: PoseSection, folder: Path) -> Poses | None:
-    """Poses of a section, None where it gives none, or those of the workspace.
+def expand(section: PoseSection, folder: Path, turn: float) -> Poses | None:
+    """Poses of a section, None where it gives none, or those of the workspace; `turn` as for `default`.
 
     Raises
     ------
@@ -138,7 +151,7 @@ def expand(section: PoseSection, folder: Path) -> Poses | None:
     if section.sweep is not None:
         return _grid({name: sweep_values(sweep) for name, sweep in section.sweep.items()})
     if section.path is not None:
-        return _path(section.path, folder)
+        return _path(section.path, folder, turn)
     return None
 
 
@@ -169,25 +182,81 @@ def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> 
     return Poses((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
 
 
-def _path(path: Mapping[str, str | tuple[object, ...]], folder: Path) -> Poses:
+def _path(path: Mapping[str, PathModel], folder: Path, turn: float) -> Poses:
     if not path:
         raise StudyError("an empty path")
     columns: dict[str, Floats] = {}
+    found: dict[str, courses.Course] = {}
     for name, given in path.items():
-        table = read_table(folder / given) if isinstance(given, str) else np.array(given, dtype=float)
-        if table.ndim == 2 and table.shape[1] == 2 and "." not in name:
-            columns[f"{name}.x"], columns[f"{name}.y"] = table[:, 0], table[:, 1]
-        elif table.ndim == 1 or table.shape[1] == 1:
-            columns[name] = table.reshape(-1)
+        course = _course(name, given, folder, turn)
+        if isinstance(course, courses.Course):
+            found[name] = course
+            columns[f"{name}.x"], columns[f"{name}.y"] = course.places.real, course.places.imag
         else:
-            raise StudyError(f"path: {name!r} needs a list of " + ("numbers" if "." in name else "[x, y]"))
+            columns[name] = course
     count = max(len(column) for column in columns.values())
     for name, column in columns.items():
         if len(column) not in (1, count):
             raise StudyError(f"path: {name!r} has {len(column)} values where another coordinate has {count}")
-    return _single(
-        {name: np.broadcast_to(column, (count,)).copy() for name, column in columns.items()}, count, (count,)
-    )
+    values = {name: np.broadcast_to(column, (count,)).copy() for name, column in columns.items()}
+    for owner in {name.rpartition(".")[0] for name in columns if name.endswith(".x")} - set(found):
+        if f"{owner}.y" in columns:
+            found[owner] = courses.polyline(values[f"{owner}.x"] + 1j * values[f"{owner}.y"])
+    slopes, bends, closed = {}, {}, False
+    # The way of a point that stays where it is says nothing.
+    moving = {owner: course for owner, course in found.items() if len(course.places) == count and course.way[-1] > 0}
+    if len(moving) == 1:
+        ((owner, course),) = moving.items()
+        slopes, bends = _along(values, owner, course)
+        closed = course.closed
+    group = PoseGroup(tuple(values), values, np.arange(count))
+    return Poses((group,), count, False, (count,), motion=count > 1, closed=closed, slopes=slopes, bends=bends)
+
+
+def _course(name: str, given: PathModel, folder: Path, turn: float) -> courses.Course | Floats:
+    """The path of a point, or the values of a coordinate."""
+    point = "." not in name
+    if not point and any(shape is not None for shape in (given.circle, given.arc, given.line)):
+        raise StudyError(f"path: {name!r} is no point: a circle, an arc or a line is the path of a point")
+    if given.circle is not None:
+        return courses.circle(given.circle, given.points, turn)
+    if given.arc is not None:
+        return courses.arc(given.arc, given.points, turn)
+    if given.line is not None:
+        begin, end = (complex(*place) for place in given.line)
+        if begin == end:
+            raise StudyError(f"path: the line of {name!r} needs two different places")
+        return courses.line(begin, end, given.points)
+    table = read_table(folder / given.file) if given.file is not None else np.array(given.through, dtype=float)
+    if point and table.ndim == 2 and table.shape[1] == 2:
+        places = table[:, 0] + 1j * table[:, 1]
+        if not given.spline:
+            return courses.polyline(places)
+        if len(places) < 3 or not np.diff(places).all():
+            raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
+        return courses.spline(places, given.points)
+    if given.spline:
+        raise StudyError(f"path: a spline is the path of a point, through a list of [x, y], not of {name!r}")
+    if table.ndim == 1 or table.shape[1] == 1:
+        return np.asarray(table.reshape(-1))
+    raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
+
+
+def _along(
+    values: Mapping[str, Floats], owner: str, course: courses.Course
+) -> tuple[dict[str, Floats], dict[str, Floats]]:  # fmt: skip
+    """Derivatives of all coordinates by the length of a point's path; what is listed beside it changes evenly between."""
+    slopes, bends = {}, {}
+    for name, column in values.items():
+        if name in (f"{owner}.x", f"{owner}.y"):
+            part = np.real if name.endswith(".x") else np.imag
+            slopes[name], bends[name] = part(course.directions).copy(), part(course.bends).copy()
+            continue
+        with np.errstate(divide="ignore", invalid="ignore"):
+            steps = np.diff(column) / np.diff(course.way)
+        steps = np.where(np.diff(column) == 0, 0.0, steps)
+        slopes[name], bends[name] = np.append(steps, steps[-1:]), np.zeros(len(column))
+    return slopes, bends
 
 
 def read_table(file: Path, most: int = 2) -> Floats:

@@ -129,8 +129,8 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
     names, report = checker.names, checker.reporter.report
     known = names.owners if limit.radius is not None else {**names.coordinates, **names.owners}
     base, order = split_order(name, known.__contains__)
-    if order and not (section.rates or section.accelerations):
-        report(path, "a limit of a velocity or an acceleration needs 'rates'", at_key=True)
+    if order and not (section.rates or section.accelerations or section.speed):
+        report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)
     if limit.radius is not None:
         if checker.known(base, names.owners, "point", path, at_key=True):
             checker.kind((*path, "radius"), _KINDS["length"][order])

@@ -30,6 +30,7 @@ from mechdesign.study.numbers import (
     read_number,
     shown,
 )
+from mechdesign.study.path_models import Speed
 from mechdesign.study.pose_models import PoseSection
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
@@ -318,6 +319,7 @@ class ReliabilitySection(PoseSection):
     outputs: CoordinateNames | None = None
     rates: dict[CoordinateName, Number] = Field(default_factory=dict)
     accelerations: dict[CoordinateName, Number] = Field(default_factory=dict)
+    speed: Speed | None = None
     limits: dict[CoordinateName, ErrorLimit] = Field(default_factory=dict)
     load: tuple[Number, ...] | None = None
     methods: Annotated[

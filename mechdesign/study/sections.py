@@ -23,6 +23,7 @@ from mechdesign.study.numbers import (
     failure,
 )
 from mechdesign.study.optimize_models import Condition, OptimizeSection
+from mechdesign.study.path_models import Speed
 from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.stiffness_models import StiffnessSection
@@ -53,6 +54,7 @@ class KinematicsSection(PoseSection):
 
     rates: dict[CoordinateName, Number] = Field(default_factory=dict)
     accelerations: dict[CoordinateName, Number] = Field(default_factory=dict)
+    speed: Speed | None = None
     outputs: CoordinateNames | None = None
     loads: tuple[Load, ...] = ()
     characteristic_length: PositiveLength | None = None

@@ -6,8 +6,10 @@ import dataclasses
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics import targets
+from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.extremes import extremes
 from mechdesign.analyses.kinematics.loops import loop_tables
 from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry, move
@@ -25,6 +27,8 @@ from mechdesign.threads import one_thread
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
+# What a step of a motion may lead beside its rates, as a part of it.
+ASTRAY = 1e-3
 
 
 @one_thread()
@@ -70,15 +74,22 @@ def kinematics(
     progress.start(poses.count, "poses")
     motion = move(question, progress)
     warnings, failed = judge_failures(study, poses, motion.reason)
-    warnings += _conditioning(motion) + _stalled(motion) + targets.gaps(study, motion.errors, poses, motion.valid)
-    tables = {"motion": motion_table(motion), "extremes": extremes_table(motion)}
+    warnings += (
+        _conditioning(motion)
+        + _stalled(motion)
+        + _astray(motion)
+        + targets.gaps(study, motion.errors, poses, motion.valid)
+    )
+    tables = {"motion": motion_table(motion)}
     swept, limits = swept_of(poses), None
     if swept is not None:
         group, reason = poses.groups[0], motion.reason
         limits = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
-        tables["limits"] = limits.table
         warnings += limits.warnings
-    tables |= loop_tables(study, poses, limits)
+    tables["extremes"], _ = extremes_table(motion, limits.ends if limits is not None else ())
+    if limits is not None:
+        tables["limits"] = limits.table
+    tables |= loop_tables(study, poses, motion.valid, limits)
     if motion.errors:
         tables["targets"] = targets_table(motion)
     if question.square:
@@ -122,11 +133,15 @@ def motion_table(motion: Motion) -> Table:
     return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
 
 
-def extremes_table(motion: Motion, names: Collection[str] | None = None) -> Table:
+def extremes_table(
+    motion: Motion, ends: Sequence[Boundary] = (), names: Collection[str] | None = None
+) -> tuple[Table, NDArray[np.bool_]]:  # fmt: skip
     """Smallest and largest values, exact for some outputs or all; see `kinematics.extremes.extremes`."""
     question, poses = motion.asked, motion.asked.poses
-    swept = swept_of(poses)
-    return extremes(question.study, question.outputs, motion.errors, motion.arrays, poses, swept, motion.reason, names)
+    return extremes(
+        question.study, question.outputs, motion.errors, motion.arrays, poses, swept_of(poses), motion.reason, ends,
+        names,
+    )  # fmt: skip
 
 
 def targets_table(motion: Motion) -> Table:
@@ -171,6 +186,28 @@ def _conditioning(motion: Motion) -> list[str]:
         poses = "1 pose is" if count == 1 else f"{count} poses are"
         return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"]
     return []
+
+
+def _astray(motion: Motion) -> list[str]:
+    """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
+    study, section, poses = motion.asked.study, motion.asked.section, motion.asked.poses
+    if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
+        return []
+    sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
+    unit = [1 / sizes.get(study.mechanism.quantity(name), 1.0) for name in poses.names]
+    way = np.array([np.diff(poses.values[name]) * u for name, u in zip(poses.names, unit, strict=True)])
+    rates = np.array([section.rates.get(name, 0.0) * u for name, u in zip(poses.names, unit, strict=True)])
+    if not rates.any():
+        return []
+    ahead = rates / np.linalg.norm(rates)
+    off = np.linalg.norm(way - ahead[:, None] * (ahead @ way), axis=0) > ASTRAY * np.linalg.norm(way, axis=0)
+    if not off.any():
+        return []
+    return [
+        f"{np.count_nonzero(off)} of {len(off)} steps of the motion do not go where the rates of "
+        f"{', '.join(poses.names)} lead: velocities and accelerations there are those of the rates, not of the motion "
+        "drawn; 'speed' gives those of a point along its path"
+    ]
 
 
 def _stalled(motion: Motion) -> list[str]:

@@ -3,43 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics import targets
-from mechdesign.analyses.kinematics.rates import drive_velocities
+from mechdesign.analyses.kinematics.boundaries import Boundary
+from mechdesign.analyses.kinematics.curves import Curves
+from mechdesign.analyses.kinematics.lines import Indices, Line, windows
+from mechdesign.analyses.kinematics.peaks import STILL, Curve, Peak, peaks, searched
 from mechdesign.analyses.kinematics.targets import Error
-from mechdesign.analyses.poses import dimensions, in_study_units, radians, starts
-from mechdesign.analyses.roots import bracketed_roots
-from mechdesign.mechanism import Configuration, Reason
+from mechdesign.analyses.poses import in_study_units
+from mechdesign.mechanism import Reason
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.golden import lowest
-from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.turns import angles_of
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 Array = NDArray[np.float64]
 
-# How far from its place an extreme may be found, as a part of a step of the sweep.
-PRECISION = 1e-13
-# A range below this part of the output's size is rounding: the output does not move.
-STILL = 1e-12
-
 
 def extremes(
     study: Study, outputs: Sequence[Coordinate], errors: Sequence[Error], arrays: Mapping[str, Array], poses: Poses,
-    swept: str | None, reason: NDArray[np.int8], asked: Collection[str] | None = None,
-) -> Table:  # fmt: skip
-    """Smallest and largest value of each output and error over the valid poses, and the ratio of the times between.
+    swept: str | None, reason: NDArray[np.int8], ends: Sequence[Boundary] = (), asked: Collection[str] | None = None,
+) -> tuple[Table, NDArray[np.bool_]]:  # fmt: skip
+    """Smallest and largest value of each output and error over the motion, and the ratio of the times between.
 
-    Where one coordinate is swept, an output's extreme between two poses is found by its derivative, and an error's by
-    golden section. `time_ratio` is the longer over the shorter part of a full turn of the swept
+    Where one coordinate is swept they are those of the whole motion, from limit to limit, between its poses too;
+    elsewhere those of the valid poses. `time_ratio` is the longer over the shorter part of a full turn of the swept
     angle between the two extremes, for a drive of constant speed; nan elsewhere. `min_at` is the swept coordinate, or
     the row where there is none.
 
@@ -51,8 +43,15 @@ def extremes(
         The one coordinate that moves.
     reason : int8 array, shape (poses,)
         See `mechdesign.mechanism.Reason`.
+    ends : sequence of Boundary
+        Limits of the motion, of a single design.
     asked : collection of str, optional
         Outputs and errors whose extremes between the poses are wanted; all where left out.
+
+    Returns
+    -------
+    (Table, bool array of shape (designs,))
+        The table, and the designs whose motion ends where no limit is known, so that it does not answer for them.
     """
     mechanism = study.mechanism
     shape = (poses.designs, poses.count // poses.designs)
@@ -64,11 +63,12 @@ def extremes(
     turn = 2 * np.pi / study.units.angle_factor
     full_turn = np.zeros(shape[0], dtype=bool)
     if swept is not None and mechanism.quantity(swept) == "angle" and np.ptp(at) >= turn * (1 - 1e-9):
-        full_turn[:] = ~reason.reshape(shape).any(axis=1)
+        full_turn[:] = ~reason.reshape(shape).any(axis=1) & (not ends)
     found = np.full((2, shape[0], len(names), 2), np.nan)  # smallest and largest: value and place
     index = np.zeros((2, shape[0], len(names)), dtype=np.intp)
     moving = np.zeros((shape[0], len(names)), dtype=bool)
     first_row = np.arange(shape[0]) * shape[1]
+    torn = np.zeros(shape[0], dtype=bool)
     for k, (curve, quantity) in enumerate(zip(curves, quantities, strict=True)):
         values = np.where(reason == Reason.OK, curve, np.nan).reshape(shape)
         known = np.isfinite(values)
@@ -85,22 +85,9 @@ def extremes(
             found[end, some, k, 0], found[end, some, k, 1] = values.ravel()[rows[some]], at[rows[some]]
     if swept is not None:
         some = np.array([asked is None or name in asked for name in names])
-        design, which = np.nonzero(moving & some)
-        needed = [mechanism.coordinate(name) for name in targets.needed(study, poses)] if errors else []
-        near = {name: radians(study, c, arrays[name]) for name, c in angles_of([*outputs, *needed]).items()}
-        for k, sign in enumerate((1, -1)):
-            for of_errors in (False, True):
-                mine = (which >= len(outputs)) == of_errors
-                lanes = design[mine], which[mine]
-                if not mine.any():
-                    continue
-                # Targets may be known within the sweep only.
-                sweep = _Sweep(study, poses, swept, index[k][lanes], full_turn[lanes[0]] & (not of_errors), near)
-                sampled = found[k][lanes]
-                if of_errors:
-                    found[k][lanes] = _refined_errors(sweep, errors, lanes[1] - len(outputs), arrays, sign, sampled)
-                else:
-                    found[k][lanes] = _refined(sweep, outputs, lanes[1], sign, sampled)
+        between = _Between(study, outputs, errors, arrays, poses, swept, reason == Reason.OK, ends)
+        torn = between.refine(found, index, some, moving)
+        full_turn &= ~torn
     low_ends, high_ends = found.reshape(2, -1, 2)
     span = high_ends[:, 0] - low_ends[:, 0]
     timed = moving.ravel() & np.repeat(full_turn, len(names))
@@ -109,7 +96,7 @@ def extremes(
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
     ratio[~np.isfinite(ratio)] = np.nan
     where = f"{swept or 'row'} at the"
-    return Table(
+    table = Table(
         "extremes",
         (
             Column("output", np.tile(np.array(names), shape[0]), "", "output or error, in its own unit"),
@@ -122,159 +109,102 @@ def extremes(
         ),
         "extremes of the outputs over the motion",
     )
+    return table, torn
 
 
 @dataclass(frozen=True, eq=False)
-class _Sweep:
-    """Lanes of a sweep, each beside one pose.
-
-    Parameters
-    ----------
-    index : ndarray of int, shape (lanes,)
-        The pose.
-    full_turn : ndarray of bool, shape (lanes,)
-        Whether the ends of the sweep are one pose.
-    near : mapping of str to ndarray, shape (poses,)
-        Angles of the motion (radians): those beside a pose are on its branch.
-    """
+class _Between:
+    """Extremes of outputs and errors between the poses of a sweep, and at the limits of its motion."""
 
     study: Study
+    outputs: Sequence[Coordinate]
+    errors: Sequence[Error]
+    arrays: Mapping[str, Array]
     poses: Poses
     swept: str
-    index: NDArray[np.intp]
-    full_turn: NDArray[np.bool_]
-    near: Mapping[str, Array]
+    valid: NDArray[np.bool_]
+    ends: Sequence[Boundary]
 
-    @cached_property
-    def plan(self) -> Plan:
-        """Plan of the coordinates given."""
-        return self.study.mechanism.plan(self.poses.groups[0].names)
+    def refine(
+        self, found: Array, index: Indices, some: NDArray[np.bool_], moving: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:  # fmt: skip
+        """Put better extremes than those of the poses into a table; returns the designs whose motion is torn.
 
-    @cached_property
-    def swept_at(self) -> int:
-        """Which of the given coordinates moves."""
-        return self.poses.groups[0].names.index(self.swept)
+        Parameters
+        ----------
+        found : ndarray, shape (2, designs, names, 2)
+            Smallest and largest: value and place, in the study's units.
+        index : ndarray of int, shape (2, designs, names)
+            Their poses.
+        some : bool array, shape (names,)
+            Outputs and errors that are asked.
+        moving : bool array, shape (designs, names)
+            Which move; those found to move are added.
+        """
+        study, poses, count = self.study, self.poses, len(self.outputs)
+        torn = np.zeros(poses.designs, dtype=bool)
+        mine = np.flatnonzero(some[:count])
+        wrong = bool(some[count:].any())
+        watched = [study.mechanism.coordinate(name) for name in (targets.needed(study, poses) if wrong else ())]
+        curves = Curves([*(self.outputs[k] for k in mine), *watched], study.units.angle_factor)
+        still = STILL * self._sizes(found)
+        for rows in windows(poses):
+            line = Line(study, poses, self.swept, self.valid, curves.leaves, self.ends, rows)
+            for k, name in enumerate(curves.names):
+                if curves.leaves[k].turning and name in self.arrays:
+                    line.align(k, self.arrays[name] * study.units.angle_factor)
+            for end, peak in enumerate(peaks(line, curves.curves[: len(mine)], still[mine])):
+                self._take(peak, 1 - 2 * end, still, found[end], index[end], moving, mine)
+            for end, sign in enumerate((1, -1) if wrong else ()):
+                peak = self._of_errors(line, curves.curves[len(mine) :], watched, sign, still[count:])
+                every = np.arange(count, len(some))
+                self._take(peak, sign, still, found[end], index[end], moving, every, rough=True)
+            torn |= line.torn
+        return torn
 
-    @cached_property
-    def given(self) -> list[Array]:
-        """Values of the given coordinates at the poses, in the study's units."""
-        return [np.asarray(values, dtype=float)[self.index] for values in self.poses.groups[0].columns()]
+    def _sizes(self, found: Array) -> Array:
+        """Sizes that rounding is judged by, shape (names, designs)."""
+        turn = 2 * np.pi / self.study.units.angle_factor
+        sizes = {"length": self.study.mechanism.size, "angle": turn}
+        own = [sizes.get(one.quantity, 0.0) for one in [*self.outputs, *self.errors]]
+        values = np.nan_to_num(np.abs(found[..., 0])).max(axis=0)
+        return np.maximum(np.array(own), values).T
 
-    @cached_property
-    def start(self) -> Configuration:
-        """The poses."""
-        start = starts(self.study.mechanism, self.poses, self.index) if self.plan.iterative else None
-        return self._solve(self.given, self.index, start)
+    def _take(
+        self, peak: Peak, sign: int, still: Array, found: Array, index: Indices, moving: NDArray[np.bool_],
+        which: Indices, rough: bool = False,
+    ) -> None:  # fmt: skip
+        """Put the better ones of some names into the table; where places are `rough`, only those of better values."""
+        value, still = found[:, which, 0].T, still[which]
+        best = np.where(np.isnan(value), np.inf, sign * value)
+        better = peak.better(best, index[:, which].T, still, moving[:, which].T & (not rough))
+        place = in_study_units(self.study, self.study.mechanism.coordinate(self.swept), peak.place)
+        moving[:, which] |= (better & (np.abs(peak.value - best) > still)).T
+        found[:, which] = np.where(
+            better.T[..., None], np.stack([sign * peak.value.T, place.T], axis=-1), found[:, which]
+        )
 
-    def _solve(self, given: Sequence[Array], index: NDArray[np.intp], start: Configuration | None) -> Configuration:
-        values = [radians(self.study, c, v) for c, v in zip(self.plan.structure.given, given, strict=True)]
-        return self.plan.solve(values, dimensions(self.poses, index), start=start)
+    def _of_errors(
+        self, line: Line, curves: Sequence[Curve], watched: Sequence[Coordinate], sign: int, still: Array
+    ) -> Peak:  # fmt: skip
+        """Smallest errors times a sign."""
+        study, poses = self.study, self.poses
+        held = {name: values for name, values in poses.groups[0].values.items() if name != self.swept}
+        names = [error.name for error in self.errors]
+        drive = study.mechanism.coordinate(self.swept)
 
-    def solve(self, lane: NDArray[np.intp], place: Array) -> Configuration:
-        """Some lanes with the swept coordinate elsewhere, in the study's units."""
-        given = [values[lane] for values in self.given]
-        given[self.swept_at] = place
-        found = self._solve(given, self.index[lane], self.start.take(lane))
-        near = {name: values[self.index[lane]] for name, values in self.near.items() if name not in found.counted}
-        return replace(found, near={**found.near, **near})
+        def errors(leaves: Array, row: Indices, place: Array) -> Array:
+            values = {c.name: curve(leaves, leaves)[0] for c, curve in zip(watched, curves, strict=True)}
+            values |= {name: column[row] for name, column in held.items() if name in values}
+            if self.swept in values:
+                values[self.swept] = in_study_units(study, drive, place)
+            table = np.full((len(names), len(row)), np.nan)
+            for error in targets.errors(study, poses, values, row, between=True):
+                table[names.index(error.name)] = error.values
+            return sign * table
 
-    def beside(self) -> tuple[Array, Array]:
-        """The swept coordinate at the poses before and after, in rising order; at an end, the pose itself."""
-        at = self.poses.groups[0].values[self.swept]
-        line = self.poses.count // self.poses.designs
-        row = self.index % line
-        before, after = at[self.index - (row > 0)], at[self.index + (row < line - 1)]
-        before = np.where(self.full_turn & (row == 0), at[0] - (at[line - 1] - at[line - 2]), before)
-        after = np.where(self.full_turn & (row == line - 1), at[line - 1] + (at[1] - at[0]), after)
-        return np.minimum(before, after), np.maximum(before, after)
+        def along(node: Indices, place: Array) -> Array:
+            leaves = line.near(line.sample(line.row[node], place)[0], node)
+            return errors(leaves, line.row[node], place)
 
-
-def _refined(sweep: _Sweep, outputs: Sequence[Coordinate], which: NDArray[np.intp], sign: int, sampled: Array) -> Array:
-    """Extremes where the derivative by the swept coordinate is zero, beside the pose that is the best of all.
-
-    `sampled` and the answer hold a value and a place a lane, `which` its output. Where the derivative does not change
-    its sign beside the pose (an extreme at the end of the sweep, or beside a pose that fails) the row stays. `sign` is
-    1 for the smallest values, -1 for the largest.
-    """
-    study, mechanism, plan = sweep.study, sweep.study.mechanism, sweep.plan
-    drive = mechanism.coordinate(sweep.swept)
-    unit = [float(name == sweep.swept) for name in sweep.poses.groups[0].names]
-    lanes = np.arange(len(which))
-    at = np.asarray(radians(study, drive, sweep.given[sweep.swept_at]), dtype=float)
-    low, high = (np.asarray(radians(study, drive, end), dtype=float) for end in sweep.beside())
-
-    def solve(lane: NDArray[np.intp], place: Array) -> tuple[Array, Array]:
-        """Value of some lanes' output and its derivative by the swept coordinate, times `sign`."""
-        configuration = sweep.solve(lane, np.asarray(in_study_units(study, drive, place)))
-        linear = mechanism.linearize(configuration)
-        velocity = linear.velocity(drive_velocities(mechanism, linear, plan.structure.given, unit))
-        value, slope = np.empty(lane.shape), np.empty(lane.shape)
-        for k in np.unique(which[lane]):
-            mine = which[lane] == k
-            value[mine] = np.broadcast_to(configuration.value(outputs[k]), lane.shape)[mine]
-            slope[mine] = np.broadcast_to(first(configuration, outputs[k], velocity), lane.shape)[mine]
-        valid = configuration.valid
-        return np.where(valid, value, np.nan), sign * np.where(valid, slope, np.nan)
-
-    slopes = [solve(lanes, end)[1] for end in (low, high)]
-    turns = (slopes[0] < 0) & (slopes[1] > 0)
-    if not turns.any():
-        return sampled
-    step = high - low
-    moving = np.flatnonzero(turns)
-    none = np.full(len(moving), np.nan)
-    place, value = low.copy(), np.full(len(lanes), np.nan)
-    place[moving] = bracketed_roots(
-        lambda lane, at: solve(moving[lane], at)[1],
-        low[moving], slopes[0][moving], high[moving], slopes[1][moving], none, none, PRECISION * step[moving],
-    )  # fmt: skip
-    value[moving] = solve(moving, place[moving])[0]
-    # Where the pose itself is the extreme, its place is kept as the study gives it.
-    turns &= np.isfinite(value) & (np.abs(place - at) > 1e-9 * step)
-    ends = np.asarray(radians(study, drive, sweep.poses.groups[0].values[sweep.swept]), dtype=float)
-    begin, end = ends.min(), ends.max()
-    around = np.where(place < begin, place + 2 * np.pi, np.where(place > end, place - 2 * np.pi, place))
-    place = np.where(sweep.full_turn, around, place)
-    place = np.asarray(in_study_units(study, drive, place))
-    angular = np.array([output.quantity == "angle" for output in outputs])[which]
-    value = np.where(angular, value / study.units.angle_factor, value)
-    return np.where(turns[:, None], np.stack([value, place], axis=1), sampled)
-
-
-def _refined_errors(
-    sweep: _Sweep, asked: Sequence[Error], which: NDArray[np.intp], arrays: Mapping[str, Array], sign: int,
-    sampled: Array,
-) -> Array:  # fmt: skip
-    """Extremes of errors between the poses beside the best one of all, by golden section.
-
-    A lane's row stays where nothing better is found: beside a pose that fails, or where a target is given a pose.
-    """
-    study, poses = sweep.study, sweep.poses
-    mechanism = study.mechanism
-    watched = [mechanism.coordinate(name) for name in targets.needed(study, poses)]
-    turn = 2 * np.pi / study.units.angle_factor
-    every = np.arange(len(which))
-
-    def error(place: Array) -> Array:
-        """Each lane's error, times `sign`; infinite where it has none."""
-        solved = sweep.solve(every, place)
-        held = dict(zip(poses.groups[0].names, sweep.given, strict=True)) | {sweep.swept: place}
-        values = {}
-        for c in watched:
-            value = held.get(c.name)
-            if value is None:
-                value = np.broadcast_to(np.asarray(in_study_units(study, c, solved.value(c))), place.shape)
-            values[c.name] = value
-        own = np.full(place.shape, np.nan)
-        for found in targets.errors(study, poses, values, sweep.index, between=True):
-            mine = np.array([one.name == found.name for one in asked])[which]
-            own[mine] = found.values[mine]
-        return np.where(solved.valid & np.isfinite(own), sign * own, np.inf)
-
-    place, value = lowest(error, *sweep.beside())
-    value = sign * value
-    # Where the pose itself is the extreme its place is kept as the study gives it: beside it values are equal.
-    size = {"length": mechanism.size, "angle": turn}
-    rounding = STILL * np.array([size.get(one.quantity, 0.0) for one in asked])[which]
-    better = np.isfinite(value) & (sign * (sampled[:, 0] - value) > rounding)
-    return np.where(better[:, None], np.stack([value, place], axis=1), sampled)
+        return searched(line, along, errors(line.values, line.row, line.place), still)

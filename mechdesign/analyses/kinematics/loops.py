@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,11 +10,11 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.motion_limits import Limits, as_given
 from mechdesign.analyses.kinematics.probing import Floats, Indices, probe
+from mechdesign.analyses.kinematics.transmission import BEYOND, transmission_extremes
 from mechdesign.analyses.poses import solve_poses
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
-from mechdesign.mechanism.golden import lowest
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -28,10 +27,6 @@ AT_POSE = 1e-12
 SAME = 1e-5
 # Precision of roots as a part of a step.
 FINE = 1e-13
-# An extreme between two poses must be beyond theirs by more than rounding (radians).
-BEYOND = 1e-12
-# At a smallest angle of 0 and a largest of a right angle there is a corner, found to this (radians).
-SQUARE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +54,14 @@ class _Toggle:
     cosine: float
 
 
-def loop_tables(study: Study, poses: Poses, limits: Limits | None) -> dict[str, Table]:
+def loop_tables(
+    study: Study, poses: Poses, valid: NDArray[np.bool_], limits: Limits | None
+) -> dict[str, Table]:  # fmt: skip
     """Tables ``loops`` and, where one coordinate is swept, ``toggles``; none without four-bars and slider-cranks.
 
     Parameters
     ----------
+    valid : bool array, shape (poses,)
     limits : Limits or None
         Of the motion; None where not just one coordinate is swept.
     """
@@ -71,7 +69,7 @@ def loop_tables(study: Study, poses: Poses, limits: Limits | None) -> dict[str, 
     if not loops:
         return {}
     samples = _sample(study, loops, poses, limits)
-    tables = {"loops": _loops(study, loops, samples, poses, limits)}
+    tables = {"loops": _loops(study, loops, samples, poses, valid, limits)}
     if limits is not None:
         tables["toggles"] = _toggles(study, loops, samples, poses, limits)
     return tables
@@ -113,12 +111,19 @@ def _sample(study: Study, loops: tuple[FourBar, ...], poses: Poses, limits: Limi
 
 
 def _loops(
-    study: Study, loops: tuple[FourBar, ...], samples: _Samples, poses: Poses, limits: Limits | None
+    study: Study, loops: tuple[FourBar, ...], samples: _Samples, poses: Poses, valid: NDArray[np.bool_],
+    limits: Limits | None,
 ) -> Table:  # fmt: skip
     units = study.units
     length, angle = units.label("length"), units.label("angle")
-    lowest = _extremes(loops, samples, limits, 1)
-    highest = _extremes(loops, samples, limits, -1)
+    if limits is None:
+        lowest, highest = (_at_poses(samples, sign) for sign in (1, -1))
+    else:
+        swept = limits.margins.coordinate.name
+        lowest, highest = (
+            (value[:, 0], place[:, 0])
+            for value, place in transmission_extremes(study, loops, poses, swept, valid, limits.ends)[0]
+        )
     if limits is None:
         at_unit, where = "", "row of the"
     else:
@@ -163,55 +168,13 @@ def _given(study: Study, poses: Poses, samples: _Samples, limits: Limits | None,
     return found
 
 
-def _extremes(
-    loops: tuple[FourBar, ...], samples: _Samples, limits: Limits | None, sign: int
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Smallest (`sign` 1) or largest (-1) transmission angle of each loop, and its place; also between poses."""
+def _at_poses(samples: _Samples, sign: int) -> tuple[Floats, Floats]:
+    """Smallest (`sign` 1) or largest (-1) transmission angle of each loop over the poses, and its place."""
     values = np.where(np.isnan(samples.angle), np.inf, sign * samples.angle)
-    every = np.arange(len(loops))
-    # The first of those that are the same but for rounding.
     best = (values <= values.min(axis=1, keepdims=True) + BEYOND).argmax(axis=1)
-    found, places = values[every, best], samples.place[best]
+    found = values[np.arange(len(values)), best]
     none = ~np.isfinite(found)
-    if limits is not None and values.shape[1] > 1:
-        # Beside the best pose, and beside the ends of the sweep, which may be the two sides of one.
-        last = values.shape[1] - 1
-        middle = np.stack([best, np.zeros_like(best), np.full_like(best, last)], axis=1).ravel()
-        a, b = (_beside(samples, limits, middle, np.clip(middle + step, 0, last)) for step in (-1, 1))
-        open_ = np.flatnonzero((a != b) & np.isfinite(samples.angle[0][middle]))
-        for lane, place, value in _golden(loops, limits, np.repeat(every, 3), samples.place[middle], a, b, sign, open_):
-            if value < found[lane] - BEYOND:
-                found[lane], places[lane] = value, place
-    for whole in (0.0, np.pi / 2):
-        found = np.where(np.abs(sign * found - whole) <= SQUARE, sign * whole, found)
-    return np.where(none, np.nan, sign * found), np.where(none, np.nan, places)
-
-
-def _golden(
-    loops: tuple[FourBar, ...], limits: Limits, loop: Indices, near: Floats, a: Floats, b: Floats, sign: int,
-    some: Indices,
-) -> Iterator[tuple[int, float, float]]:  # fmt: skip
-    """Loop, place and value of the smallest transmission angle (times `sign`) in `some` of the brackets."""
-    if not len(some):
-        return
-    loop, a, b = loop[some], a[some], b[some]
-    start = limits.margins.start(near[some])
-
-    def angle(x: Floats) -> Floats:
-        angles, _, _ = _values(loops, limits.margins.solve(x, start))
-        value = sign * angles[loop, np.arange(len(loop))]
-        return np.where(np.isnan(value), np.inf, value)
-
-    place, least = lowest(angle, a, b)
-    yield from zip(loop.tolist(), place.tolist(), least.tolist(), strict=True)
-
-
-def _beside(samples: _Samples, limits: Limits, middle: Indices, other: Indices) -> Floats:
-    """Places of the samples beside others; their own where the motion ends there or is slow to follow."""
-    shut = ~np.isfinite(samples.angle[0][other])
-    if limits.margins.plan.iterative:
-        shut |= samples.end[other] | samples.end[middle]
-    return np.where(shut, samples.place[middle], samples.place[other])
+    return np.where(none, np.nan, sign * found), np.where(none, np.nan, samples.place[best])
 
 
 def _toggles(

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
-from mechdesign.analyses.kinematics.rates import DriveRates, inverse_rates
+from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.smoothing import through_change_points
 from mechdesign.analyses.kinematics.targets import Error, errors, needed
-from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, radians, solve_poses
+from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, solve_poses
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
@@ -100,7 +100,6 @@ def asked(study: Study) -> Asked:
         shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
     names = dict.fromkeys([*mechanism.drives, *shown, *needed(study, poses)])
     watched = {name: mechanism.coordinate(name) for name in names}
-    rates = {*section.rates, *section.accelerations}
     return Asked(
         study,
         section,
@@ -109,7 +108,7 @@ def asked(study: Study) -> Asked:
         listed,
         section.outputs is not None and len(listed) == len(mechanism.drives),
         list((watched | angles_of([*watched.values(), *mechanism.counting])).values()),
-        not rates <= set(mechanism.drives),
+        of_given(study, section),
     )
 
 
@@ -159,25 +158,14 @@ class Motion:
         conditioning = np.where(assembled, regularity(linear), np.nan)
         self.put("conditioning", rows, conditioning)
         regular = conditioning >= STALLED
-        if self.asked.section.rates or self.asked.section.accelerations:
+        section = self.asked.section
+        if section.rates or section.accelerations or section.speed:
             self._rates(linear, solved, regular)
         if self.asked.square or self.asked.section.loads:
             self._statics(linear, rows, regular)
 
-    def _drive_rates(self, linear: Linearization, given: tuple[str, ...]) -> DriveRates:
-        study, section = self.asked.study, self.asked.section
-        names = given if self.asked.of_given else study.mechanism.drives
-        coordinates = [study.mechanism.coordinate(name) for name in names]
-        speeds, bends = (
-            [radians(study, c, known.get(c.name, 0.0)) for c in coordinates]
-            for known in (section.rates, section.accelerations)
-        )
-        if self.asked.of_given:
-            return inverse_rates(study.mechanism, linear, coordinates, speeds, bends)
-        return DriveRates(speeds, bends)
-
     def _rates(self, linear: Linearization, solved: SolvedPoses, regular: NDArray[np.bool_]) -> None:
-        drives = self._drive_rates(linear, solved.given)
+        drives = drive_rates(self.asked.study, self.asked.section, self.asked.poses, solved, linear)
         velocity = linear.velocity(drives.velocities)
         acceleration = linear.acceleration(velocity, drives.accelerations)
         configuration = linear.configuration

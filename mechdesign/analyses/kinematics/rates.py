@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.jacobians import determinant, jacobian
+from mechdesign.analyses.poses import SolvedPoses, radians
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.outputs import second
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+from mechdesign.study.reliability_models import ReliabilitySection
+from mechdesign.study.sections import KinematicsSection
 
 Array = NDArray[np.float64]
 
@@ -24,6 +29,42 @@ class DriveRates:
 
     velocities: Sequence[Value]
     accelerations: Sequence[Value]
+
+
+def of_given(study: Study, section: KinematicsSection | ReliabilitySection) -> bool:
+    """Whether a section's rates are those of the coordinates that the poses give rather than of the drives."""
+    return section.speed is not None or not {*section.rates, *section.accelerations} <= set(study.mechanism.drives)
+
+
+def drive_rates(
+    study: Study, section: KinematicsSection | ReliabilitySection, poses: Poses, solved: SolvedPoses,
+    linear: Linearization,
+) -> DriveRates:  # fmt: skip
+    """Rates of the drives at some poses, as a section asks for them: constant ones, or those of the motion.
+
+    At a speed v along the path of a point, of length s, a coordinate c that the path gives has the velocity c'(s) v
+    and the acceleration c''(s) v^2.
+
+    Parameters
+    ----------
+    linear : Linearization
+        At the solved poses.
+    """
+    inverse = of_given(study, section)
+    names = solved.given if inverse else study.mechanism.drives
+    coordinates = [study.mechanism.coordinate(name) for name in names]
+    if section.speed is None:
+        speeds, bends = (
+            [radians(study, c, known.get(c.name, 0.0)) for c in coordinates]
+            for known in (section.rates, section.accelerations)
+        )
+    else:
+        nowhere = np.full(poses.count, np.nan)
+        speeds, bends = (
+            [radians(study, c, known.get(c.name, nowhere)[solved.rows] * section.speed**order) for c in coordinates]
+            for order, known in ((1, poses.slopes), (2, poses.bends))
+        )
+    return inverse_rates(study.mechanism, linear, coordinates, speeds, bends) if inverse else DriveRates(speeds, bends)
 
 
 def inverse_rates(

@@ -1,45 +1,63 @@
-"""Smallest and largest transmission angles of the four-bars of many designs at once, where their motions are whole."""
+"""Smallest and largest transmission angles of the four-bars and slider-cranks of a mechanism over its motion."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.kinematics.loops import BEYOND, SQUARE
-from mechdesign.analyses.kinematics.probing import Floats, Indices
-from mechdesign.analyses.poses import dimensions, radians, solve_poses, starts
+from mechdesign.analyses.kinematics.boundaries import Boundary
+from mechdesign.analyses.kinematics.lines import Floats, Leaf, Line, windows
+from mechdesign.analyses.kinematics.peaks import Curve, peaks
+from mechdesign.analyses.poses import solve_poses
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import quiet
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
-from mechdesign.mechanism.golden import lowest
+from mechdesign.mechanism.rates import Rates
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
+# Angles within this of each other are one (radians).
+BEYOND = 1e-12
+# Angles this near to 0 or a right angle are that (radians): there is a corner, found to this.
+SQUARE = 1e-10
 
-def transmission_table(study: Study, poses: Poses, swept: str | None, whole: NDArray[np.bool_]) -> Table | None:
+
+def transmission_table(
+    study: Study, poses: Poses, swept: str | None, whole: NDArray[np.bool_]
+) -> tuple[Table, NDArray[np.bool_]] | None:  # fmt: skip
     """The part of table ``loops`` that a design's dimensions do not name otherwise; None without such loops.
 
     Parameters
     ----------
     swept : str or None
-        The one coordinate that moves; between the poses of its sweep the extremes are found by golden section.
+        The one coordinate that moves; the extremes between the poses of its sweep count too.
     whole : bool array, shape (designs,)
         Designs all of whose poses are valid; rows of the others are nan, as their limits of motion are not known here.
+
+    Returns
+    -------
+    (Table, bool array of shape (designs,)) or None
+        The table, with a row a design and loop, and the designs whose motion is torn between poses.
     """
     loops = four_bars(study.mechanism)
     if not loops:
         return None
-    angle = np.empty((len(loops), poses.count))
-    for solved in solve_poses(study, poses):
-        angle[:, solved.rows] = _angles(loops, solved.configuration)
-    # Lanes are designs by loops, as the rows of the table.
-    line = poses.count // poses.designs
-    values = np.moveaxis(angle.reshape(len(loops), poses.designs, line), 0, 1).reshape(-1, line)
-    keep = np.repeat(whole, len(loops))
-    found = np.full((2, len(values)), np.nan)
-    if keep.any():
-        found[:, keep] = _extremes(study, loops, poses, swept, np.flatnonzero(keep), values[keep])
+    torn = np.zeros(poses.designs, dtype=bool)
+    if swept is None:
+        angle = np.empty((len(loops), poses.count))
+        for solved in solve_poses(study, poses):
+            angle[:, solved.rows] = _angles(loops, solved.configuration)
+        each = angle.reshape(len(loops), poses.designs, -1)
+        found = [each.min(axis=2), each.max(axis=2)]
+    else:
+        valid = np.repeat(whole, poses.count // poses.designs)
+        both, torn = transmission_extremes(study, loops, poses, swept, valid)
+        found = [value for value, _ in both]
+    # Rows are designs by loops.
+    rows = [np.where(whole, part, np.nan).T.ravel() for part in found]
     words = [np.tile(np.array(names), poses.designs) for names in (
         [loop.kind for loop in loops],
         *([loop.links[k] for loop in loops] for k in range(4)),
@@ -48,9 +66,9 @@ def transmission_table(study: Study, poses: Poses, swept: str | None, whole: NDA
     names = ("kind", "frame", "input", "coupler", "output", "joints")
     unit = study.units.label("angle")
     columns = [Column(name, column) for name, column in zip(names, words, strict=True)]
-    for name, row in zip(("transmission_min", "transmission_max"), found, strict=True):
+    for name, row in zip(("transmission_min", "transmission_max"), rows, strict=True):
         columns.append(Column(name, row / study.units.angle_factor, unit))
-    return Table("loops", tuple(columns))
+    return Table("loops", tuple(columns)), torn
 
 
 @quiet
@@ -59,53 +77,52 @@ def _angles(loops: tuple[FourBar, ...], configuration: Configuration) -> Floats:
     return np.where(configuration.valid, angle, np.nan)
 
 
-def _extremes(
-    study: Study, loops: tuple[FourBar, ...], poses: Poses, swept: str | None, lanes: Indices, values: Floats
-) -> Floats:
-    """Smallest and largest value of each lane, shape (2, lanes), also between poses; as `kinematics.loops`."""
-    signs = np.array([1.0, -1.0])[:, None]
-    values = signs[:, :, None] * values
-    best = (values <= values.min(axis=2, keepdims=True) + BEYOND).argmax(axis=2)
-    found = np.take_along_axis(values, best[:, :, None], axis=2)[:, :, 0]
-    last = values.shape[2] - 1
-    if swept is not None and last > 0:
-        # Beside the best pose, and beside the ends of the sweep, which may be the two sides of one.
-        middle = np.stack([best, np.zeros_like(best), np.full_like(best, last)])
-        shape = middle.shape
-        which, sign = (np.broadcast_to(x, shape).ravel() for x in (lanes, signs))
-        between = _golden(study, loops, poses, swept, which, middle.ravel(), last, sign).reshape(shape).min(axis=0)
-        found = np.where(between < found - BEYOND, between, found)
-    found = signs * found
-    for corner in (0.0, np.pi / 2):
-        found = np.where(np.abs(found - corner) <= SQUARE, corner, found)
-    return np.asarray(found)
+def transmission_extremes(
+    study: Study, loops: Sequence[FourBar], poses: Poses, swept: str, valid: NDArray[np.bool_],
+    ends: Sequence[Boundary] = (),
+) -> tuple[list[tuple[Floats, Floats]], NDArray[np.bool_]]:  # fmt: skip
+    """Smallest and largest transmission angles over the motion along a sweep, and the designs whose motion is torn.
+
+    The square of its sine has the same extremes as the angle and is smooth where that is 0 or a right angle.
+
+    Returns
+    -------
+    (list of (ndarray, ndarray), bool array of shape (designs,))
+        Smallest and largest: angle (radians) and swept coordinate (core's units), shape (loops, designs).
+    """
+    leaves = [leaf for loop in loops for leaf in _leaves_of(loop)]
+    squares = [_leaf(2 * k) for k in range(len(loops))]
+    angles = [_leaf(2 * k + 1) for k in range(len(loops))]
+    found, torn = [], np.zeros(poses.designs, dtype=bool)
+    for rows in windows(poses):
+        line = Line(study, poses, swept, valid, leaves, ends, rows)
+        shape = (len(loops), poses.designs)
+        found.append(peaks(line, squares, np.full(shape, BEYOND), angles))
+        torn |= line.torn
+    both = []
+    for k, sign in enumerate((1, -1)):
+        values = np.stack([part[k].value for part in found])
+        places = np.stack([part[k].place for part in found])
+        best = np.where(np.isnan(values), np.inf, values).argmin(axis=0)[None]
+        value, place = (sign_ * np.take_along_axis(x, best, axis=0)[0] for sign_, x in ((sign, values), (1, places)))
+        for whole in (0.0, np.pi / 2):
+            value = np.where(np.abs(value - whole) <= SQUARE, whole, value)
+        both.append((value, place))
+    return both, torn
 
 
-def _golden(
-    study: Study, loops: tuple[FourBar, ...], poses: Poses, swept: str, lanes: Indices, middle: Indices, last: int,
-    sign: Floats,
-) -> Floats:  # fmt: skip
-    """Smallest value of each lane, times its sign, beside a pose of its sweep."""
-    group = poses.groups[0]
-    plan = study.mechanism.plan(group.names)
-    loop, row = lanes % len(loops), lanes // len(loops) * (last + 1) + middle
-    given = [
-        np.asarray(radians(study, c, v[row]), dtype=float)
-        for c, v in zip(plan.structure.given, group.columns(), strict=True)
-    ]
-    which = group.names.index(swept)
-    at = np.asarray(radians(study, plan.structure.given[which], group.values[swept]), dtype=float)
-    places = dimensions(poses, row)
-    start = None
-    if plan.iterative:
-        start = plan.solve(given, places, start=starts(study.mechanism, poses, row))
-    every = np.arange(len(lanes))
+def _leaves_of(loop: FourBar) -> list[Leaf]:
+    """The square of the sine of the transmission angle, and the angle."""
 
-    def angle(x: Floats) -> Floats:
-        held = list(given)
-        held[which] = x
-        value = sign * _angles(loops, plan.solve(held, places, start=start))[loop, every]
-        return np.where(np.isnan(value), np.inf, value)
+    def square(configuration: Configuration) -> Value:
+        return loop.squareness(configuration, 3)[0] ** 2
 
-    a, b = at[row - (middle > 0)], at[row + (middle < last)]
-    return lowest(angle, a, b)[1]
+    def slope(configuration: Configuration, velocity: Rates) -> Value:
+        sine, cosine = loop.squareness(configuration, 3)
+        return 2 * sine * cosine * loop.turning(configuration, velocity)
+
+    return [Leaf(square, slope), Leaf(loop.transmission, lambda configuration, velocity: np.nan)]
+
+
+def _leaf(k: int) -> Curve:
+    return lambda values, slopes: (values[k], slopes[k])

@@ -136,8 +136,9 @@ def tables(
     """
     one = study.poses(command)
     poses = stacked(one, designs, places, parameters)
+    torn = np.zeros(designs, dtype=bool)
     if command == "kinematics":
-        found, reason = _motion(study, wanted, poses, outputs)
+        found, reason, torn = _motion(study, wanted, poses, outputs)
     elif command == "reliability":
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
@@ -146,12 +147,13 @@ def tables(
         found, reason = stiffness.tables(study, question, poses, held), held.reason
         found = {name: table for name, table in found.items() if name in TABLES[command]}
     reason = reason.reshape(designs, one.count)
-    return Stack(Result(command, found), reason, one.listed, {"loops": np.asarray(reason.any(axis=1))})
+    return Stack(Result(command, found), reason, one.listed, {"loops": torn | reason.any(axis=1), "extremes": torn})
 
 
 def _motion(
     study: Study, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None
-) -> tuple[dict[str, Table], NDArray[np.int8]]:
+) -> tuple[dict[str, Table], NDArray[np.int8], NDArray[np.bool_]]:
+    """Tables, reasons, and the designs whose motion ends where no limit is known."""
     question = dataclasses.replace(asked(study), poses=poses)
     motion = move(question)
     made = {name: make for name, make in _OF_MOTION.items() if name in wanted}
@@ -160,10 +162,13 @@ def _motion(
     if not question.square:
         made.pop("jacobian", None)
     found = {name: make(motion) for name, make in made.items()}
+    torn = np.zeros(poses.designs, dtype=bool)
     if "extremes" in wanted:
-        found["extremes"] = kinematics.extremes_table(motion, outputs)
+        found["extremes"], torn = kinematics.extremes_table(motion, names=outputs)
     if "loops" in wanted:
         failed = np.asarray(motion.reason.reshape(poses.designs, -1).any(axis=1))
         loops = transmission_table(study, poses, kinematics.swept_of(poses), ~failed)
-        found |= {} if loops is None else {"loops": loops}
-    return found, motion.reason
+        if loops is not None:
+            found["loops"], more = loops
+            torn = torn | more
+    return found, motion.reason, torn

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.poses import in_study_units, judge_failures, solve_poses
+from mechdesign.analyses.kinematics.rates import drive_rates
+from mechdesign.analyses.poses import SolvedPoses, in_study_units, judge_failures, solve_poses
 from mechdesign.analyses.reliability import sobol, tables
 from mechdesign.analyses.reliability.allocation import Allocated, allocate
 from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.comparison import disagreements
 from mechdesign.analyses.reliability.cycle import notes, with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
-from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
+from mechdesign.analyses.reliability.first_order import FirstOrder, Rates, linear_errors, nominal_values
 from mechdesign.analyses.reliability.methods import METHODS, MOST, Found, Partial, Task, analytic
 from mechdesign.analyses.reliability.question import Question, ask
 from mechdesign.analyses.reliability.shortfalls import pointless, unassembled, unreached
@@ -169,13 +170,13 @@ class NominalPoses:
     reason : int8 array, shape (poses,)
     groups : tuple
         Per group of poses that give the same coordinates: rows, configuration, drives (n, drives), whether the
-        drives were given.
+        drives were given, and the drives' rates.
     values : ndarray, shape (channels, poses)
         Radians and lengths.
     """
 
     reason: NDArray[np.int8]
-    groups: tuple[tuple[NDArray[np.intp], Configuration, Floats, bool], ...]
+    groups: tuple[tuple[NDArray[np.intp], Configuration, Floats, bool, Rates], ...]
     values: Floats
 
     @staticmethod
@@ -186,11 +187,13 @@ class NominalPoses:
         for solved in solve_poses(study, poses, [channel.coordinate for channel in question.channels]):
             configuration = solved.configuration
             reason[solved.rows] = configuration.reason
-            found = nominal_values(study.mechanism, configuration, question.channels, question.rates)
+            rates = _rates(study, poses, question, solved)
+            found = nominal_values(study.mechanism, configuration, question.channels, rates)
             for row, value in zip(values, found, strict=True):
                 row[solved.rows] = value
             drives = np.stack([np.broadcast_to(d, configuration.shape) for d in solved.drives], axis=-1)
-            groups.append((solved.rows, configuration, drives, set(solved.given) == set(study.mechanism.drives)))
+            forward = set(solved.given) == set(study.mechanism.drives)
+            groups.append((solved.rows, configuration, drives, forward, rates))
         return NominalPoses(reason, tuple(groups), values)
 
     @property
@@ -199,13 +202,22 @@ class NominalPoses:
         return np.isin(self.reason, (Reason.OK, Reason.LIMIT))
 
 
+def _rates(study: Study, poses: Poses, question: Question, solved: SolvedPoses) -> Rates:
+    """Rates of the drives at some poses, at which they are held for made mechanisms too; none where none are asked."""
+    section = study.reliability
+    if section is None or question.orders == 1:
+        return Rates((), ())
+    found = drive_rates(study, section, poses, solved, study.mechanism.linearize(solved.configuration))
+    return Rates(tuple(found.velocities), tuple(found.accelerations))
+
+
 def loaded(study: Study, nominal: NominalPoses, question: Question) -> tuple[NominalPoses, Elastic | None, list[str]]:
     """Deflections at every pose where the study has a load, poses that do not hold it marked, and what is doubtful."""
     bent, notes = elasticity(study)
     if bent is None:
         return nominal, None, notes
     flexibility = np.full((len(question.channels), 3, len(nominal.reason)), np.nan)
-    for rows, configuration, _, _ in nominal.groups:
+    for rows, configuration, *_ in nominal.groups:
         for begin in range(0, len(rows), _BLOCK):
             block = np.arange(begin, min(begin + _BLOCK, len(rows)))
             part = bent.at(configuration.take(block), question.channels)
@@ -221,12 +233,12 @@ def first_order(
     """Linear error model at every pose; nan where the pose is not assembled."""
     parts: FirstOrder | None = None
     components = np.zeros((len(question.channels), 0, 0))
-    for rows, configuration, _, _ in nominal.groups:
+    for rows, configuration, _, _, rates in nominal.groups:
         for begin in range(0, len(rows), _BLOCK):
             block = np.arange(begin, min(begin + _BLOCK, len(rows)))
             with np.errstate(invalid="ignore", divide="ignore"):
                 parts = linear_errors(
-                    study.mechanism, configuration.take(block), question.channels, sources, question.rates,
+                    study.mechanism, configuration.take(block), question.channels, sources, rates.take(block),
                     None if elastic is None else elastic.take(rows[block]),
                 )  # fmt: skip
             if not components.size:
@@ -244,7 +256,7 @@ def _settings(
     mean, sigma = linear.shift(), linear.deviation()
     assembled = np.flatnonzero(nominal.assembled)
     settings = []
-    for rows, configuration, drives, given in nominal.groups:
+    for rows, configuration, drives, given, rates in nominal.groups:
         for k, row in enumerate(rows):
             if not nominal.assembled[row]:
                 continue
@@ -262,7 +274,7 @@ def _settings(
                     drives[k].tolist(),
                     question.channels,
                     nominal.values[:, row].tolist(),
-                    question.rates,
+                    rates.take(k),
                     question.bands,
                     question.discs,
                     question.pair,

@@ -38,10 +38,18 @@ class Channel:
 
 @dataclass(frozen=True)
 class Rates:
-    """Rates and accelerations of the drives (radians and lengths per time)."""
+    """Rates and accelerations of the drives (radians and lengths per time): numbers, or arrays over poses."""
 
-    velocity: tuple[float, ...]
-    acceleration: tuple[float, ...]
+    velocity: tuple[Value, ...]
+    acceleration: tuple[Value, ...]
+
+    def take(self, index: NDArray[np.intp] | int) -> Rates:
+        """Those of some poses, or of one."""
+
+        def part(values: tuple[Value, ...]) -> tuple[Value, ...]:
+            return tuple(value if np.ndim(value) == 0 else value[index] for value in values)
+
+        return Rates(part(self.velocity), part(self.acceleration))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ import numpy as np
 from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, radians
 from mechdesign.analyses.reliability.error_limits import Band, Disc
-from mechdesign.analyses.reliability.first_order import Channel, Rates
-from mechdesign.errors import MechanismError, StudyError
+from mechdesign.analyses.reliability.first_order import Channel
+from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.study import Study
@@ -34,7 +34,6 @@ class Question:
     outputs: tuple[Coordinate, ...]
     orders: int
     channels: tuple[Channel, ...]
-    rates: Rates
     bands: tuple[Band, ...]
     discs: tuple[Disc, ...]
     pair: tuple[int, int] | None
@@ -59,16 +58,7 @@ def ask(study: Study, section: ReliabilitySection) -> Question:
     known = [output.name for output in outputs]
     outputs += expand_outputs(study, tuple(dict.fromkeys(name for name in limited if name not in known)))
     known = [output.name for output in outputs]
-    for name in section.rates | section.accelerations:
-        if name not in mechanism.drives:
-            raise StudyError(
-                f"reliability.rates: '{name}' is not a drive; the drives are {', '.join(mechanism.drives)}"
-            )
-    rates = Rates(*(
-        tuple(float(radians(study, mechanism.coordinate(name), given.get(name, 0.0))) for name in mechanism.drives)
-        for given in (section.rates, section.accelerations)
-    ))  # fmt: skip
-    orders = 3 if section.rates or section.accelerations else 1
+    orders = 3 if section.rates or section.accelerations or section.speed else 1
     bands, discs = [], []
     for base, order, limit in limits:
         begin = order * len(outputs)
@@ -88,7 +78,7 @@ def ask(study: Study, section: ReliabilitySection) -> Question:
     elif not limited and len(outputs) == 2:
         pair = (0, 1)
     channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
-    return Question(tuple(outputs), orders, channels, rates, tuple(bands), tuple(discs), pair)
+    return Question(tuple(outputs), orders, channels, tuple(bands), tuple(discs), pair)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:

@@ -62,6 +62,8 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
             for point in link_points(link):
                 owners.setdefault(point, name)
     for point, path in sweep.places.items():
+        if sweep.closed:
+            path = np.append(path, path[0])
         line, share = _LOOKS[min(ranked[point] + lift, 2)]
         axes.plot(
             path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,
