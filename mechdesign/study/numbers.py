@@ -21,9 +21,9 @@ from mechdesign.expressions import RESERVED, Expression, ExpressionError
 from mechdesign.study.units import QUANTITY, Powers, QuantityError, Units, measure
 
 NAME = re.compile(r"[^\W\d]\w*")
-LARGEST, SMALLEST = 1e100, 1e-100
+LARGEST, SMALLEST = 1e60, 1e-60
 """Magnitudes beyond which a number is a slip of writing: its square or reciprocal would soon overflow."""
-LONGEST, SHORTEST = 1e30, 1e-30
+LONGEST, SHORTEST = 1e15, 1e-15
 """The same for lengths, which are multiplied with one another more often."""
 COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 
