@@ -21,6 +21,10 @@ from mechdesign.expressions import RESERVED, Expression, ExpressionError
 from mechdesign.study.units import QUANTITY, Powers, QuantityError, Units, measure
 
 NAME = re.compile(r"[^\W\d]\w*")
+LARGEST, SMALLEST = 1e60, 1e-60
+"""Magnitudes beyond which a number is a slip of writing: its square or reciprocal would soon overflow."""
+LONGEST, SHORTEST = 1e15, 1e-15
+"""The same for lengths, which are multiplied with one another more often."""
 COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 
 
@@ -113,10 +117,19 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Value
     Raises
     ------
     PydanticCustomError
-        Where it is none of them, not finite, or a quantity of another kind than `kind`.
+        Where it is none of them, not finite, too large, or a quantity of another kind than `kind`.
     """
     if isinstance(raw, Value):
         return raw
+    value = _read(raw, context, kind)
+    largest = LONGEST if kind == "length" else LARGEST
+    if abs(value.nominal) > largest:
+        what = "length" if kind == "length" else "number"
+        raise failure(f"{shown(raw)} is too large a {what}: none is beyond {largest:g}; choose a larger unit")
+    return value
+
+
+def _read(raw: object, context: Context, kind: str | None) -> Value:
     if isinstance(raw, bool) or not isinstance(raw, int | float | str):
         raise failure(f"expected a number, not {shown(raw)}")
     if isinstance(raw, str):
@@ -197,6 +210,9 @@ class Reader:
     def _check_minimum(self, number: float) -> None:
         if self.minimum is None or math.isnan(number):
             return
+        smallest = SHORTEST if self.kind == "length" else SMALLEST
+        if 0 < number < smallest:
+            raise failure(f"{number:g} is too small a number: none but 0 is below {smallest:g}; choose a smaller unit")
         if number < self.minimum or (self.exclusive and number == self.minimum):
             what = "positive" if self.minimum == 0 and self.exclusive else f"at least {self.minimum:g}"
             raise failure(f"must be {what}, not {number:g}")

@@ -43,10 +43,18 @@ _PER_RADIAN = frozenset(name for name in KINDS if name.endswith(("stiffness", "c
 
 _FACTOR = r"\(?[A-Za-zµμ°]+(?:\s*(?:\^|\*\*)\s*-?\d)?\)?"
 QUANTITY = re.compile(
-    r"\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
-    rf"(?P<unit>(?:1\s*/\s*)?{_FACTOR}(?:\s*[*/·\s]\s*{_FACTOR})*)\s*"
+    r"\s*(?P<number>[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+    rf"(?P<unit>(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)\s*"
 )
-"""A number and a unit; digits occur in a unit only as powers, so that nothing large can be computed by it."""
+"""A number and a unit; digits occur in a unit only as powers, so that nothing large can be computed by it.
+
+No text matches in two ways: what does not match is found out in time that grows with its length.
+"""
+
+MAX_LENGTH = 60
+"""Longest text of a unit, in characters."""
+MAX_POWER = 9
+"""Highest power of length, angle, time or force in a unit."""
 
 _DEFINITIONS = """
 kilo- = 1000 = k-
@@ -196,7 +204,12 @@ def measure(text: str) -> tuple[float, Powers, float]:
     match = QUANTITY.fullmatch(text)
     if match is None:
         raise QuantityError(f"{text!r} is not a number with a unit")
-    powers, factor = _common(match["unit"]) or _unit(match["unit"])
+    unit = match["unit"]
+    if len(unit) > MAX_LENGTH:
+        raise QuantityError(f"{unit[:MAX_LENGTH]!r}... is no unit: none is longer than {MAX_LENGTH} characters")
+    powers, factor = _common(unit) or _unit(unit)
+    if max(map(abs, powers)) > MAX_POWER:
+        raise QuantityError(f"{unit!r} is no unit: it is {describe(powers)}, and no power is beyond {MAX_POWER}")
     return float(match["number"]), powers, factor
 
 

@@ -100,3 +100,22 @@ def test_common_units_are_those_of_the_registry(text: str) -> None:
     assert (number, powers) == (float(text.split()[0]), unit_rules._unit(unit)[0])
     assert factor == pytest.approx(unit_rules._unit(unit)[1], rel=1e-14)
     assert unit_rules._common(unit) is not None
+
+
+@pytest.mark.parametrize("unit", ["*".join(["km"] * 100), "/".join(["mm"] * 100), " ".join(["m"] * 110), "a" * 3000])
+@pytest.mark.parametrize("number", ["3", "1e300", "0"])
+def test_a_unit_of_a_hundred_factors(number, unit):
+    with pytest.raises(QuantityError, match="is no unit: none is longer than 60 characters"):
+        Units().convert(f"{number} {unit}")
+
+
+@pytest.mark.parametrize("unit", ["km^9*km^9", "nm**-9 / nm", "1/ms^9/ms"])
+@pytest.mark.parametrize("length", ["nm", "Gm"])
+def test_a_power_that_no_quantity_has(length, unit):
+    with pytest.raises(QuantityError, match="no power is beyond 9"):
+        Units(length=length).convert(f"3 {unit}")
+
+
+@pytest.mark.parametrize("text", ["3 m" + "  m" * 1000 + "!", "3" * 5000 + "!", "3 m" + " m ^" * 1000])
+def test_what_is_no_quantity_is_found_out_at_once(text):
+    assert unit_rules.QUANTITY.fullmatch(text) is None

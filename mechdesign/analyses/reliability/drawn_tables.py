@@ -37,7 +37,7 @@ def density(answer: Answer) -> Table | None:
     rows, normal, simulated, scales, means = [], [], [], [], []
     covariance, shift = linear.covariance(), linear.shift()
     for row, sums in sorted(answer.sums.items()):
-        if not len(sums.density):
+        if not len(sums.density) or not sums.counted:
             continue
         block = covariance[row][np.ix_(pair, pair)]
         rho, rest = correlation(block), 1.0 - correlation(block) ** 2
