@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 # Solves poses with given values near rows of a study's, both of one shape.
 Solve = Callable[[Sequence[Array], NDArray[np.intp]], Configuration]
 
+# An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
+ON_THE_CUT = 1e-9
 # Poses on the way that are solved at once.
 CHUNK = 65536
 # What an angle may turn between neighbouring poses so that the way round is certain.
@@ -66,6 +68,7 @@ def continuous(
     starts = np.concatenate([[True], ~together])
     heads = np.maximum.accumulate(np.where(starts, np.arange(len(known)), 0))
     total -= total[:, heads]
+    total += values[:, known[heads]] < ON_THE_CUT - np.pi
     found = values.copy()
     found[:, known] += TURN * total
     return np.stack([_across(row, poses.grid) for row in found])

@@ -125,21 +125,20 @@ def _begun(study: Study, poses: Poses, drive: str, values: Array) -> Array:
     """A drive's values in each design in the turn that leaves it within its limits, else near the sketch's value."""
     mechanism = study.mechanism
     drawn = float(mechanism.sketch_configuration.value(mechanism.coordinate(drive)))
-    found = values.reshape(poses.designs, -1).copy()
-    for design, row in enumerate(found):
-        known = row[np.isfinite(row)]
-        if not len(known):
-            continue
-        turns = np.round((drawn - known[0]) / TURN)
-        sizes = mechanism.nominal | {name: v[design * len(row)] for name, v in poses.places.items()}
-        for low, high in (bound.ends(sizes) for bound in mechanism.bounds if bound.drive and bound.of_angle
-                          and bound.coordinate.name == drive):  # fmt: skip
-            # All of the motion if it fits, or else its begin.
-            for some in (known[:1], known):
-                fewest, most = np.ceil((low - some.min()) / TURN), np.floor((high - some.max()) / TURN)
-                turns = np.clip(turns, fewest, most) if fewest <= most else turns
-        row += TURN * turns
-    return found.ravel()
+    lines = values.reshape(poses.designs, -1)
+    known = np.isfinite(lines)
+    begin = np.take_along_axis(lines, known.argmax(axis=1)[:, None], axis=1)[:, 0]
+    smallest, largest = (f(np.where(known, lines, begin[:, None]), axis=1) for f in (np.min, np.max))
+    turns = np.round((drawn - begin) / TURN)
+    sizes = mechanism.nominal | {name: place[:: lines.shape[1]] for name, place in poses.places.items()}
+    for bound in mechanism.bounds:
+        if bound.drive and bound.of_angle and bound.coordinate.name == drive:
+            low, high = bound.ends(sizes)
+            # All of the motion where it fits, or else its begin.
+            for least, most in ((begin, begin), (smallest, largest)):
+                fewest, greatest = np.ceil((low - least) / TURN), np.floor((high - most) / TURN)
+                turns = np.where(fewest <= greatest, np.clip(turns, fewest, greatest), turns)
+    return np.asarray(lines + TURN * turns[:, None]).ravel()
 
 
 def dimensions(poses: Poses, rows: NDArray[np.intp]) -> dict[str, Value]:

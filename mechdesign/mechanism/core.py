@@ -58,30 +58,24 @@ class Core:
         places = {**self.nominal, **configuration.places}
         return [margin for bound in self.bounds for margin in bound.margins(configuration, places)]
 
-    def turns(self, places: Mapping[str, Value], *, drawn: bool = False) -> dict[str, Value]:
-        """Values that angles lie within half a turn of (see `mechdesign.mechanism.turns`): drives within their limits.
-
-        Parameters
-        ----------
-        drawn : bool
-            Whether the other angles of drives and expressions are told near those of the sketch.
-        """
-        near: dict[str, Value] = dict(self._drawn_angles) if drawn else {}
-        sizes = {**self.nominal, **places}
+    def turns(self, places: Mapping[str, Value]) -> dict[str, Value]:
+        """Values that drives' angles lie within half a turn of, so that they lie within their limits."""
+        sizes = {**self.nominal, **places} if places else self.nominal
+        near: dict[str, Value] = {}
         for bound in self.bounds:
             near |= bound.turn(sizes)
         return near
+
+    def drawn_angles(self) -> dict[str, float]:
+        """Angles of drives and in measures and limits as the sketch has them (radians)."""
+        named = [self.coordinate(name) for name in (*self.description.drives, *self.description.measures)]
+        found = angles_of([*named, *(bound.coordinate for bound in self.bounds)])
+        return {name: float(self.sketch_configuration.value(angle)) for name, angle in found.items()}
 
     @cached_property
     def counting(self) -> tuple[Coordinate, ...]:
         """Coordinates of the limits that depend on the turns of angles."""
         return tuple(bound.coordinate for bound in self.bounds if bound.counts(self.nominal))
-
-    @cached_property
-    def _drawn_angles(self) -> dict[str, float]:
-        named = [self.coordinate(name) for name in (*self.description.drives, *self.description.measures)]
-        found = angles_of([*named, *(bound.coordinate for bound in self.bounds)])
-        return {key: float(self.sketch_configuration.value(angle)) for key, angle in found.items()}
 
     def _bound(self, limit: Limit, index: int) -> Bound:
         if limit.kind == "distance":

@@ -50,11 +50,13 @@ class Bound:
             if self.coordinate.quantity == "angle" and low is not None and high is not None:
                 half = (high - low) / 2
                 away = value - (low + half)
-                if self.coordinate.name in configuration.counted:
-                    judged = away if self.drive else np.where(half >= np.pi, away, wrap(away))
-                    return [(self.label, half - np.abs(judged))]
-                # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
-                return [(self.label, np.where(half >= np.pi, np.pi, half - np.abs(wrap(away))))]
+                whole = half >= np.pi
+                # A drive is told within its limits, if it can be, or as it is given.
+                margin = half - np.abs(away if self.drive else np.where(whole, away, wrap(away)))
+                if self.coordinate.name not in configuration.counted:
+                    # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
+                    margin = np.where(whole, np.pi, margin)
+                return [(self.label, margin)]
         found = []
         if low is not None:
             found.append((f"{self.label} min", value - low))

@@ -101,8 +101,10 @@ class Margins:
         given[self.which] = place
         found = self.plan.solve(given, start=start, limits=False)
         near = {name: self._between(values, place) for name, values in self.near.items()}
-        counted = found.counted | near.keys() if self.counted else frozenset()
-        found = replace(found, near={**found.near, **near}, counted=counted)
+        if self.counted:
+            found = replace(found, near={**found.near, **near}, counted=found.counted | near.keys())
+        else:
+            found = replace(found, near={**found.near, **near, **self.mechanism.turns({})}, counted=frozenset())
         if limits:
             self.plan.judge(found)
         return found

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +103,11 @@ class Atlas:
     def empty(self) -> bool:
         """Whether the held values cannot be had at the point's place in the sketch, where poses would grow from."""
         return not self.known[b""].tree.n
+
+    @cached_property
+    def _drawn(self) -> dict[str, float]:
+        """Angles of the sketch: others lie within half a turn of them."""
+        return self.plan.mechanism.drawn_angles()
 
     @property
     def spacing(self) -> float:
@@ -274,7 +280,7 @@ class Atlas:
         return Configuration(
             graph, vectors, shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros(shape, dtype=np.int8), places,
-            self.plan.core.turns(places, drawn=True) | self.plan.turns([0.0, 0.0, *self.approach.held], places),
+            self._drawn | self.plan.turns([0.0, 0.0, *self.approach.held], places),
         )  # fmt: skip
 
     def _open(self, state: State, shape: tuple[int, ...]) -> Flags:

@@ -157,7 +157,7 @@ def _pieces(study: Study, drive: str) -> tuple[Margins, list[Piece]]:
     place = np.linspace(low, high, number) / (unit if turning else 1.0)
     group = PoseGroup((drive,), {drive: place}, np.arange(number))
     # The whole path is wanted, however many turns the limits leave the drive.
-    near = {name: np.full(number, value) for name, value in mechanism.turns({}, drawn=True).items()}
+    near = {name: np.full(number, value) for name, value in mechanism.drawn_angles().items()}
     margins = Margins(study, group, drive, near, counted=False)
     valid = margins.solve(margins.at).valid
     ends = boundaries(margins, valid)[0]
