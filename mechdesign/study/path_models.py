@@ -122,6 +122,11 @@ class Path(Model):
         False, description="whether a smooth curve (a cubic spline) is laid through the points, closed where they are"
     )
 
+    @property
+    def shape(self) -> str | None:
+        """Which figure of the plane it is; None for what is listed."""
+        return next((key for key in ("circle", "arc", "line") if getattr(self, key) is not None), None)
+
     @model_validator(mode="before")
     @classmethod
     def _short(cls, raw: Any) -> Any:
@@ -139,7 +144,9 @@ class Path(Model):
         if self.spline and not listed:
             raise failure(f"{given[0]!r} is smooth already: 'spline' is for a list of points")
         if self.points is not None and listed and not self.spline:
-            raise failure("a list of points has its own number; 'points' goes with a spline, a circle, an arc or a line")
+            raise failure(
+                "a list of points has its own number; 'points' goes with a spline, a circle, an arc or a line"
+            )
         return self
 
     @classmethod

@@ -72,7 +72,12 @@ def kinematics(
     progress.start(poses.count, "poses")
     motion = move(question, progress)
     warnings, failed = judge_failures(study, poses, motion.reason)
-    warnings += _conditioning(motion) + _stalled(motion) + _astray(motion) + targets.gaps(study, motion.errors, poses, motion.valid)
+    warnings += (
+        _conditioning(motion)
+        + _stalled(motion)
+        + _astray(motion)
+        + targets.gaps(study, motion.errors, poses, motion.valid)
+    )
     tables = {"motion": motion_table(motion)}
     swept, limits = swept_of(poses), None
     if swept is not None:

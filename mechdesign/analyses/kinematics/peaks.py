@@ -98,7 +98,7 @@ def peaks(
     which, curve, segment = np.nonzero([
         some & (sign * one < 0) & (sign * other > 0) for sign, some in zip(signs, likely, strict=True)
     ])  # fmt: skip
-    sign = np.array(signs)[which]
+    times = np.array(signs)[which]
 
     def at(which: Sequence[Curve], lane: Indices, x: Floats) -> tuple[Floats, Floats]:
         return _at(line, which, curve[lane], line.begin[segment[lane]], x)
@@ -106,13 +106,13 @@ def peaks(
     low, high = line.place[line.begin[segment]], line.place[line.end[segment]]
     none = np.full(len(segment), np.nan)
     # Along the sweep, whichever way it goes.
-    ahead = sign * np.sign(high - low)
+    ahead = times * np.sign(high - low)
     place = bracketed_roots(
         lambda lane, x: ahead[lane] * at(curves, lane, x)[1],
-        low, (sign * one[curve, segment]), high, (sign * other[curve, segment]), none, none,
+        low, times * one[curve, segment], high, times * other[curve, segment], none, none,
         PRECISION * np.abs(high - low),
     )  # fmt: skip
-    value = sign * at(told or curves, np.arange(len(segment)), place)[0]
+    value = times * at(told or curves, np.arange(len(segment)), place)[0]
     first = line.position[line.begin[segment]]
     position = first + (place - low) / (high - low) * (line.position[line.end[segment]] - first)
     if told is not None:
@@ -225,4 +225,5 @@ def _first_smallest(
     for table, column in zip(found, (value, place, position), strict=True):
         table[lanes] = column[best]
     nodes[lanes] = node[best]
-    return Peak(*(table.reshape(shape) for table in found), nodes.reshape(shape))
+    best_value, best_place, best_position = (table.reshape(shape) for table in found)
+    return Peak(best_value, best_place, best_position, nodes.reshape(shape))
