@@ -60,7 +60,8 @@ def arc(given: Arc, points: int | None, turn: float) -> Course:
 def _round(center: complex, radius: float, angles: Floats, sign: float, *, closed: bool) -> Course:
     outward: Plane = np.exp(1j * angles)
     way = radius * np.abs(angles - angles[0])
-    return Course(center + radius * outward, way, sign * 1j * outward, -outward / radius, closed)
+    places: Plane = center + radius * outward
+    return Course(places, way, sign * 1j * outward, -outward / radius, closed)
 
 
 def line(begin: complex, end: complex, points: int | None) -> Course:
