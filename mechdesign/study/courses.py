@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -57,9 +58,10 @@ def arc(given: Arc, points: int | None, turn: float) -> Course:
 
 
 def _round(center: complex, radius: float, angles: Floats, sign: float, *, closed: bool) -> Course:
-    outward = np.exp(1j * angles)
+    outward: Plane = np.exp(1j * angles)
     way = radius * np.abs(angles - angles[0])
-    return Course(center + radius * outward, way, sign * 1j * outward, -outward / radius, closed)
+    places: Plane = center + radius * outward
+    return Course(places, way, sign * 1j * outward, -outward / radius, closed)
 
 
 def line(begin: complex, end: complex, points: int | None) -> Course:
@@ -99,7 +101,7 @@ def spline(places: Plane, points: int | None) -> Course:
         plane: Plane = found[:, 0] + 1j * found[:, 1]
         return plane
 
-    fine = np.unique(np.concatenate([np.linspace(a, b, PIECES + 1) for a, b in zip(knots, knots[1:], strict=False)]))
+    fine = np.unique(np.concatenate([np.linspace(a, b, PIECES + 1) for a, b in pairwise(knots)]))
     nodes, weights = np.polynomial.legendre.leggauss(4)
     middle, half = (fine[1:] + fine[:-1]) / 2, np.diff(fine) / 2
     speeds = np.abs(at((middle[:, None] + half[:, None] * nodes).ravel(), 1)).reshape(len(middle), -1)

@@ -122,6 +122,11 @@ class Path(Model):
         False, description="whether a smooth curve (a cubic spline) is laid through the points, closed where they are"
     )
 
+    @property
+    def shape(self) -> str | None:
+        """Which figure of the plane it is; None for what is listed."""
+        return next((key for key in ("circle", "arc", "line") if getattr(self, key) is not None), None)
+
     @model_validator(mode="before")
     @classmethod
     def _short(cls, raw: Any) -> Any:

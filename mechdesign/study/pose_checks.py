@@ -37,9 +37,13 @@ def coordinates(checker: Checker, command: str, section: PoseSection) -> None:
         for key in ("from", "to", "step"):
             if quantity in ("length", "angle"):
                 checker.kind((*path, key), quantity)
-    for name in section.path or ():
-        if name not in checker.names.owners:
-            checker.coordinate(name, (command, "path", name), at_key=True)
+    for name, given in (section.path or {}).items():
+        if name in checker.names.owners:
+            continue
+        place: Path = (command, "path", name)
+        if checker.coordinate(name, place, at_key=True) is not None and (given.spline or given.shape is not None):
+            what = "spline" if given.spline else f"{given.shape}"
+            checker.reporter.report(place, f"{name!r} is no point: a {what} is the path of a point", at_key=True)
 
 
 def _given(

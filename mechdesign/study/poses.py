@@ -202,7 +202,9 @@ def _path(path: Mapping[str, PathModel], folder: Path, turn: float) -> Poses:
     for owner in {name.rpartition(".")[0] for name in columns if name.endswith(".x")} - set(found):
         if f"{owner}.y" in columns:
             found[owner] = courses.polyline(values[f"{owner}.x"] + 1j * values[f"{owner}.y"])
-    slopes, bends, closed = {}, {}, False
+    slopes: dict[str, Floats] = {}
+    bends: dict[str, Floats] = {}
+    closed = False
     # The way of a point that stays where it is says nothing.
     moving = {owner: course for owner, course in found.items() if len(course.places) == count and course.way[-1] > 0}
     if len(moving) == 1:
@@ -216,8 +218,6 @@ def _path(path: Mapping[str, PathModel], folder: Path, turn: float) -> Poses:
 def _course(name: str, given: PathModel, folder: Path, turn: float) -> courses.Course | Floats:
     """The path of a point, or the values of a coordinate."""
     point = "." not in name
-    if not point and any(shape is not None for shape in (given.circle, given.arc, given.line)):
-        raise StudyError(f"path: {name!r} is no point: a circle, an arc or a line is the path of a point")
     if given.circle is not None:
         return courses.circle(given.circle, given.points, turn)
     if given.arc is not None:
@@ -235,8 +235,6 @@ def _course(name: str, given: PathModel, folder: Path, turn: float) -> courses.C
         if len(places) < 3 or not np.diff(places).all():
             raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
         return courses.spline(places, given.points)
-    if given.spline:
-        raise StudyError(f"path: a spline is the path of a point, through a list of [x, y], not of {name!r}")
     if table.ndim == 1 or table.shape[1] == 1:
         return np.asarray(table.reshape(-1))
     raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
@@ -245,8 +243,9 @@ def _course(name: str, given: PathModel, folder: Path, turn: float) -> courses.C
 def _along(
     values: Mapping[str, Floats], owner: str, course: courses.Course
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:  # fmt: skip
-    """Derivatives of all coordinates by the length of a point's path; what is listed beside it changes evenly between."""
-    slopes, bends = {}, {}
+    """Derivatives of all coordinates by the length of a point's path; those listed beside it change evenly between."""
+    slopes: dict[str, Floats] = {}
+    bends: dict[str, Floats] = {}
     for name, column in values.items():
         if name in (f"{owner}.x", f"{owner}.y"):
             part = np.real if name.endswith(".x") else np.imag

@@ -91,12 +91,119 @@ def test_accelerations_are_zero_where_only_rates_are_given() -> None:
     check_row(study, table, 1, {"P.x": (5, 2, 0), "P.y": (11, -0.5, 0)}, ["t1", "t2"])
 
 
-def test_drive_rates_on_an_inverse_path_are_drive_rates() -> None:
-    study = study_of(ARM.replace("{P.x: 2, P.y: -0.5}", "{t1: 5}").replace("{P.x: 0.3, P.y: 1}", "{t2: 3}"))
+def test_drive_rates_at_poses_by_outputs_are_drive_rates() -> None:
+    text = ARM.replace("{P.x: 2, P.y: -0.5}", "{t1: 5}").replace("{P.x: 0.3, P.y: 1}", "{t2: 3}")
+    study = study_of(
+        text.replace("path: {P: [[3, 12], [5, 11], [9, 9]]}", "poses: [{P.x: 3, P.y: 12}, {P.x: 5, P.y: 11}]")
+    )
     table = kinematics(study).tables["motion"]
     pose = study.mechanism.solve({"P.x": 5, "P.y": 11})
     check_row(study, table, 1, {"t1": (pose["t1"], 5, 0), "t2": (pose["t2"], 0, 3)}, ["P.x", "P.y", "E.y"])
     assert "t1_velocity" not in table
+
+
+@pytest.mark.parametrize("poses", ["path: {P: [[3, 12], [5, 11]]}", "sweep: {P.x: {from: 3, to: 5, step: 1}, P.y: 11}"])
+@pytest.mark.parametrize("question", ["kinematics", "reliability"])
+def test_drive_rates_along_a_motion_by_outputs_are_refused(poses: str, question: str) -> None:
+    varied = "dimensions: {upper.length: 0.1}, " if question == "reliability" else ""
+    text = f"{ARM.partition('kinematics')[0]}{question}: {{{varied}{poses}, rates: {{t1: 5}}}}\n"
+    with pytest.raises(StudyError, match="rates of drives that do not change are not those"):
+        study_of(text)
+
+
+def on_path(path: str, speed: str = "7 mm/s") -> Table:
+    text = f"{ARM.partition('kinematics')[0]}kinematics: {{path: {{P: {path}}}, speed: {speed}}}\n"
+    return kinematics(study_of(text)).tables["motion"]
+
+
+def vectors(table: Table, order: str = "") -> np.ndarray:
+    return table[f"P.x{order}"] + 1j * table[f"P.y{order}"]
+
+
+def test_a_circle_at_a_speed() -> None:
+    table = on_path("{circle: {center: [8, 6], radius: 2 mm, from: 90}, points: 12}", "0.7 cm/s")
+    outward = np.exp(1j * np.radians(90 + 30 * np.arange(12)))
+    assert vectors(table) == pytest.approx(8 + 6j + 2 * outward)
+    assert vectors(table, "_velocity") == pytest.approx(7j * outward)
+    assert vectors(table, "_acceleration") == pytest.approx(-49 / 2 * outward)
+
+
+def test_arcs_and_lines_at_a_speed() -> None:
+    table = on_path("{arc: {center: [8, 6], radius: 2, from: 90, to: -90}, points: 3}")
+    assert vectors(table) == pytest.approx([8 + 8j, 10 + 6j, 8 + 4j])
+    assert vectors(table, "_velocity") == pytest.approx([7, -7j, -7])
+    assert vectors(table, "_acceleration") == pytest.approx([-24.5j, -24.5, 24.5j])
+    table = on_path("{line: [[5, 6], [8, 10]], points: 3}")
+    assert vectors(table) == pytest.approx([5 + 6j, 6.5 + 8j, 8 + 10j])
+    assert vectors(table, "_velocity") == pytest.approx(7 * (0.6 + 0.8j) * np.ones(3))
+    assert vectors(table, "_acceleration") == pytest.approx(np.zeros(3), abs=1e-11)
+
+
+def test_a_polyline_turns_at_its_corners_and_does_not_accelerate() -> None:
+    table = on_path("[[5, 6], [8, 6], [8, 10]]")
+    assert vectors(table, "_velocity") == pytest.approx([7, 7j, 7j])
+    assert vectors(table, "_acceleration") == pytest.approx(np.zeros(3), abs=1e-11)
+    closed = on_path("[[5, 6], [8, 6], [8, 10], [5, 6]]")
+    assert vectors(closed, "_velocity") == pytest.approx([7, 7j, -7 * (0.6 + 0.8j), 7])
+
+
+def test_a_spline_through_a_circle_is_nearly_the_circle() -> None:
+    angles = np.radians(np.arange(0, 361, 15))
+    places = ", ".join(f"[{8 + 2 * np.cos(a):.12f}, {6 + 2 * np.sin(a):.12f}]" for a in angles[:-1])
+    for more, at in (("", angles), (", points: 9", np.radians(np.arange(0, 361, 45)))):
+        table = on_path(f"{{through: [{places}, [10, 6]], spline: true{more}}}")
+        assert vectors(table) == pytest.approx(8 + 6j + 2 * np.exp(1j * at), abs=1e-4)
+        assert vectors(table, "_velocity") == pytest.approx(7j * np.exp(1j * at), abs=1e-3)
+        assert vectors(table, "_acceleration") == pytest.approx(-24.5 * np.exp(1j * at), rel=0.02)
+
+
+def test_what_is_listed_beside_a_path_moves_with_it() -> None:
+    text = PLATFORM.partition("kinematics")[0] + (
+        "kinematics:\n  path: {B1: {line: [[3, 3], [4, 3]], points: 3}, platform.angle: [0, 4, 10]}\n  speed: 2\n"
+        "  outputs: [platform.angle, B1]\n"
+    )
+    table = kinematics(study_of(text)).tables["motion"]
+    assert table["platform.angle_velocity"] == pytest.approx([16, 24, 24])
+    assert table["B1.x_velocity"] == pytest.approx([2, 2, 2])
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ("{speed: 3, sweep: {t1: 3, t2: 4}}", "a speed is that of a point along its 'path'"),
+        ("{speed: 3, path: {t1: [3, 4], t2: 4}}", "one point along its path, and this path is that of no point"),
+        ("{speed: 3, path: {P: [[3, 12], [5, 11]]}, rates: {t1: 3}}", "'speed' and 'rates' are both given"),
+        ("{speed: 3, path: {P: [[3, 12]]}}", "the path's point does not move: it has no direction"),
+        ("{speed: 3 deg/s, path: {P: [[3, 12]]}}", "'3 deg/s' is an angular velocity, where a velocity is expected"),
+        ("{speed: -3, path: {P: [[3, 12]]}}", "must be positive, not -3"),
+        (
+            "{path: {t1: {circle: {center: [0, 1], radius: 1}}, t2: 3}}",
+            "'t1' is no point: a circle is the path of a point",
+        ),
+        ("{path: {P: {circle: {center: [0, 1]}}}}", "kinematics.path.P.circle.radius: is missing"),
+        ("{path: {P: {circle: {center: [0, 1], radius: 1}, line: [[0, 0], [1, 1]]}}}", "not circle and line"),
+        ("{path: {P: {points: 3}}}", "a path is one of through, file, circle, arc, line, not none of them"),
+        ("{path: {P: {through: [[3, 12], [5, 11]], points: 3}}}", "'points' goes with a spline"),
+        ("{path: {P: {through: [[3, 12], [5, 11]], spline: true}}}", "the spline of 'P' needs three points or more"),
+        ("{path: {P: {line: [[3, 12], [3, 12]]}}}", "the line of 'P' needs two different places"),
+        ("{path: {P: {line: [[3, 12], [3, 13]], spline: true}}}", "'line' is smooth already"),
+        ("{path: {P: {arc: {center: [0, 1], radius: 1, from: 3, to: 3}}}}", "an arc needs two different angles"),
+    ],
+)
+def test_wrong_paths_and_speeds(section: str, message: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        study_of(f"{ARM.partition('kinematics')[0]}kinematics: {section}\n")
+    assert message in str(caught.value)
+
+
+def test_rates_that_lead_away_from_the_motion_are_told() -> None:
+    told = "1 of 2 steps of the motion do not go where the rates of P.x, P.y lead"
+    assert any(
+        told in warning
+        for warning in kinematics(study_of(ARM, "kinematics.path={P: [[3, 12], [5, 11.5], [9, 9]]}")).warnings
+    )
+    along = kinematics(study_of(ARM, "kinematics.path={P: [[3, 12], [5, 11.5], [1, 12.5]]}")).warnings
+    assert not any("lead" in warning for warning in along)
 
 
 @pytest.mark.parametrize(

@@ -143,16 +143,17 @@ class _Between:
         """
         study, poses, count = self.study, self.poses, len(self.outputs)
         torn = np.zeros(poses.designs, dtype=bool)
-        mine = np.flatnonzero(some[:count])
+        mine: Indices = np.flatnonzero(some[:count])
         wrong = bool(some[count:].any())
         watched = [study.mechanism.coordinate(name) for name in (targets.needed(study, poses) if wrong else ())]
-        curves = Curves([*(self.outputs[k] for k in mine), *watched], study.units.angle_factor)
+        curves = Curves([*(self.outputs[k] for k in mine.tolist()), *watched], study.units.angle_factor)
         still = STILL * self._sizes(found)
         for rows in windows(poses):
             line = Line(study, poses, self.swept, self.valid, curves.leaves, self.ends, rows)
             for k, name in enumerate(curves.names):
-                if curves.leaves[k].turning and name in self.arrays:
-                    line.align(k, self.arrays[name] * study.units.angle_factor)
+                known = self.arrays.get(name, poses.groups[0].values.get(name))
+                if curves.leaves[k].turning and known is not None:
+                    line.align(k, known * study.units.angle_factor)
             for end, peak in enumerate(peaks(line, curves.curves[: len(mine)], still[mine])):
                 self._take(peak, 1 - 2 * end, still, found[end], index[end], moving, mine)
             for end, sign in enumerate((1, -1) if wrong else ()):
@@ -166,9 +167,10 @@ class _Between:
         """Sizes that rounding is judged by, shape (names, designs)."""
         turn = 2 * np.pi / self.study.units.angle_factor
         sizes = {"length": self.study.mechanism.size, "angle": turn}
-        own = [sizes.get(one.quantity, 0.0) for one in [*self.outputs, *self.errors]]
-        values = np.nan_to_num(np.abs(found[..., 0])).max(axis=0)
-        return np.maximum(np.array(own), values).T
+        quantities = [*(output.quantity for output in self.outputs), *(error.quantity for error in self.errors)]
+        own = np.array([sizes.get(quantity, 0.0) for quantity in quantities])
+        values: Array = np.nan_to_num(np.abs(found[..., 0])).max(axis=0)
+        return np.asarray(np.maximum(own, values).T)
 
     def _take(
         self, peak: Peak, sign: int, still: Array, found: Array, index: Indices, moving: NDArray[np.bool_],

@@ -72,7 +72,8 @@ def peaks(
     """Smallest values of curves, and of them times -1, where a slope is zero or the motion ends.
 
     A segment cannot hold a value below both its ends by more than half its length times its largest slope: links
-    hardly turn within it. Those that may hold the smallest of all are divided once more before slopes are compared.
+    hardly turn within it. Those that may hold the smallest of all are divided where their slope does not change evenly,
+    so that it might be zero twice: by its parabola, in the middle by a quarter of its larger end.
 
     Parameters
     ----------
@@ -93,12 +94,15 @@ def peaks(
             best = line.least(sign * values)[:, design]
             least = np.fmin(sign * values[:, line.begin], sign * values[:, line.end]) - drop
             likely.append(least < best)
+        rise = values[:, line.end] - values[:, line.begin]
+        with np.errstate(invalid="ignore"):
+            bent = ~(6 * np.abs(rise - (one + other) / 2) <= np.fmax(np.abs(one), np.abs(other)))
         if looks is not None and len(design):
-            line.divide(np.flatnonzero(np.logical_or.reduce(likely).any(axis=0)), looks)
+            line.divide(np.flatnonzero((np.logical_or.reduce(likely) & bent).any(axis=0)), looks)
     which, curve, segment = np.nonzero([
         some & (sign * one < 0) & (sign * other > 0) for sign, some in zip(signs, likely, strict=True)
     ])  # fmt: skip
-    sign = np.array(signs)[which]
+    times = np.array(signs)[which]
 
     def at(which: Sequence[Curve], lane: Indices, x: Floats) -> tuple[Floats, Floats]:
         return _at(line, which, curve[lane], line.begin[segment[lane]], x)
@@ -106,13 +110,13 @@ def peaks(
     low, high = line.place[line.begin[segment]], line.place[line.end[segment]]
     none = np.full(len(segment), np.nan)
     # Along the sweep, whichever way it goes.
-    ahead = sign * np.sign(high - low)
+    ahead = times * np.sign(high - low)
     place = bracketed_roots(
         lambda lane, x: ahead[lane] * at(curves, lane, x)[1],
-        low, (sign * one[curve, segment]), high, (sign * other[curve, segment]), none, none,
+        low, times * one[curve, segment], high, times * other[curve, segment], none, none,
         PRECISION * np.abs(high - low),
     )  # fmt: skip
-    value = sign * at(told or curves, np.arange(len(segment)), place)[0]
+    value = times * at(told or curves, np.arange(len(segment)), place)[0]
     first = line.position[line.begin[segment]]
     position = first + (place - low) / (high - low) * (line.position[line.end[segment]] - first)
     if told is not None:
@@ -225,4 +229,5 @@ def _first_smallest(
     for table, column in zip(found, (value, place, position), strict=True):
         table[lanes] = column[best]
     nodes[lanes] = node[best]
-    return Peak(*(table.reshape(shape) for table in found), nodes.reshape(shape))
+    best_value, best_place, best_position = (table.reshape(shape) for table in found)
+    return Peak(best_value, best_place, best_position, nodes.reshape(shape))

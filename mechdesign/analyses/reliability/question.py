@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.kinematics.motion import default_outputs
+from mechdesign.analyses.kinematics.rates import of_given
 from mechdesign.analyses.poses import expand_outputs, radians
 from mechdesign.analyses.reliability.error_limits import Band, Disc
-from mechdesign.analyses.reliability.first_order import Channel
+from mechdesign.analyses.reliability.first_order import Channel, Rates
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
@@ -79,6 +80,17 @@ def ask(study: Study, section: ReliabilitySection) -> Question:
         pair = (0, 1)
     channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
     return Question(tuple(outputs), orders, channels, tuple(bands), tuple(discs), pair)
+
+
+def constant_rates(study: Study, section: ReliabilitySection) -> Rates | None:
+    """Rates of the drives that are the same everywhere; None where they follow from a motion."""
+    if of_given(study, section):
+        return None
+    return Rates(*(
+        tuple(float(radians(study, study.mechanism.coordinate(name), known.get(name, 0.0)))
+              for name in study.mechanism.drives)
+        for known in (section.rates, section.accelerations)
+    ))  # fmt: skip
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:

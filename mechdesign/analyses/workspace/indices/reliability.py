@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from mechdesign.analyses.reliability.deflection import Elasticity, elasticity
 from mechdesign.analyses.reliability.error_limits import Band
-from mechdesign.analyses.reliability.first_order import linear_errors
+from mechdesign.analyses.reliability.first_order import Rates, linear_errors
 from mechdesign.analyses.reliability.probability import failure_probability
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
@@ -33,7 +33,7 @@ DEPENDENT = 0.5
 def prepare(study: Study) -> Evaluate:
     """Find what varies and what it is limited to."""
     # Here, for the poses of a reliability question may themselves be nodes of a workspace.
-    from mechdesign.analyses.reliability.question import ask
+    from mechdesign.analyses.reliability.question import ask, constant_rates
 
     sources = find_sources(study)[0]
     assert study.reliability is not None
@@ -41,19 +41,27 @@ def prepare(study: Study) -> Evaluate:
     if not question.limited:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
         raise StudyError((Problem(message, "reliability.limits", str(study.path or "")),))
-    return assembled_only(partial(evaluate, study.mechanism, question, sources, elasticity(study)[0]))
+    rates = constant_rates(study, study.reliability)
+    limited = {band.output for band in question.bands} | {part for disc in question.discs for part in (disc.x, disc.y)}
+    if rates is None and any(question.channels[k].order for k in limited):
+        message = "the index 'reliability' of velocities needs rates of the drives: those of a path are not known here"
+        raise StudyError((Problem(message, "reliability.limits", str(study.path or "")),))
+    # Where only positions are limited, rates do not matter.
+    rates = rates or Rates((0.0,) * len(study.mechanism.drives), (0.0,) * len(study.mechanism.drives))
+    return assembled_only(partial(evaluate, study.mechanism, question, rates, sources, elasticity(study)[0]))
 
 
 def evaluate(
     mechanism: Mechanism,
     question: Question,
+    rates: Rates,
     sources: Sources,
     bent: Elasticity | None,
     configuration: Configuration,
 ) -> Floats:
     """Probability that all limits hold, the drives held [S2, eqs. 10, 11]."""
     elastic = None if bent is None else bent.at(configuration, question.channels)
-    linear = linear_errors(mechanism, configuration, question.channels, sources, question.rates, elastic)
+    linear = linear_errors(mechanism, configuration, question.channels, sources, rates, elastic)
     covariance, mean = linear.covariance(), linear.shift()
     if len(question.bands) == 2 and not question.discs and not mean.any():
         return _rectangle(question.bands[0], question.bands[1], covariance)

@@ -1,0 +1,279 @@
+"""Extremes and velocities of random mechanisms, against circles that are cut here and differences along the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+from mechdesign.analyses.kinematics.analysis import kinematics
+
+Seeds = Callable[[int], Iterator[int]]
+# Own looks at a motion (a hundredth of a degree apart or so), and beside each place where it ends.
+LOOKS = 40_001
+BESIDE = np.concatenate([-np.geomspace(1e-9, 1.0, 60), [0.0], np.geomspace(1e-9, 1.0, 60)])
+
+
+def cut(one: np.ndarray, r: float, other: np.ndarray, s: float, side: float) -> np.ndarray:
+    """Where circles about two places meet, left (`side` 1) or right of the way from one to the other; nan if not."""
+    span = other - one
+    d = np.abs(span)
+    x = (d * d + r * r - s * s) / (2 * d)
+    square = r * r - x * x
+    square = np.where((square < 0) & (square > -1e-13 * r * r), 0.0, square)
+    with np.errstate(invalid="ignore"):
+        return one + span / d * (x + side * 1j * np.sqrt(square))
+
+
+class FourBar:
+    """A crank, a rod with a point P, and a rocker; P may carry a dyad to a second pivot."""
+
+    def __init__(self, rng: np.random.Generator, six: bool) -> None:
+        self.six = six
+        while True:
+            self.a, self.b, self.c = rng.uniform(20, 120, 3).tolist()
+            self.d = 100.0
+            self.p = complex(*rng.uniform(-80, 80, 2))
+            self.side = rng.choice([-1.0, 1.0])
+            self.e, self.f, self.g = complex(*rng.uniform(-150, 150, 2)), *rng.uniform(60, 250, 2).tolist()
+            self.side2 = rng.choice([-1.0, 1.0])
+            self.drawn = float(rng.uniform(0, 360))
+            shortest, *middle, longest = sorted([self.a, self.b, self.c, self.d])
+            if abs(sum(middle) - shortest - longest) < 0.5:
+                continue
+            near = {k: complex(v[0]) for k, v in self.points(np.array([self.drawn])).items()}
+            # Not drawn near a dead centre, of which the side would not be clear.
+            angles = [near["B"] - near["A"], near["B"] - 100.0]
+            sine = abs(np.sin(np.angle(angles[0] / angles[1])))
+            if np.isnan(sine) or sine < 0.1:
+                continue
+            if six:
+                two = [near["F"] - near["P"], near["F"] - self.e]
+                sine = abs(np.sin(np.angle(two[0] / two[1])))
+                if np.isnan(sine) or sine < 0.1:
+                    continue
+            self.near = near
+            return
+
+    def points(self, crank: np.ndarray) -> dict[str, np.ndarray]:
+        a = self.a * np.exp(1j * np.radians(crank))
+        b = cut(a, self.b, np.full_like(a, self.d), self.c, self.side)
+        p = a + self.p * (b - a) / self.b
+        found = {"A": a, "B": b, "P": p}
+        if self.six:
+            found["F"] = cut(p, self.f, np.full_like(p, self.e), self.g, self.side2)
+        return found
+
+    def measured(self, crank: np.ndarray) -> dict[str, np.ndarray]:
+        at = self.points(crank)
+        last = at["F"] if self.six else at["P"]
+        lost = np.isnan(last)
+        found = {"P.x": at["P"].real, "P.y": at["P"].imag, "gap": np.abs(at["P"] - self.d)}
+        if self.six:
+            found |= {"F.x": at["F"].real, "F.y": at["F"].imag}
+        found["P.y_error"] = at["P"].imag - (20 + 10 * np.sin(2 * np.radians(crank)))
+        product = (at["B"] - at["A"]) * np.conj(at["B"] - self.d)
+        sine = np.abs(product.imag) / (self.b * self.c)
+        found["transmission"] = np.degrees(np.arcsin(np.minimum(sine, 1)))
+        return {name: np.where(lost, np.nan, values) for name, values in found.items()}
+
+    def text(self) -> str:
+        places = {k: f"[{v.real:.6f}, {v.imag:.6f}]" for k, v in self.near.items() if k != "P"}
+        more = f", E: [{self.e.real!r}, {self.e.imag!r}]" if self.six else ""
+        dyad = f"    arm: [P, F, {self.f!r}]\n    lever: [E, F, {self.g!r}]\n" if self.six else ""
+        return (
+            "mechanism:\n  links:\n"
+            f"    ground: {{O: [0, 0], D: [100, 0]{more}}}\n    crank: [O, A, {self.a!r}]\n"
+            f"    rod: {{from: A, to: B, length: {self.b!r}, points: {{P: [{self.p.real!r}, {self.p.imag!r}]}}}}\n"
+            f"    rocker: [D, B, {self.c!r}]\n{dyad}"
+            "  drives: [crank]\n  measures: {gap: {distance: [D, P]}}\n"
+            '  targets: {P.y: "20 + 10*sin(2*crank)"}\n'
+            f"  sketch: {{{', '.join(f'{k}: {v}' for k, v in places.items())}}}\n"
+        )
+
+
+def dense(function: Callable[[np.ndarray], dict[str, np.ndarray]], low: float, high: float) -> np.ndarray:
+    """Places all along a motion, crowded where it ends: found by halving, as nothing else is known here."""
+    at = np.linspace(low, high, LOOKS)
+    known = np.isfinite(next(iter(function(at).values())))
+    first = np.flatnonzero(known[1:] != known[:-1])
+    good, bad = np.where(known[first], at[first], at[first + 1]), np.where(known[first], at[first + 1], at[first])
+    for _ in range(60):
+        middle = (good + bad) / 2
+        inside = np.isfinite(next(iter(function(middle).values())))
+        good, bad = np.where(inside, middle, good), np.where(inside, bad, middle)
+    return np.unique(np.concatenate([at, np.clip((good[:, None] + BESIDE).ravel(), low, high)]))
+
+
+def compare(text: str, function: Callable[[np.ndarray], dict[str, np.ndarray]], low: float, high: float) -> None:
+    """Smallest and largest values of a study's first table of extremes, and of the transmission angle."""
+    at = dense(function, low, high)
+    wanted = function(at)
+    if not np.isfinite(next(iter(wanted.values()))).any():
+        return
+    result = kinematics(study_of(text))
+    table = result.tables["extremes"]
+    for name, values in wanted.items():
+        if name == "transmission":
+            loops = result.tables["loops"]
+            row = int(np.flatnonzero(loops["coupler"] == "rod")[0])
+            found = loops["transmission_min"][row], loops["transmission_max"][row]
+        else:
+            row = int(np.flatnonzero(table["output"] == name)[0])
+            found = table["min"][row], table["max"][row]
+        # A look is at most half a hundredth of a degree from an extreme, a kink of the transmission at most that.
+        assert found == pytest.approx((np.nanmin(values), np.nanmax(values)), abs=2e-2, rel=1e-5), (name, text)
+        for sign, value in ((1, np.nanmin(values)), (-1, np.nanmax(values))):
+            assert sign * found[0 if sign == 1 else 1] <= sign * value + 1e-6 * max(1.0, abs(value)), (name, text)
+
+
+def swept(rng: np.random.Generator, drawn: float) -> tuple[float, float, float]:
+    """A closed sweep, or an open one about the pose drawn, in steps of up to 30 deg."""
+    step = float(rng.choice([5, 7.5, 10, 15, 20, 30]))
+    if rng.random() < 0.5:
+        return 0.0, 360.0, step
+    count = int(rng.integers(3, 12))
+    low = drawn - step * float(rng.uniform(0.2, count - 0.2))
+    return low, low + step * count, step
+
+
+def check_four_bar(seed: int, six: bool) -> None:
+    rng = np.random.default_rng([seed, six])
+    bar = FourBar(rng, six)
+    low, high, step = swept(rng, bar.drawn)
+    outputs = "[P, gap, F]" if six else "[P, gap]"
+    text = (
+        f"{bar.text()}kinematics:\n  sweep: {{crank: {{from: {low!r}, to: {high!r}, step: {step!r}}}}}\n"
+        f"  outputs: {outputs}\n"
+    )
+    compare(text, bar.measured, low, high)
+
+
+def test_extremes_of_four_bars(seeds: Seeds) -> None:
+    for seed in seeds(25):
+        check_four_bar(seed, six=False)
+
+
+def test_extremes_of_six_bars(seeds: Seeds) -> None:
+    for seed in seeds(15):
+        check_four_bar(seed, six=True)
+
+
+def test_extremes_of_slider_cranks(seeds: Seeds) -> None:
+    for seed in seeds(15):
+        rng = np.random.default_rng(seed)
+        r, l, e = rng.uniform([20, 40, -30], [80, 160, 30]).tolist()  # noqa: E741
+        drawn = float(rng.uniform(0, 360))
+        px, py = rng.uniform(-60, 60, 2).tolist()
+
+        def measured(crank: np.ndarray, r=r, l=l, e=e, p=complex(px, py)) -> dict[str, np.ndarray]:  # noqa: E741
+            a = r * np.exp(1j * np.radians(crank))
+            square = l * l - (e - a.imag) ** 2
+            square = np.where((square < 0) & (square > -1e-13 * l * l), 0.0, square)
+            with np.errstate(invalid="ignore"):
+                b = a.real + np.sqrt(square) + 1j * e
+            at = a + p * (b - a) / l
+            return {"B.x": b.real, "P.x": at.real, "P.y": at.imag}
+
+        far = float(measured(np.array([drawn]))["B.x"][0])
+        a = complex(r * np.exp(1j * np.radians(drawn)))
+        if not far - a.real > 0.1 * l:
+            continue
+        low, high, step = swept(rng, drawn)
+        text = (
+            f"mechanism:\n  links:\n    ground: {{O: [0, 0], G: [0, {e!r}]}}\n    crank: [O, A, {r!r}]\n"
+            f"    rod: {{from: A, to: B, length: {l!r}, points: {{P: [{px!r}, {py!r}]}}}}\n    slider: {{B: [0, 0]}}\n"
+            "  joints: {guide: {prismatic: [ground, slider], through: G, point: B}}\n  drives: [crank]\n"
+            f"  sketch: {{A: [{a.real!r}, {a.imag!r}], B: [{far!r}, {e!r}]}}\n"
+            f"kinematics:\n  sweep: {{crank: {{from: {low!r}, to: {high!r}, step: {step!r}}}}}\n  outputs: [B.x, P]\n"
+        )
+        compare(text, measured, low, high)
+
+
+class Robot:
+    """A five-bar: two driven cranks and two rods that meet at C."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.base = rng.uniform(30, 100)
+        self.a, self.b = rng.uniform(80, 120), rng.uniform(180, 260)
+
+    def drives(self, c: np.ndarray) -> np.ndarray:
+        """Angles of the cranks (radians), elbows outward."""
+        right = cut(np.full_like(c, self.base), self.a, c, self.b, -1.0) - self.base
+        left = cut(np.full_like(c, -self.base), self.a, c, self.b, 1.0) + self.base
+        return np.array([np.angle(right), np.angle(left)])
+
+    def text(self) -> str:
+        q = self.drives(np.array([200j]))[:, 0]
+        one, two = self.base + self.a * np.exp(1j * q[0]), -self.base + self.a * np.exp(1j * q[1])
+        return (
+            f"mechanism:\n  links:\n    ground: {{B1: [{self.base:.9f}, 0], B2: [{-self.base:.9f}, 0]}}\n"
+            f"    l1: [B1, D1, {self.a:.9f}]\n    u1: [D1, C, {self.b:.9f}]\n"
+            f"    l2: [B2, D2, {self.a:.9f}]\n    u2: [D2, C, {self.b:.9f}]\n"
+            "  drives: {q1: {angle: l1}, q2: {angle: l2}}\n"
+            f"  sketch: {{D1: [{one.real:.9f}, {one.imag:.9f}], D2: [{two.real:.9f}, {two.imag:.9f}], C: [0, 200]}}\n"
+        )
+
+
+def moved(rng: np.random.Generator) -> tuple[str, Callable[[np.ndarray], np.ndarray], np.ndarray]:
+    """A path in a line of YAML, its place after a length of way, and the ways of its poses."""
+    x, y, r = rng.uniform(-20, 20), rng.uniform(190, 210), rng.uniform(10, 40)
+    n = int(rng.integers(5, 30))
+    kind = rng.choice(["circle", "arc", "line", "polyline"])
+    if kind == "circle":
+        begin, sign = rng.uniform(-180, 180), rng.choice([-1, 1])
+        way = 2 * np.pi * r * np.arange(n) / n
+        back = str(sign < 0).lower()
+        text = f"circle: {{center: [{x}, {y}], radius: {r}, from: {begin}, clockwise: {back}}}, points: {n}"
+        return text, lambda s: complex(x, y) + r * np.exp(1j * (np.radians(begin) + sign * s / r)), way
+    if kind == "arc":
+        begin, end = rng.uniform(-180, 180, 2)
+        way = np.linspace(0, r * np.radians(abs(end - begin)), n)
+        text = f"arc: {{center: [{x}, {y}], radius: {r}, from: {begin}, to: {end}}}, points: {n}"
+        turn = np.sign(end - begin)
+        return text, lambda s: complex(x, y) + r * np.exp(1j * (np.radians(begin) + turn * s / r)), way
+    corners = rng.uniform([-40, 180], [40, 230], (2 if kind == "line" else 4, 2))
+    z = corners[:, 0] + 1j * corners[:, 1]
+    lengths = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(z)))])
+    listed = ", ".join(f"[{float(a)!r}, {float(b)!r}]" for a, b in corners)
+    if kind == "line":
+        return (
+            f"line: [{listed}], points: {n}",
+            lambda s: z[0] + (z[1] - z[0]) * s / lengths[1],
+            lengths[1] * np.linspace(0, 1, n),
+        )
+
+    def along(s: np.ndarray) -> np.ndarray:
+        # Each segment goes straight on, also beyond its corner: the side that begins there counts.
+        k = np.clip(np.searchsorted(lengths, np.median(s) + 1e-9, side="right") - 1, 0, len(z) - 2)
+        return z[k] + (z[k + 1] - z[k]) * (s - lengths[k]) / (lengths[k + 1] - lengths[k])
+
+    return f"through: [{listed}]", along, lengths
+
+
+def test_velocities_along_paths(seeds: Seeds) -> None:
+    for seed in seeds(25):
+        rng = np.random.default_rng(seed)
+        robot = Robot(rng)
+        form, place, ways = moved(rng)
+        speed = float(rng.uniform(5, 300))
+        text = f"{robot.text()}kinematics:\n  path: {{C: {{{form}}}}}\n  speed: {speed!r} mm/s\n  outputs: [C]\n"
+        table = kinematics(study_of(text)).tables["motion"]
+        assert len(table["q1"]) == len(ways)
+        h = 1e-4 / speed * 100
+        for row, s in enumerate(ways):
+            at = place(s + speed * h * np.array([-1.0, 0.0, 1.0]))
+            q = robot.drives(at)
+            if np.isnan(q).any() or not table["valid"][row]:
+                continue
+            q = np.degrees(np.unwrap(q))
+            for name, (before, now, after) in {"C.x": at.real, "C.y": at.imag, "q1": q[0], "q2": q[1]}.items():
+                gap = table[name][row] - now
+                assert gap - 360 * round(gap / 360) == pytest.approx(0, abs=1e-6), (name, text)
+                size = speed / 50 + abs(table[f"{name}_velocity"][row])
+                assert table[f"{name}_velocity"][row] == pytest.approx((after - before) / (2 * h), abs=1e-4 * size)
+                bend = (after - 2 * now + before) / h**2
+                size = speed**2 / 50 + abs(table[f"{name}_acceleration"][row])
+                assert table[f"{name}_acceleration"][row] == pytest.approx(bend, abs=2e-3 * size), (name, text)

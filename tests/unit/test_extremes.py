@@ -1,0 +1,135 @@
+"""Extremes of a motion: the same whatever its steps are, between its poses, at its ends and at its limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.analyses.optimize import stacked
+from mechdesign.errors import StudyError
+from mechdesign.results import Table
+
+GALLERY = Path(__file__).parents[2] / "configs" / "gallery"
+SLIDER = """\
+mechanism:
+  links: {ground: {O: [0, 0], G: [0, -20]}, crank: [O, A, 40], rod: [A, B, 120], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: G, point: B}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 40], B: [110, -20]}
+"""
+# The crank swings between limits: 70 + 50 does not reach over 100 + 60, and 100 - 60 is less than 70 + 50.
+ROCKER = """\
+mechanism:
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 60], rod: [A, B, 70], rocker: [D, B, 50]}
+  drives: [crank]
+  sketch: {A: [60, 0], B: [94, 50]}
+"""
+
+
+def extremes(text: str, *changes: str) -> dict[str, dict[str, float]]:
+    table = kinematics(study_of(text, *changes)).tables["extremes"]
+    return by_name(table)
+
+
+def by_name(table: Table) -> dict[str, dict[str, float]]:
+    names = [name for name in table.names if name != "output"]
+    return {str(output): {name: float(table[name][k]) for name in names} for k, output in enumerate(table["output"])}
+
+
+@pytest.mark.parametrize("first", [0, -170, 7])
+@pytest.mark.parametrize("step", [5, 24, 40, 60])
+def test_the_stroke_of_a_slider_crank(first: int, step: int) -> None:
+    row = extremes(SLIDER, f"kinematics={{sweep: {{theta: {{from: {first}, to: {first + 360}, step: {step}}}}}}}")[
+        "B.x"
+    ]
+    far, near = np.sqrt(160**2 - 20**2), np.sqrt(80**2 - 20**2)
+    stretched, folded = 360 - np.degrees(np.arcsin(20 / 160)), 180 - np.degrees(np.arcsin(20 / 80))
+    assert (row["max"], row["min"]) == pytest.approx((far, near), rel=1e-12)
+    assert (row["max_at"] - stretched) % 360 == pytest.approx(0, abs=1e-9) or row["max_at"] % 360 == pytest.approx(
+        stretched
+    )
+    assert row["min_at"] % 360 == pytest.approx(folded, rel=1e-11)
+    part = stretched - folded
+    assert row["time_ratio"] == pytest.approx(part / (360 - part), rel=1e-10)
+
+
+@pytest.mark.parametrize("step", [5, 15, 30])
+def test_a_rocker_between_its_limits(step: int) -> None:
+    # At the limits rod and rocker are in line: the law of cosines gives the crank there.
+    limit = np.degrees(np.arccos((60**2 + 100**2 - 120**2) / (2 * 60 * 100)))
+    found = extremes(ROCKER, f"kinematics={{sweep: {{crank: {{from: -180, to: 180, step: {step}}}}}}}")
+    crank = found["crank.angle"]
+    assert (crank["min"], crank["max"]) == pytest.approx((-limit, limit), rel=1e-10)
+    assert crank["range"] == pytest.approx(2 * limit, rel=1e-10)
+    ends = [60 * np.exp(1j * np.radians(angle)) for angle in (-limit, limit)]
+    beyond = [100 + (end - 100) * 50 / 120 for end in ends]
+    at = np.radians(np.linspace(-limit, limit, 200_001)[1:-1])
+    a = 60 * np.exp(1j * at)
+    d = np.abs(a - 100)
+    x = (d * d + 50**2 - 70**2) / (2 * d)
+    b = 100 + (a - 100) / d * (x - 1j * np.sqrt(50**2 - x**2))
+    every = np.concatenate([b, beyond])
+    assert (found["B.x"]["min"], found["B.x"]["max"]) == pytest.approx((every.real.min(), every.real.max()), rel=1e-8)
+    assert (found["B.y"]["min"], found["B.y"]["max"]) == pytest.approx((every.imag.min(), every.imag.max()), rel=1e-8)
+    assert np.isnan(crank["time_ratio"])
+
+
+@pytest.mark.parametrize(
+    ("name", "drive", "steps"),
+    [
+        ("shaper", "crank", (5, 30)), ("whitworth", "crank", (5, 30)), ("jansen", "crank", (5, 20)),
+        ("klann", "crank", (5, 24)), ("stephenson", "crank", (1, 10)), ("stephenson_ii", "turn", (1, 10)),
+    ],
+)  # fmt: skip
+def test_extremes_do_not_depend_on_the_step(name: str, drive: str, steps: tuple[int, int]) -> None:
+    fine, coarse = (
+        by_name(
+            kinematics(mechdesign.load(GALLERY / f"{name}.yaml", [f"kinematics.sweep.{drive}.step={step}"])).tables[
+                "extremes"
+            ]
+        )
+        for step in steps
+    )
+    for output, row in fine.items():
+        for end in ("min", "max"):
+            assert coarse[output][end] == pytest.approx(row[end], rel=1e-9, abs=1e-9), output
+
+
+def test_a_second_peak_beside_the_end_of_the_sweep() -> None:
+    # y = cos(2 t) + cos(t) / 8 of a cardan arm: 1.125 at 0, a second peak of 0.875 at 180.
+    text = SLIDER + "  measures: {wave: cos(2*(theta - 173)) + cos(theta - 173)/8}\n"
+    for step in (5, 24, 30):
+        change = f"kinematics={{sweep: {{theta: {{from: 0, to: 360, step: {step}}}}}, outputs: [wave]}}"
+        row = extremes(text, change)["wave"]
+        assert (row["max"], row["max_at"]) == pytest.approx((1.125, 173), rel=1e-9)
+        # The slope is zero where cos t = -1/32.
+        assert row["min"] == pytest.approx(2 / 32**2 - 1 - 1 / (8 * 32), rel=1e-12)
+
+
+def test_designs_that_reach_a_limit_are_left_to_be_asked_one_by_one() -> None:
+    study = study_of(ROCKER + "kinematics: {sweep: {crank: {from: 0, to: 60, step: 10}}, outputs: [B.x]}\n")
+    places = {"rod.length": np.array([70.0, 20.0])}
+    stack = stacked.tables(study, "kinematics", ["extremes", "loops"], 2, places, {})
+    assert stack.open["extremes"].tolist() == [False, True]
+    assert stack.open["loops"].tolist() == [False, True]
+    row = by_name(kinematics(study).tables["extremes"])["B.x"]
+    table = stack.result.tables["extremes"]
+    assert (table["min"][0], table["max"][0]) == pytest.approx((row["min"], row["max"]), rel=1e-12)
+
+
+def test_an_open_sketch_is_told_under_follow_as_under_side() -> None:
+    texts = []
+    for branch in ("side", "follow"):
+        with pytest.raises(StudyError) as caught:
+            study_of(
+                ROCKER.replace("[A, B, 70]", "[A, B, 20]").replace("[D, B, 50]", "[D, B, 5]"),
+                f"mechanism.branch={branch}",
+            )
+        texts.append(str(caught.value))
+    assert texts[0] == texts[1]
+    assert "the sketch cannot be assembled" in texts[0]
