@@ -9,7 +9,7 @@ from typing import Any
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study import pose_checks, reliability_checks, targets
 from mechdesign.study.document import Path
-from mechdesign.study.names import Names
+from mechdesign.study.names import GROUND, Names
 from mechdesign.study.numbers import suggestion
 from mechdesign.study.optimize_models import Condition, OptimizeSection
 from mechdesign.study.parameters import Parameters
@@ -217,6 +217,8 @@ class Checker:
     def stiffness(self, section: StiffnessSection) -> StiffnessSection:
         root: Path = ("stiffness",)
         right = self.known(section.at, self.names.owners, "point", (*root, "at"))
+        if right and section.link is None and GROUND in self.names.owners[section.at]:
+            self.reporter.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
         if section.link is not None and self.known(section.link, self.names.moving, "moving link", (*root, "link")):
             points = self.names.points_of(section.link)
             if right and section.at not in points:
@@ -238,9 +240,10 @@ class Checker:
             clamped = [set(other.fixed) for other in self.names.section.joints.values() if other.fixed is not None]
             pins = [p for p, owners in self.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
             if self.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
-                self.kind(path, "stiffness")
-                self.kind((*path, "radial"), "stiffness")
-                self.kind((*path, "moment"), "rotational_stiffness")
+                if bearing.radial is not None:
+                    self.kind((*path, "radial"), "stiffness")
+                if bearing.moment is not None:
+                    self.kind((*path, "moment"), "rotational_stiffness")
                 if bearing.moment is not None and joint not in slides:
                     self.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
         loads = []

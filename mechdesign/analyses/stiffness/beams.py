@@ -86,7 +86,7 @@ class Course:
 
 
 def course_of(beams: Beams, configuration: Configuration) -> Course:
-    """The beams of a link in poses of shape (n,)."""
+    """The beams of a link in any batch of poses."""
     corners = np.array([configuration.point(name) for name in beams.corners])
     spans = np.diff(corners, axis=0)
     lengths = np.abs(spans)
@@ -94,5 +94,5 @@ def course_of(beams: Beams, configuration: Configuration) -> Course:
         along = configuration.rotation(beams.link)[None]
     else:
         along = np.divide(spans, lengths, out=np.ones(spans.shape, dtype=complex), where=lengths > 0)
-    starts = np.concatenate([np.zeros((1, corners.shape[1])), np.cumsum(lengths, axis=0)])
+    starts = np.concatenate([np.zeros((1, *corners.shape[1:])), np.cumsum(lengths, axis=0)])
     return Course(beams.corners, corners, along, starts)

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description, Drive, Fixed, Prismatic
@@ -94,11 +93,6 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
 
     An elastic asked link is a body of its leg like any other: what is asked is its section at the point. A pin's
     bearing gives between its two links; of more than two, between each and the pin.
-
-    Raises
-    ------
-    StudyError
-        If the asked point is fixed to the ground.
     """
     graph, description = mechanism.graph, mechanism.description
 
@@ -109,8 +103,6 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
     for body, point in graph.points:
         if ":" not in point:
             holders.setdefault(point, []).append(body)
-    if link is None and GROUND in holders[at]:
-        raise StudyError([Problem(f"point '{at}' belongs to the ground and does not move", "stiffness.at")])
     names = list(graph.bodies)
     contacts: list[Contact] = []
     for name, leg in description.links.items():

@@ -111,8 +111,6 @@ def find_legs(mechanism: Mechanism, link: str | None, at: str, section: Stiffnes
     ------
     NotSerialError
         Where the legs are not serial chains.
-    StudyError
-        Where what is asked does not move.
     """
     description = mechanism.description
     bodies = build_bodies(mechanism, link, at, section)

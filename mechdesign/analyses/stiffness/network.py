@@ -99,11 +99,6 @@ def build_network(mechanism: Mechanism, link: str | None, at: str, section: Stif
         The asked link; None for the pin `at` itself.
     section : StiffnessSection
         What is elastic.
-
-    Raises
-    ------
-    StudyError
-        If the asked point does not move.
     """
     bodies = build_bodies(mechanism, link, at, section)
     builder = _Builder(mechanism, bodies, section)

@@ -16,7 +16,7 @@ from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index, number
 from mechdesign.analyses.workspace.indices.local import Floats
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def prepare(study: Study) -> Evaluate:
     question = ask(study, study.reliability)
     if not question.limited:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
-        raise StudyError((Problem(message, "reliability.limits", str(study.path or "")),))
+        raise StudyError((study.problem(message, "reliability", "limits"),))
     return assembled_only(partial(evaluate, study.mechanism, question, sources, elasticity(study)[0]))
 
 
