@@ -23,6 +23,8 @@ from mechdesign.study.workspace_models import INDEX_NAMES, NEEDED, Over, Workspa
 
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
 _STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))
+# Commands whose section no default can replace.
+_UNASSUMED = ("reliability", "stiffness")
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
@@ -213,6 +215,10 @@ class Checker:
                 self.reporter.report(path, f"there is no result {name!r}{hint}")
         else:
             self.known(command, COMMANDS, "command", path)
+        column = name.rpartition(".")[2]
+        needed = command if command in _UNASSUMED else NEEDED.get(column.rpartition("_")[0])
+        if not dotted and needed is not None and self.reporter.raw((needed,)) is None:
+            self.reporter.report(path, f"{name!r} needs the {needed} section, and the study has none")
 
     def stiffness(self, section: StiffnessSection) -> StiffnessSection:
         root: Path = ("stiffness",)

@@ -8,12 +8,9 @@ is half its square: the total energy is least over all that the conditions allow
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.linalg import qr
 
-ELEMENTS = 1  # per beam: one is exact; a test uses more
 FREE = 1e-7  # deformation of a motion of unit size (lengths and stiffnesses near one) below which it is free
 
 
@@ -92,16 +89,14 @@ class Frame:
 
     def beam(self, a: int, b: int, axial: float, bending: float, shearing: float = np.inf) -> None:
         """An elastic beam of stiffness EA, EI and shear stiffness (factor times GA) from node to node."""
-        inner = [self.node(p) for p in np.linspace(self.places[a], self.places[b], ELEMENTS + 1)[1:-1].tolist()]
-        for i, j in pairwise([a, *inner, b]):
-            span = self.places[j] - self.places[i]
-            # What the end does that the beginning, as a rigid body, would not: against the element's stiffness there.
-            factor = np.linalg.inv(np.linalg.cholesky(_element(span, axial, bending, shearing)[3:, 3:])).T
-            carried = {0: (i, 2, span.imag), 1: (i, 2, -span.real)}
-            numbers = self._deform(3)
-            for axis in range(3):
-                terms = [(j, axis, 1.0), (i, axis, -1.0), *([carried[axis]] if axis in carried else [])]
-                self._constrain(*terms, give=dict(zip(numbers, factor[axis], strict=True)))
+        span = self.places[b] - self.places[a]
+        # What the end does that the beginning, as a rigid body, would not: against the element's stiffness there.
+        factor = np.linalg.inv(np.linalg.cholesky(_element(span, axial, bending, shearing)[3:, 3:])).T
+        carried = {0: (a, 2, span.imag), 1: (a, 2, -span.real)}
+        numbers = self._deform(3)
+        for axis in range(3):
+            terms = [(b, axis, 1.0), (a, axis, -1.0), *([carried[axis]] if axis in carried else [])]
+            self._constrain(*terms, give=dict(zip(numbers, factor[axis], strict=True)))
 
     def respond(self, node: int, loads: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Displacements (3 nodes, loads) under loads (3, loads) at a node, and motions (3 nodes, k) that are free.

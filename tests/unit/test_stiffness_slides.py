@@ -72,6 +72,15 @@ def test_a_trolley_beyond_an_end_stands_on_a_rigid_bracket_from_it() -> None:
         assert abs(soft[1, 2]) == pytest.approx(30.0 * SPAN / (3 * EI), rel=1e-9)
 
 
+def test_a_trolley_over_a_support_or_over_the_foot_of_a_bracket() -> None:
+    """Parts of the beam without length, in a batch with others."""
+    result = ask_stiffness(GIRDER, "stiffness.poses=[{t: 0}, {t: 150}, {t: 400}, {t: 210}]")
+    for row, a in enumerate((0.0, 150.0, 400.0, 210.0)):
+        expected = np.zeros((3, 3))
+        expected[0, 0], expected[1:, 1:] = a / EA, supported(a)
+        assert_allclose(matrix(result, "C", row), expected, rtol=1e-9, atol=1e-18)
+
+
 def test_two_trolleys_pass_each_other() -> None:
     """Maxwell and Betti: the lift at one under a force at the other, whichever comes first on the girder."""
     text = GIRDER.replace("    trolley:", "    other: {X: [0, 0]}\n    trolley:")

@@ -107,6 +107,7 @@ def test_wrong_mechanisms(tmp_path, monkeypatch, old, new, message):
     assert all(line.startswith("study.yaml") for line in found)
 
 
+VARIABLE = "variables: {r: {from: 20, to: 30, step: 5}}"
 QUESTIONS = [
     ("kinematic: {}", "10:1: kinematic: unknown key; did you mean 'kinematics'?"),
     ("seed: -1", "10:7: seed: must be at least 0, not -1"),
@@ -171,6 +172,12 @@ QUESTIONS = [
     ("kinematics: {outputs: [P, P.x]}", "kinematics.outputs.1: 'P.x' is listed twice"),
     ("matrix: {r: [1, 2]}", "matrix: is not available in this version"),
     ("stiffness: {at: P, sections: {b: {matrix: [[1]]}}}", "stiffness.sections.b.matrix: is not available"),
+    (
+        f"optimize: {{{VARIABLE}, maximize: [stiffness.k_min]}}",
+        "maximize.0: 'stiffness.k_min' needs the stiffness section",
+    ),
+    (f"optimize: {{{VARIABLE}, minimize: [k_min_mean]}}", "minimize.0: 'k_min_mean' needs the stiffness section"),
+    (f"optimize: {{{VARIABLE}, maximize: [reliability.reliability]}}", "needs the reliability section, and the study"),
     ("stiffness: {}", "stiffness.at: is missing: the point whose stiffness is asked"),
     ("stiffness:", "10:1: stiffness.at: is missing: the point whose stiffness is asked"),
     ("stiffness: {at: O}", "10:17: stiffness.at: point 'O' belongs to the ground and does not move"),
