@@ -2,7 +2,7 @@
 
 A link given by its ends is one beam from the first to the second; its other points are brackets, rigid from their foot
 on the beam, beyond an end from that end. A link given by its points alone is beams along them in the order listed. What
-slides on an elastic link rides on these beams at the foot of its current place.
+slides on an elastic link rides on these beams at the foot of its current place, the nearest of them.
 """
 
 from __future__ import annotations

@@ -22,27 +22,29 @@ ORDER = 3.3
 
 
 def draw_beams(axes: Axes, study: Study, configuration: Configuration, index: int = 0) -> None:
-    """Draw the beams of the links that the study's stiffness takes as elastic, in one pose of a batch."""
+    """Draw the beams of the study's elastic links in one pose of a batch, where they are not plainly the link itself.
+
+    Those are links with brackets, and links of more than two points without ends.
+    """
     if study.stiffness is None:
         return
-    lines: dict[str, list[np.ndarray]] = {"elastic beam": [], "rigid bracket": []}
-    for name in study.stiffness.elastic:
-        for kind, ends in _lines(study, name, configuration, index):
-            if np.isfinite(ends).all():
-                lines[kind].append(ends)
     looks = {"elastic beam": (1.3, (0, (6, 2))), "rigid bracket": (2.2, "-")}
-    for kind, drawn in lines.items():
-        width, dashes = looks[kind]
-        for k, ends in enumerate(drawn):
+    told = set()
+    for name in study.stiffness.elastic:
+        lines = list(_lines(study, name, configuration, index))
+        if len(lines) == 1 and len(lines[0][1]) < 3:
+            continue
+        for kind, ends in lines:
+            width, dashes = looks[kind]
             axes.plot(ends.real, ends.imag, color=style.INK, linewidth=width, linestyle=dashes, zorder=ORDER,
-                      label=kind if not k else None)  # fmt: skip
-    if lines["rigid bracket"]:
+                      label=kind if kind not in told else None)  # fmt: skip
+            told.add(kind)
+    if told:
         axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none")
 
 
-def _lines(
-    study: Study, name: str, configuration: Configuration, index: int
-) -> Iterator[tuple[str, np.ndarray]]:  # fmt: skip
+def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
+    """The beams of a link, all in one line, and its brackets."""
     from mechdesign.analyses.stiffness.beams import beams_of, course_of
 
     mechanism = study.mechanism
