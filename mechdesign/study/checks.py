@@ -9,7 +9,7 @@ from typing import Any
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study import pose_checks, reliability_checks, targets
 from mechdesign.study.document import Path
-from mechdesign.study.names import Names
+from mechdesign.study.names import GROUND, Names
 from mechdesign.study.numbers import suggestion
 from mechdesign.study.optimize_models import Condition, OptimizeSection
 from mechdesign.study.parameters import Parameters
@@ -23,6 +23,8 @@ from mechdesign.study.workspace_models import INDEX_NAMES, NEEDED, Over, Workspa
 
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
 _STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))
+# Commands whose section no default can replace.
+_UNASSUMED = ("reliability", "stiffness")
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
@@ -213,10 +215,16 @@ class Checker:
                 self.reporter.report(path, f"there is no result {name!r}{hint}")
         else:
             self.known(command, COMMANDS, "command", path)
+        column = name.rpartition(".")[2]
+        needed = command if command in _UNASSUMED else NEEDED.get(column.rpartition("_")[0])
+        if not dotted and needed is not None and self.reporter.raw((needed,)) is None:
+            self.reporter.report(path, f"{name!r} needs the {needed} section, and the study has none")
 
     def stiffness(self, section: StiffnessSection) -> StiffnessSection:
         root: Path = ("stiffness",)
         right = self.known(section.at, self.names.owners, "point", (*root, "at"))
+        if right and section.link is None and GROUND in self.names.owners[section.at]:
+            self.reporter.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
         if section.link is not None and self.known(section.link, self.names.moving, "moving link", (*root, "link")):
             points = self.names.points_of(section.link)
             if right and section.at not in points:
@@ -242,9 +250,10 @@ class Checker:
             clamped = [set(other.fixed) for other in self.names.section.joints.values() if other.fixed is not None]
             pins = [p for p, owners in self.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
             if self.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
-                self.kind(path, "stiffness")
-                self.kind((*path, "radial"), "stiffness")
-                self.kind((*path, "moment"), "rotational_stiffness")
+                if bearing.radial is not None:
+                    self.kind((*path, "radial"), "stiffness")
+                if bearing.moment is not None:
+                    self.kind((*path, "moment"), "rotational_stiffness")
                 if bearing.moment is not None and joint not in slides:
                     self.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
         loads = []

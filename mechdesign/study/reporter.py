@@ -95,6 +95,9 @@ class Reporter:
             if _has(data, segment):
                 found.append(segment)
                 data = data[segment]
+            elif data is None or not found:
+                # Of a section that is empty, or missing, nothing is written, and no short form leaves anything out.
+                return (*found, segment, *remaining)
             elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
                 found.append(LIST_FORM[str(segment)])
                 data = data[LIST_FORM[str(segment)]]
@@ -124,7 +127,9 @@ class Reporter:
                 known = schema_keys(root, location[:-1])
                 self.report(location, unknown_key(str(location[-1]), known), at_key=True)
             elif kind == "missing":
-                self.report(location, "is missing", at_key=True)
+                field = _fields(root, location[:-1]).get(str(location[-1]))
+                meaning = f": {field.description}" if field is not None and field.description else ""
+                self.report(location, f"is missing{meaning}", at_key=True)
             else:
                 self.report(
                     location, str(item["msg"]) if kind == "study" else _expected(kind, item["input"]), at_key=at_key

@@ -31,6 +31,12 @@ from mechdesign.study.numbers import (
 )
 from mechdesign.study.pose_models import PoseSection
 
+_ELASTIC = (
+    "The section of each link that bends; links not named are rigid. A link given by its ends is a beam from the first "
+    "to the second, and its other points are brackets: rigid from their foot on the beam, beyond an end from that end. "
+    "A link given by its points alone is beams along them in the order listed. A slide on a link rides on its beams at "
+    "the foot of its current place. A telescopic leg is a cantilever of its current length from its first end."
+)
 # Keys of each kind of section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
 
@@ -130,9 +136,9 @@ class StiffnessSection(PoseSection):
     """How stiff is it?"""
 
     link: LinkName | None = None
-    at: PointName
+    at: PointName = Field(description="the point whose stiffness is asked")
     sections: dict[str, Profile] = Field(default_factory=dict)
-    elastic: dict[LinkName, str] = Field(default_factory=dict)
+    elastic: dict[LinkName, str] = Field(default_factory=dict, description=_ELASTIC)
     actuators: dict[AnyName, Annotated[float, _Series()]] = Field(default_factory=dict)
     bearings: dict[AnyName, Bearing] = Field(default_factory=dict)
     direction: Angle | None = None

@@ -1,18 +1,17 @@
 """A planar frame by finite elements: beams, springs and rigid bars, and joints as constraints.
 
 Written to check the stiffness analysis; it shares nothing with it but geometry. Every node has (ux, uy, phi); bodies
-meet only where a joint says so, so two bodies hinged at a point have a node each there. Constraints are kept exactly:
-the stiffness matrix is taken on the space of displacements that they allow.
+meet only where a joint says so, so two bodies hinged at a point have a node each there. Joints and rigid bars are kept
+exactly, as conditions on the displacements. Every elastic element adds its deformations, each scaled so that its energy
+is half its square: the total energy is least over all that the conditions allow, however short or stiff an element is.
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
+from scipy.linalg import qr
 
-ELEMENTS = 3  # per beam; a uniform beam needs one, more exercise the assembly
-FREE = 1e-12  # share of the largest stiffness (lengths near one) below which a motion is free
+FREE = 1e-7  # deformation of a motion of unit size (lengths and stiffnesses near one) below which it is free
 
 
 class Frame:
@@ -20,19 +19,24 @@ class Frame:
 
     def __init__(self) -> None:
         self.places: list[complex] = []
-        self.springs: list[tuple[np.ndarray, np.ndarray]] = []  # (freedoms, stiffness matrix)
         self.constraints: list[dict[int, float]] = []
+        self.deformations = 0
 
     def node(self, place: complex) -> int:
         """Add a free node."""
         self.places.append(place)
         return len(self.places) - 1
 
-    def _constrain(self, *terms: tuple[int, int, float]) -> None:
-        row: dict[int, float] = {}
+    def _constrain(self, *terms: tuple[int, int, float], give: dict[int, float] | None = None) -> None:
+        """A sum of displacements is zero, or what deformations (from -1 downwards) `give`."""
+        row = {-1 - number: -factor for number, factor in (give or {}).items()}
         for node, axis, factor in terms:
             row[3 * node + axis] = row.get(3 * node + axis, 0.0) + factor
         self.constraints.append(row)
+
+    def _deform(self, count: int) -> range:
+        self.deformations += count
+        return range(self.deformations - count, self.deformations)
 
     def ground(self, node: int, *axes: int) -> None:
         """Hold some of a node's freedoms."""
@@ -80,18 +84,19 @@ class Frame:
         self._spring([(a, 0, u.real), (a, 1, u.imag), (b, 0, -u.real), (b, 1, -u.imag)], stiffness)
 
     def _spring(self, terms: list[tuple[int, int, float]], stiffness: float) -> None:
-        gradient = np.array([factor for *_, factor in terms])
-        self.springs.append(
-            (np.array([3 * node + axis for node, axis, _ in terms]), stiffness * np.outer(gradient, gradient))
-        )
+        (number,) = self._deform(1)
+        self._constrain(*terms, give={number: stiffness**-0.5})
 
     def beam(self, a: int, b: int, axial: float, bending: float, shearing: float = np.inf) -> None:
         """An elastic beam of stiffness EA, EI and shear stiffness (factor times GA) from node to node."""
-        inner = [self.node(p) for p in np.linspace(self.places[a], self.places[b], ELEMENTS + 1)[1:-1].tolist()]
-        nodes = [a, *inner, b]
-        for i, j in pairwise(nodes):
-            freedoms = np.array([3 * i, 3 * i + 1, 3 * i + 2, 3 * j, 3 * j + 1, 3 * j + 2])
-            self.springs.append((freedoms, _element(self.places[j] - self.places[i], axial, bending, shearing)))
+        span = self.places[b] - self.places[a]
+        # What the end does that the beginning, as a rigid body, would not: against the element's stiffness there.
+        factor = np.linalg.inv(np.linalg.cholesky(_element(span, axial, bending, shearing)[3:, 3:])).T
+        carried = {0: (a, 2, span.imag), 1: (a, 2, -span.real)}
+        numbers = self._deform(3)
+        for axis in range(3):
+            terms = [(b, axis, 1.0), (a, axis, -1.0), *([carried[axis]] if axis in carried else [])]
+            self._constrain(*terms, give=dict(zip(numbers, factor[axis], strict=True)))
 
     def respond(self, node: int, loads: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Displacements (3 nodes, loads) under loads (3, loads) at a node, and motions (3 nodes, k) that are free.
@@ -99,24 +104,22 @@ class Frame:
         Where a load drives a free motion, the displacements are those of the rest.
         """
         count = 3 * len(self.places)
-        matrix = np.zeros((count, count))
-        for freedoms, stiffness in self.springs:
-            matrix[np.ix_(freedoms, freedoms)] += stiffness
-        rows = np.zeros((len(self.constraints), count))
+        rows = np.zeros((len(self.constraints), count + self.deformations))
         for k, row in enumerate(self.constraints):
             for freedom, factor in row.items():
                 rows[k, freedom] += factor
-        moves = np.eye(count)
-        if len(rows):
-            _, sizes, right = np.linalg.svd(rows)
-            moves = right[np.count_nonzero(sizes > 1e-10 * sizes[0]) :].T
-        values, vectors = np.linalg.eigh(moves.T @ matrix @ moves)
-        firm = values > FREE * values.max(initial=0.0)
-        applied = np.zeros((count, 3 if loads is None else loads.shape[1]))
-        applied[3 * node : 3 * node + 3] = np.eye(3) if loads is None else loads
-        modes = moves @ vectors
-        moved = modes[:, firm] @ ((modes[:, firm].T @ applied) / values[firm][:, None])
-        return moved, modes[:, ~firm]
+        turned, triangle, _ = qr(rows.T, pivoting=True)
+        sizes = np.abs(np.diag(triangle))
+        allowed = turned[:, np.count_nonzero(sizes > 1e-10 * sizes.max(initial=0.0)) :]
+        moves = allowed[:count]
+        # Deformations from -1 downwards stand last, in reverse.
+        _, sizes, right = np.linalg.svd(allowed[count:])
+        sizes = np.concatenate([sizes, np.zeros(len(right) - len(sizes))])
+        firm = sizes > FREE
+        modes = moves @ right.T
+        applied = np.eye(3) if loads is None else loads
+        pull = modes[3 * node : 3 * node + 3, firm].T @ applied
+        return modes[:, firm] @ (pull / sizes[firm][:, None] ** 2), modes[:, ~firm]
 
     def compliance(self, node: int) -> np.ndarray:
         """Displacements (ux, uy, phi) of a node, a column for each unit load at it; nan where it moves freely."""

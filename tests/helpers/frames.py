@@ -1,10 +1,12 @@
-"""The finite-element model of a study's mechanism in a pose, from its description alone.
+"""A study's mechanism in one pose as a frame of finite elements, built as a designer would draw it.
 
-Where things give, as the study's format has it: an elastic link is beams along its points (those of a binary link in
-order along it), and a line that slides on it grows with a beam of its own; an elastic telescopic leg is a cantilever
-from its beginning, where its actuator and its bearing sit; a motor sits at the joint of its two links, or else at their
-first points; the bearing of a pin is between its two links, of a compound pin between each link and the pin, at a fixed
-pin between each link and the ground.
+An elastic link given by its ends is a straight beam between them; given by its points alone it is beams from point to
+point in the order listed. Whatever sits on the link - its other points, the pin in its slot, the slider on its line -
+is welded there, where it is in this pose, to the nearest place of these beams by a rigid bracket. A rigid link is one
+stiff body, and so is an elastic one that has no two points for a beam to lie between. An elastic telescopic leg is a
+cantilever from its beginning, where its actuator and its bearing sit; a motor sits at the joint of its two links, or
+else at their first points; the bearing of a pin is between its two links, of a compound pin between each link and the
+pin, at a fixed pin between each link and the ground.
 """
 
 from __future__ import annotations
@@ -45,7 +47,7 @@ class Structure:
     def __init__(self, study: Study, poses: Configuration, row: int = 0) -> None:
         self.study, self.pose, self.frame = study, poses.take(np.array([row])), Frame()
         self.section, self.description = study.stiffness, study.mechanism.description
-        self.nodes: dict[tuple[str, str], int] = {}
+        self.nodes: dict[tuple[str, str], int] = {}  # of each link: at its points, and where each line's slider is
         self.there: dict[str, list[int]] = {}  # nodes at each point, before joints join them
         self.clamps: list[tuple[int, int]] = []
         for link in self.description.links.values():
@@ -66,60 +68,84 @@ class Structure:
     def number(self, term: str | float) -> float:
         return self.study.mechanism.nominal[term] if isinstance(term, str) else term
 
-    def local(self, link: Link, point: str) -> complex:
-        x, y = link.points[point]
-        return complex(self.number(x), self.number(y))
+    def seats(self, link: Link) -> dict[str, complex]:
+        """What sits on a link, and where it is in the world: its points, and what slides along its lines."""
+        found = {point: self.place(point) for point in link.points}
+        for name, joint in self.description.joints.items():
+            if not isinstance(joint, Fixed) and joint.line.link == link.name:
+                found[name] = self.place(joint.point)
+        return found
 
-    def origin(self, link: Link) -> complex:
-        if link.name == GROUND:
-            return 0j
-        point = next(iter(link.points))
-        return self.place(point) - self.local(link, point) * self.turn(link.name)
-
-    def _node(self, link: str, point: str, place: complex) -> int:
-        node = self.nodes[link, point] = self.frame.node(place)
-        self.there.setdefault(point, []).append(node)
+    def _node(self, link: str, seat: str, place: complex) -> int:
+        node = self.nodes[link, seat] = self.frame.node(place)
+        if seat not in self.description.joints:
+            self.there.setdefault(seat, []).append(node)
         return node
 
-    def _hold(self, a: int, b: int, link: Link) -> None:
-        """What is between two neighbouring places of a link."""
-        section = self.section.elastic.get(link.name)
-        if section is None or abs(self.frame.places[a] - self.frame.places[b]) < 1e-12:
-            self.frame.rigid(a, b)
-        else:
-            self.frame.beam(a, b, *stiffnesses(self.section.sections[section]))
-
     def _link(self, link: Link) -> None:
-        if link.name == GROUND:
-            for point in link.points:
-                self.frame.ground(self._node(GROUND, point, self.place(point)), 0, 1, 2)
-            return
-        order = list(link.points)
+        section = self.section.elastic.get(link.name)
         if link.telescopic:
-            self._leg(link)
+            self._leg(link, section)
             return
-        if link.ends is not None:
-            length = abs(self.local(link, link.ends[1]))
-            inner = {p: self.local(link, p) for p in order if p not in link.ends}
-            along = sorted(
-                (p for p, z in inner.items() if abs(z.imag) <= 1e-9 * length and 0 < z.real < length),
-                key=lambda p: inner[p].real,
-            )
-            order = [link.ends[0], *along, link.ends[1], *(p for p in inner if p not in along)]
-        nodes = [self._node(link.name, point, self.place(point)) for point in order]
-        for a, b in pairwise(nodes):
-            self._hold(a, b, link)
+        nodes = [self._node(link.name, seat, place) for seat, place in self.seats(link).items()]
+        corners = [self.place(point) for point in link.ends or link.points]
+        if link.name == GROUND:
+            for node in nodes:
+                self.frame.ground(node, 0, 1, 2)
+        elif section is None or len(corners) < 2:
+            for node in nodes[1:]:
+                self.frame.rigid(nodes[0], node)
+        else:
+            self._beams(link, corners, stiffnesses(self.section.sections[section]))
 
-    def _leg(self, link: Link) -> None:
+    def _beams(self, link: Link, corners: list[complex], stiffness: tuple[float, float, float]) -> None:
+        """Beams from corner to corner, divided where something is welded on."""
+        welds: list[list[tuple[float, str]]] = [[] for _ in corners[1:]]
+        size = sum(abs(b - a) for a, b in pairwise(corners))
+        names = list(link.ends or link.points)
+        for seat, place in self.seats(link).items():
+            if seat in names:
+                # A corner itself: the beginning of its beam, or the end of the last.
+                k = names.index(seat)
+                welds[min(k, len(welds) - 1)].append((float(k == len(welds)), seat))
+                continue
+            options = []
+            for k, (a, b) in enumerate(pairwise(corners)):
+                share = min(1.0, max(0.0, ((place - a) / (b - a)).real)) if a != b else 0.0
+                options.append((round(abs(place - a - share * (b - a)) / size, 9), k, share))
+            _, k, share = min(options)
+            welds[k].append((share, seat))
+        before = None
+        for (a, b), here in zip(pairwise(corners), welds, strict=True):
+            first = before if before is not None else self.frame.node(a)
+            last, length = first, 0.0
+            for share, seat in [*sorted(here), (1.0, "")]:
+                # What sits closer together than a beam could bend shares a node.
+                if (share - length) * abs(b - a) > 1e-7 * size:
+                    onward = self.frame.node(a + share * (b - a))
+                    self.frame.beam(last, onward, *stiffness)
+                    last, length = onward, share
+                if seat:
+                    self.frame.rigid(last, self.nodes[link.name, seat])
+            before = last
+
+    def _leg(self, link: Link, section: str | None) -> None:
         """A telescopic leg: a rigid body at its beginning, and a rod that slides there; an elastic rod bends."""
         tail, head = link.ends
-        nodes = [self._node(link.name, point, self.place(point)) for point in link.points]
-        for node in nodes[1:]:
-            self.frame.rigid(nodes[0], node)
-        foot = self.frame.node(self.place(tail))
-        self.nodes[link.name, ":rod"] = foot
-        self._hold(foot, self._node(link.name, head, self.place(head)), link)
-        self._guide(link.name, self.nodes[link.name, tail], foot, self.turn(link.name))
+        foot = self.nodes[link.name, ":rod"] = self.frame.node(self.place(tail))
+        tip = self._node(link.name, head, self.place(head))
+        if section is None or abs(self.place(head) - self.place(tail)) < 1e-12:
+            self.frame.rigid(foot, tip)
+        else:
+            self.frame.beam(foot, tip, *stiffnesses(self.section.sections[section]))
+        body = self._node(link.name, tail, self.place(tail))
+        for seat, place in self.seats(link).items():
+            if seat == tail:
+                continue
+            joint = self.description.joints.get(seat)
+            on_rod = joint is not None and joint.line.through == head
+            self.frame.rigid(tip if on_rod else body, self._node(link.name, seat, place))
+        self._guide(link.name, body, foot, self.turn(link.name))
 
     # Joints.
 
@@ -130,39 +156,16 @@ class Structure:
                 self.clamps.append((one, two))
                 continue
             line = joint.line
-            link = self.description.links[line.link]
             if line.toward is not None:
                 along = self.place(line.toward) - self.place(line.through)
             else:
                 along = self.turn(line.link) * np.exp(1j * self.number(line.direction))
-            base = self._base(link, line.through)
-            at = self.frame.node(self.place(joint.point))
-            if link.telescopic or link.name == GROUND:
-                self.frame.rigid(base, at)
-            else:
-                self._hold(base, at, link)
             if isinstance(joint, Prismatic):
                 slider = self.nodes[joint.slider, joint.point]
             else:
                 slider = self.frame.node(self.place(joint.point))
                 self.there[joint.point].append(slider)
-            self._guide(name, at, slider, along)
-
-    def _base(self, link: Link, through: str | None) -> int:
-        """The node that a line goes through; the origin of a frame counts as the point before the first."""
-        if through is not None:
-            return self.nodes[link.name, through]
-        for point in link.points:
-            if self.local(link, point) == 0:
-                return self.nodes[link.name, point]
-        if (link.name, "") in self.nodes:
-            return self.nodes[link.name, ""]
-        node = self.nodes[link.name, ""] = self.frame.node(self.origin(link))
-        if link.name == GROUND:
-            self.frame.ground(node, 0, 1, 2)
-        else:
-            self._hold(node, self.nodes[link.name, next(iter(link.points))], link)
-        return node
+            self._guide(name, self.nodes[line.link, name], slider, along)
 
     def _guide(self, name: str, a: int, b: int, along: complex) -> None:
         """A slide, its drive and its bearing."""

@@ -1,4 +1,4 @@
-"""Random platforms on serial legs of all kinds: RRR, RPR, PRR, passive struts, and rods clamped to the platform."""
+"""Random platforms on serial legs: RRR, RPR, PRR, levers with slots, passive struts, rods clamped to the platform."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def platform(rng: Random) -> str:
     """A study of the stiffness at P of a platform that stands on three or four legs, in the pose drawn."""
     holding = rng.choice([0, 0, 1, 1, 2])  # legs without a drive that hold the platform in one way
     kinds = [rng.choice(["RR", "RP"]) for _ in range(holding)]
-    kinds += [rng.choice(["RRR", "RPR", "PRR"]) for _ in range(3 - holding)]
+    kinds += [rng.choice(["RRR", "RPR", "PRR", "lever"]) for _ in range(3 - holding)]
     driven = [False] * holding + [True] * (3 - holding)
     if rng.random() < 0.3:
         kinds, driven = [*kinds, rng.choice(["RRR", "RPR", "PRR"])], [*driven, False]
@@ -54,6 +54,16 @@ def platform(rng: Random) -> str:
             direction = math.degrees(cmath.phase(elbow - foot))
             joints[f"guide_{k}"] = {"prismatic": ["ground", f"block_{k}"], "through": f"A{k}", "direction": direction}
             drive = rng.choice([{"slide": f"guide_{k}"}, {"angle": f"rod_{k}", "from": f"block_{k}"}])
+        elif kind == "lever":
+            # Its slot runs beside its line, from a bracket to the platform's pin, before its end or beyond it.
+            axis = cmath.rect(1, cmath.phase(tip - base) + rng.uniform(-0.3, 0.3))
+            root = base + axis * complex(rng.uniform(0, 0.2), rng.uniform(-0.1, 0.1))
+            sketch |= {f"K{k}": root, f"E{k}": base + rng.uniform(0.5, 1.5) * axis}
+            local = (root - base) / axis
+            links[f"lever_{k}"] = {"from": f"A{k}", "to": f"E{k}", "points": {f"K{k}": [local.real, local.imag]}}
+            direction = math.degrees(cmath.phase((tip - root) / axis))
+            joints[f"slot_{k}"] = {"slot": f"lever_{k}", "through": f"K{k}", "direction": direction, "point": f"B{k}"}
+            drive = {"angle": f"lever_{k}"}
         elif kind == "RR":
             links[f"strut_{k}"] = [f"A{k}", f"B{k}"]
         else:

@@ -54,11 +54,9 @@ class Sprung:
         free = [point for point in pins if GROUND not in layout.owners(point)]
         if free and rng.random() < 0.3:
             self.at = rng.choice(free)
-            event("asked a pin")
         else:
             body = rng.choice(moving)
             self.link, self.at = body.name, rng.choice([*body.points, *[body.to] * bool(body.to)])
-            event("asked an elastic link" if self.link in self.elastic else "asked a rigid link")
 
     def __repr__(self) -> str:
         return "\n" + self.text()
@@ -93,4 +91,7 @@ class Sprung:
 def sprung(draw: st.DrawFn, **kinds: Any) -> Sprung:
     """Random mechanisms (see `mechanisms`) with something elastic."""
     made = draw(mechanisms(**kinds))
-    return Sprung(made, Random(draw(st.integers(0, 2**32 - 1))))
+    found = Sprung(made, Random(draw(st.integers(0, 2**32 - 1))))
+    asked = "a pin" if not found.link else "an elastic link" if found.link in found.elastic else "a rigid link"
+    event(f"asked {asked}")
+    return found

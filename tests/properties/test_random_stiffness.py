@@ -73,7 +73,7 @@ def test_every_part_is_in_equilibrium_and_pins_bear_no_moment(case: Sprung) -> N
     layout = case.layout
     places = layout.places | {guide.name: layout.places[guide.point] for guide in layout.guides.values()}
     places |= {body.name: layout.places[body.to] for body in layout.bodies.values() if body.to}
-    parts = {str(name) for column in ("from", "to") for name in table[column]}
+    parts = {str(name) for column in ("on", "by") for name in table[column]}
     loaded = "asked" if "asked" in parts else case.link
     for number, applied in enumerate(loads, 1):
         total = {part: np.zeros(3) for part in parts}
@@ -89,9 +89,9 @@ def test_every_part_is_in_equilibrium_and_pins_bear_no_moment(case: Sprung) -> N
                 continue
             name, force = str(row["joint"]), np.array([row["fx"], row["fy"], row["mz"]])
             at = places.get(name, 0j)
-            act(str(row["from"]), *force, at)
-            act(str(row["to"]), *-force, at)
-            for part in (row["from"], row["to"]):
+            act(str(row["on"]), *force, at)
+            act(str(row["by"]), *-force, at)
+            for part in (row["on"], row["by"]):
                 shares[str(part)] = max(shares[str(part)], np.abs(force).max())
             if name in layout.drives:
                 assert np.abs(force[:2]).max() < 1e-9 * np.abs(applied).max()

@@ -121,6 +121,20 @@ def test_a_bearing_across_a_guide_and_one_at_a_pin() -> None:
     assert_allclose(pin, np.diag([3e-6, 3e-6, 0]), rtol=1e-12, atol=1e-20)
 
 
+def test_a_bearing_by_a_bare_quantity_is_its_stiffness_across() -> None:
+    bare, long = (ask_stiffness(ARM, f"stiffness.bearings={{E: {given}}}") for given in ("5e2 N/mm", "{radial: 5e5}"))
+    assert_allclose(matrix(bare, "C"), matrix(long, "C"), rtol=1e-12)
+
+
+def test_a_link_of_one_point_has_no_beam_and_is_said_to_be_rigid() -> None:
+    result = ask_stiffness(SLIDER, "stiffness.elastic={rod: beam, slider: beam}", "stiffness.at=B")
+    assert not any("slider" in warning for warning in result.warnings)
+    text = SLIDER.replace("slider: {B: [0, 0], T: [0.1, 0.05]}", "slider: {B: [0, 0]}")
+    single = ask_stiffness(text, "stiffness.elastic={rod: beam, slider: beam}", "stiffness.at=B")
+    assert "link 'slider' has a single point, and so no beam" in single.warnings[0]
+    assert_allclose(matrix(single, "C"), matrix(result, "C"), rtol=1e-9, atol=1e-20)
+
+
 def test_an_asked_pin_lies_midway_in_the_bearing_of_its_two_links() -> None:
     """Each rod, else rigid, holds the pin along itself by half of its bearing; between them there is all of it."""
     rigid = ["stiffness.actuators={}", "stiffness.bearings={P: 1e6}"]

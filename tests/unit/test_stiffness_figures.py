@@ -10,6 +10,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.deflected import round_down
+from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.springs import Coil, quantity
 from mechdesign.report.figures.stiffness import figures
 
@@ -42,6 +43,21 @@ def sweep(text: str) -> str:
 )  # fmt: skip
 def test_pictures_of_a_pin(overrides: list[str], names: set[str]) -> None:
     assert pictures(FIVE_BAR, *overrides) == names
+
+
+def test_beams_and_brackets_are_drawn_in_the_mechanism() -> None:
+    """Of the links that have brackets; the other's beam is plainly the link."""
+    text = ARM.replace("upper: [O, E, 0.5]", "upper: {from: O, to: E, length: 0.5, points: {M: [0.2, 0.1]}}")
+    with style.context():
+        figure = mechanism_figure(study_of(text))
+    for axes in figure.axes:
+        (bracket,) = (line for line in axes.lines if line.get_label() == "rigid bracket")
+        beams = [line for line in axes.lines if np.ndim(line.get_xdata()) and line.get_linestyle() == "--"]
+        ends = np.array(bracket.get_xydata()) @ [1, 1j]
+        assert abs(ends[1] - ends[0]) == pytest.approx(0.1)
+        assert abs(ends[0]) == pytest.approx(0.2)
+        lengths = [abs(np.diff(np.array(line.get_xydata()) @ [1, 1j])[0]) for line in beams]
+        assert lengths == pytest.approx([0.5])
 
 
 def test_what_is_rigid_on_the_way_has_no_curve() -> None:

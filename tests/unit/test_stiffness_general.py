@@ -87,7 +87,7 @@ def test_forces_in_the_joints_of_the_press_balance() -> None:
     table = result.tables["forces"]
     place = {**points(PRESS, "A B S", crank=40), "O2": 0.136 + 0.27j, "O4": 0j}
     at = {"guide": "S"}
-    on_ground = table["from"] == "ground"
+    on_ground = table["on"] == "ground"
     force = np.array([table["fx"][on_ground].sum(), table["fy"][on_ground].sum()])
     assert_allclose(force, [0, -1000], atol=1e-9)
     arms = [place[at.get(name, name)] for name in table["joint"][on_ground]]

@@ -21,7 +21,10 @@ from helpers.stiffness import (
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.analyses.stiffness.beams import Beams
 from mechdesign.analyses.stiffness.legs import Beam, Guide, Hinge
+
+CRANK, ROD = Beams("crank", ("O", "A"), True), Beams("rod", ("A", "B"), True)
 
 
 def test_two_link_legs_on_a_platform() -> None:
@@ -104,14 +107,14 @@ def test_leg_elements_in_order_from_the_base() -> None:
     crank, guide = legs_of(SLIDER)
     assert (crank.name, guide.name) == ("crank+rod", "guide")
     assert crank.elements == (
-        Hinge("O", "crank"), Beam("O", "A", "beam"), Hinge("A"), Beam("A", "B", "beam"), Hinge("B"),
+        Hinge("O", "crank"), Beam(CRANK, "O", "A", "beam"), Hinge("A"), Beam(ROD, "A", "B", "beam"), Hinge("B"),
     )  # fmt: skip
     assert [type(element) for element in guide.elements] == [Guide]
 
 
 def test_rigid_drives_are_no_elements() -> None:
     crank, _ = legs_of(SLIDER, "stiffness.actuators={}")
-    assert crank.elements[0] == Beam("O", "A", "beam")
+    assert crank.elements[0] == Beam(CRANK, "O", "A", "beam")
 
 
 def test_dangling_links_carry_nothing() -> None:
@@ -125,7 +128,9 @@ def test_dangling_links_carry_nothing() -> None:
 
 def test_link_with_more_points_is_beams_along_them() -> None:
     bracket, _ = legs_of(BENT)
-    assert [e for e in bracket.elements if isinstance(e, Beam)] == [Beam("O", "M", "beam"), Beam("M", "A", "beam")]
+    assert [e for e in bracket.elements if isinstance(e, Beam)] == [
+        Beam(Beams("bracket", ("O", "M", "A", "X"), False), "O", "A", "beam")
+    ]
     study = study_of(BENT)
     pose = study.mechanism.solve({"bracket": 2})
     place = {name: complex(pose[f"{name}.x"], pose[f"{name}.y"]) for name in study.mechanism.points}
@@ -156,7 +161,7 @@ def test_points_on_a_binary_link_lie_along_it() -> None:
     )
     text += "  sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}\n  elastic: {a1: beam}\n"
     beams = [e for e in legs_of(text)[0].elements if isinstance(e, Beam)]
-    assert beams == [Beam("O1", "M", "beam"), Beam("M", "E1", "beam")]
+    assert beams == [Beam(Beams("a1", ("O1", "E1"), True), "O1", "E1", "beam")]
     plain = FIVE_BAR + "  sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}\n  elastic: {a1: beam}\n"
     assert matrix(ask_stiffness(text), "K") == pytest.approx(matrix(ask_stiffness(plain), "K"), rel=1e-9)
 

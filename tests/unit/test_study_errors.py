@@ -107,6 +107,7 @@ def test_wrong_mechanisms(tmp_path, monkeypatch, old, new, message):
     assert all(line.startswith("study.yaml") for line in found)
 
 
+VARIABLE = "variables: {r: {from: 20, to: 30, step: 5}}"
 QUESTIONS = [
     ("kinematic: {}", "10:1: kinematic: unknown key; did you mean 'kinematics'?"),
     ("seed: -1", "10:7: seed: must be at least 0, not -1"),
@@ -171,7 +172,16 @@ QUESTIONS = [
     ("kinematics: {outputs: [P, P.x]}", "kinematics.outputs.1: 'P.x' is listed twice"),
     ("matrix: {r: [1, 2]}", "matrix: is not available in this version"),
     ("stiffness: {at: P, sections: {b: {matrix: [[1]]}}}", "stiffness.sections.b.matrix: is not available"),
-    ("stiffness: {}", "stiffness.at: is missing"),
+    (
+        f"optimize: {{{VARIABLE}, maximize: [stiffness.k_min]}}",
+        "maximize.0: 'stiffness.k_min' needs the stiffness section",
+    ),
+    (f"optimize: {{{VARIABLE}, minimize: [k_min_mean]}}", "minimize.0: 'k_min_mean' needs the stiffness section"),
+    (f"optimize: {{{VARIABLE}, maximize: [reliability.reliability]}}", "needs the reliability section, and the study"),
+    ("stiffness: {}", "stiffness.at: is missing: the point whose stiffness is asked"),
+    ("stiffness:", "10:1: stiffness.at: is missing: the point whose stiffness is asked"),
+    ("stiffness: {at: O}", "10:17: stiffness.at: point 'O' belongs to the ground and does not move"),
+    ("stiffness: {at: P, bearings: {A: 5 N*mm}}", "'5 N*mm' is a moment, where a stiffness is expected"),
     ("stiffness: {at: P, link: crank}", "link 'crank' has no point 'P'; it has O, A"),
     ("stiffness: {at: P, elastic: {rod: beam}}", "there is no section 'beam'"),
     ("stiffness: {at: P, sections: {b: {E: 1, diameter: 2, inner_diameter: 3}}}", "3 is not below the outer one 2"),
@@ -246,3 +256,20 @@ def test_files_that_cannot_be_read(tmp_path):
         mechdesign.load(tmp_path / "missing.yaml")
     with pytest.raises(StudyError, match="cannot be read: Is a directory"):
         mechdesign.load(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("question", "said"),
+    [
+        ("stiffness", "stiffness: is missing: say which point's stiffness is asked"),
+        ("reliability", "reliability: asks what varies: give 'dimensions' or 'clearances'"),
+        ("workspace", "workspace.point: the point whose workspace is asked for is needed"),
+        ("optimize", "optimize.variables: an optimisation needs variables"),
+    ],
+)
+def test_a_missing_section_is_told_with_its_file_and_line(tmp_path, question, said):
+    path = tmp_path / "study.yaml"
+    path.write_text(STUDY)
+    with pytest.raises(StudyError) as caught:
+        getattr(mechdesign, question)(mechdesign.load(path))
+    assert str(caught.value).startswith(f"{path}:1:1: {said}")

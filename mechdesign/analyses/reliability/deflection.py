@@ -140,13 +140,7 @@ class Elasticity:
 
 
 def elasticity(study: Study) -> tuple[Elasticity | None, list[str]]:
-    """The loaded mechanism of a study, None where nothing loads it, and what is doubtful.
-
-    Raises
-    ------
-    StudyError
-        If what the stiffness section asks does not move.
-    """
+    """The loaded mechanism of a study, None where nothing loads it, and what is doubtful."""
     section, stiffness = study.reliability, study.stiffness
     assert section is not None
     if stiffness is None:

@@ -237,10 +237,8 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
     """
     section = study.reliability
     if section is None or not (section.dimensions or section.clearances):
-        raise StudyError(
-            "reliability asks what varies, and the study does not say: give reliability.dimensions or "
-            "reliability.clearances"
-        )
+        message = "asks what varies: give 'dimensions' or 'clearances'"
+        raise StudyError((study.problem(message, "reliability"),))
     mechanism: Mechanism = study.mechanism
     scalars = []
     warnings = []

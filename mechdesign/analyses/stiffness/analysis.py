@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import judge_failures, pose_in_words, solve_poses
+from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.compliance import Held
 from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
 from mechdesign.analyses.stiffness.legs import Guide, Hinge, Leg, NotSerialError, find_legs
@@ -25,7 +26,7 @@ from mechdesign.analyses.stiffness.tables import (
     springs_table,
     stiffness_table,
 )
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
@@ -86,7 +87,7 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     Raises
     ------
     StudyError
-        If the study has no stiffness section, or what it asks does not move.
+        If the study has no stiffness section.
     AssemblyError
         If no pose at all can be assembled.
     """
@@ -189,17 +190,12 @@ def ask(study: Study) -> Asked:
     Raises
     ------
     StudyError
-        If the study has no stiffness section, or what it asks does not move.
+        If the study has no stiffness section.
     """
     section = study.stiffness
     if section is None:
-        raise StudyError(
-            [
-                Problem(
-                    "is missing: say which point's stiffness is asked, for example {link: platform, at: P}", "stiffness"
-                )
-            ]
-        )
+        message = "is missing: say which point's stiffness is asked, for example {link: platform, at: P}"
+        raise StudyError((study.problem(message, "stiffness"),))
     mechanism = study.mechanism
     link = section.link
     bearers = [name for name, other in mechanism.description.links.items()
@@ -246,7 +242,12 @@ def _loaded(asked: Asked, configuration: Configuration) -> Loaded:
 def _cautions(
     study: Study, poses: Poses, asked: Asked, known: NDArray[np.bool_], rank: NDArray[np.intp], margin: Array
 ) -> list[str]:
-    told = []
+    links = study.mechanism.description.links
+    told = [
+        f"link '{name}' has a single point, and so no beam: it is rigid, though 'elastic' names it; give it two ends"
+        for name in asked.section.elastic
+        if len(beams_of(links[name]).corners) < 2
+    ]
     loose = np.flatnonzero(known & (rank < asked.size))
     if len(loose):
         told.append(

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description, Drive, Fixed, Prismatic
@@ -30,8 +29,8 @@ class Contact:
         Where it is.
     slide : int or None
         Index of its slide in the mechanism's graph.
-    reach_a, reach_b : tuple of str
-        From the body's own point to the contact; a slide lies beyond the points of the body that bears its line.
+    mount : str or None
+        Where it sits on body `a`, if elsewhere: of a motor between links that share no pin.
     give : float
         How many times the compliance of the joint's bearing lies here.
     drive : str or None
@@ -43,8 +42,7 @@ class Contact:
     b: str
     point: str
     slide: int | None = None
-    reach_a: tuple[str, ...] = ()
-    reach_b: tuple[str, ...] = ()
+    mount: str | None = None
     give: float = 1.0
     drive: str | None = None
 
@@ -52,15 +50,13 @@ class Contact:
         """The body on the other side."""
         return self.b if body == self.a else self.a
 
-    def reach(self, body: str) -> tuple[str, ...]:
-        """From the body's own point to the contact."""
-        return (self.reach_a if body == self.a else self.reach_b) or (self.point,)
+    def at(self, body: str) -> str:
+        """The point at which it sits on a body."""
+        return self.mount if self.mount is not None and body == self.a else self.point
 
     def through(self, pin: str, onward: Contact) -> Contact:
         """The hinge between the two bodies that this contact and `onward` join to a massless pin."""
-        return replace(
-            self, a=self.other(pin), b=onward.other(pin), reach_a=(), reach_b=(), give=self.give + onward.give
-        )
+        return replace(self, a=self.other(pin), b=onward.other(pin), give=self.give + onward.give)
 
 
 @dataclass(frozen=True)
@@ -97,11 +93,6 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
 
     An elastic asked link is a body of its leg like any other: what is asked is its section at the point. A pin's
     bearing gives between its two links; of more than two, between each and the pin.
-
-    Raises
-    ------
-    StudyError
-        If the asked point is fixed to the ground.
     """
     graph, description = mechanism.graph, mechanism.description
 
@@ -112,8 +103,6 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
     for body, point in graph.points:
         if ":" not in point:
             holders.setdefault(point, []).append(body)
-    if link is None and GROUND in holders[at]:
-        raise StudyError([Problem(f"point '{at}' belongs to the ground and does not move", "stiffness.at")])
     names = list(graph.bodies)
     contacts: list[Contact] = []
     for name, leg in description.links.items():
@@ -127,16 +116,15 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
         if isinstance(joint, Fixed):
             continue
         line = joint.line
-        through = line.through if line.through is not None else _origin(mechanism, line.link)
+        through = line.through if line.through is not None else origin_of(line.link)
         if isinstance(joint, Prismatic):
             other = holder(joint.slider, joint.point)
         else:
             other = f"slot:{name}"
             names.append(other)
             holders[joint.point].append(other)
-        reach = (through, joint.point) if through != joint.point else (through,)
         contacts.append(
-            Contact("slide", holder(line.link, through), other, joint.point, graph.slides.index(name), reach,
+            Contact("slide", holder(line.link, through), other, joint.point, graph.slides.index(name),
                     drive=_mover(description, name))
         )  # fmt: skip
 
@@ -191,7 +179,7 @@ def _motor(description: Description, drive: Drive, pins: Mapping[str, list[list[
         if near is not None and far is not None:
             return Contact("motor", near, far, point, drive=drive.name)
     first, second = (next(iter(description.links[link].points), origin_of(link)) for link in links)
-    return Contact("motor", drive.reference, drive.target, second, None, (first,), (second,), drive=drive.name)
+    return Contact("motor", drive.reference, drive.target, second, mount=first, drive=drive.name)
 
 
 def _clusters(point: str, there: list[str], clamps: list[tuple[str, str, str]]) -> list[list[str]]:
@@ -202,14 +190,6 @@ def _clusters(point: str, there: list[str], clamps: list[tuple[str, str, str]]) 
             joined = [c for c in clusters if a in c or b in c]
             clusters = [c for c in clusters if c not in joined] + [[body for c in joined for body in c]]
     return clusters
-
-
-def _origin(mechanism: Mechanism, link: str) -> str:
-    """What a line through the origin of a link's frame goes through: a point of the link, where one lies there."""
-    for point, terms in mechanism.description.links[link].points.items():
-        if not any(mechanism.nominal[term] if isinstance(term, str) else term for term in terms):
-            return point
-    return origin_of(link)
 
 
 def _hinges(

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.stiffness.beams import Course, course_of
 from mechdesign.analyses.stiffness.legs import Beam, Bearing, Element, Guide, Leg, Shift
 from mechdesign.analyses.stiffness.screws import Array, Chain, hinge_twist, slide_twist
 from mechdesign.mechanism import Configuration
@@ -46,7 +47,7 @@ def freedoms(
     """Twists (3, n) that elements allow, seen from places `at`, and their compliances; None where they are free."""
     for element in elements:
         if isinstance(element, Beam):
-            yield from _beam(element, section.sections[element.section], configuration, at)
+            yield from _beam(element, section, configuration, at)
         elif isinstance(element, Shift):
             yield slide_twist(np.full(configuration.shape, element.direction)), None
         elif isinstance(element, Bearing):
@@ -79,19 +80,23 @@ def _slide_direction(slide: int, configuration: Configuration) -> NDArray[np.com
 
 
 def _beam(
-    beam: Beam, profile: Profile, configuration: Configuration, at: NDArray[np.complex128]
+    beam: Beam, section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]
 ) -> Iterator[tuple[Array, Value]]:
-    tail, head = configuration.point(beam.tail), configuration.point(beam.head)
-    span = head - tail
-    length = np.abs(span)
-    if beam.axis is not None:
-        along = configuration.rotation(beam.axis)
-    else:
-        along = np.divide(span, length, out=np.ones(span.shape, dtype=complex), where=length > 0)
+    course = course_of(beam.beams, configuration)
+    tail, head = (course.foot(point, configuration.point(point)) for point in (beam.tail, beam.head))
+    profile = section.sections[beam.section]
+    yield from bending(course, np.minimum(tail, head), np.maximum(tail, head), profile, at)
+
+
+def bending(
+    course: Course, low: Array, high: Array, profile: Profile, at: NDArray[np.complex128]
+) -> Iterator[tuple[Array, Value]]:
+    """Twists (3, n) of what lies between two distances along the beams of a link, and their compliances."""
     stretch, bend, shear = rigidities(profile)
-    yield slide_twist(along), length / stretch
-    yield slide_twist(1j * along), length**3 / (12 * bend) + length * shear
-    yield hinge_twist((tail + head) / 2 - at), length / bend
+    for middle, along, length in course.between(low, high):
+        yield slide_twist(along), length / stretch
+        yield slide_twist(1j * along), length**3 / (12 * bend) + length * shear
+        yield hinge_twist(middle - at), length / bend
 
 
 def rigidities(profile: Profile) -> tuple[float, float, float]:

@@ -13,18 +13,21 @@ Davies, Circuit actions attributable to active couplings, 1995]
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.stiffness.chains import freedoms, looked_at_from
+from mechdesign.analyses.stiffness.beams import course_of
+from mechdesign.analyses.stiffness.chains import bending, freedoms, looked_at_from
 from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import RANK, RIGID, Array
 from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import Value
 from mechdesign.study.stiffness_models import StiffnessSection
 
 # Of states of self-stress, those with less than this share of the largest compliance are rounding: rigid.
@@ -42,7 +45,9 @@ class Twists:
         Seen from the asked point, or from the middle of the joints where that is far away.
     compliance : ndarray, shape (n, freedoms)
         0 of free joints, which `free` marks.
-    edge : ndarray of int, shape (freedoms,)
+    within : ndarray, shape (n or 1, edges, freedoms)
+        1 where a freedom is a part of an edge, else 0. Ways along the beams of one link share theirs, as far as they
+        go together in each pose.
     arm : complex ndarray, shape (n,)
         From where the twists are seen to the asked point.
     length : float
@@ -53,7 +58,7 @@ class Twists:
     twist: Array
     compliance: Array
     free: NDArray[np.bool_]
-    edge: NDArray[np.intp]
+    within: Array
     arm: NDArray[np.complex128]
     length: float
 
@@ -100,9 +105,9 @@ class Loaded:
         there, shift = moved_to(twists.arm) * scale, self.shift * scale[:size] @ self._loads
         found = {}
         for vertex, path in twists.network.paths.items():
-            signs = twists.network.signs(path)[twists.edge]
-            on = np.flatnonzero(signs)
-            found[vertex] = there @ ((signs[on] * twists.twist[:, :, on]) @ shift[:, on])
+            signs = twists.network.signs(path) @ twists.within
+            on = np.flatnonzero(signs.any(axis=0))
+            found[vertex] = there @ ((signs[:, None, on] * twists.twist[:, :, on]) @ shift[:, on])
         return found
 
     @property
@@ -117,19 +122,42 @@ def twists_of(network: Network, section: StiffnessSection, configuration: Config
     at, n = configuration.point(section.at), configuration.shape[0]
     joints = [edge.point for edge in network.edges]
     origin = at if section.link is None else looked_at_from(joints, at, configuration, length)
-    found = [(k, *each) for k, edge in enumerate(network.edges)
+    found = [(np.eye(len(network.edges))[k][:, None], *each) for k, edge in enumerate(network.edges) if not edge.beam
              for each in freedoms(edge.elements, section, configuration, origin)]  # fmt: skip
+    for ways in network.ways_along_beams:
+        found += _beam_freedoms(network, ways, section, configuration, origin)
     twist = np.zeros((n, 3, len(found)))
     compliance = np.zeros((n, len(found)))
-    for j, (_, each, soft) in enumerate(found):
+    within = np.zeros((max((edges.shape[1] for edges, *_ in found), default=1), len(network.edges), len(found)))
+    for j, (edges, each, soft) in enumerate(found):
+        within[:, :, j] = edges.T
         twist[:, :, j] = np.broadcast_to(each, (3, n)).T
         if soft is not None:
             compliance[:, j] = soft
     twist[:, 2] *= length
-    return Twists(
-        network, twist, compliance, np.array([soft is None for *_, soft in found], dtype=bool),
-        np.array([k for k, *_ in found], dtype=np.intp), at - origin, length,
-    )  # fmt: skip
+    free = np.array([soft is None for *_, soft in found], dtype=bool)
+    return Twists(network, twist, compliance, free, within, at - origin, length)
+
+
+def _beam_freedoms(
+    network: Network, ways: Sequence[int], section: StiffnessSection, configuration: Configuration,
+    origin: NDArray[np.complex128],
+) -> Iterator[tuple[Array, Array, Value]]:  # fmt: skip
+    """Of the beams of one link, cut wherever something sits: edges (edges, n) that go over a part, twist, compliance.
+
+    What slides changes its order along the beams from pose to pose: the parts are sorted in each.
+    """
+    beams = [beam for k in ways if (beam := network.edges[k].beam)]
+    course = course_of(beams[0].beams, configuration)
+    feet = np.array([course.foot(beam.head, configuration.point(beam.head)) for beam in beams])
+    cuts = np.sort(np.concatenate([np.zeros((1, feet.shape[1])), feet]), axis=0)
+    for low, high in pairwise(cuts):
+        over = np.zeros((len(network.edges), feet.shape[1]))
+        over[list(ways)] = feet > low
+        if (over == over[:, :1]).all():
+            over = over[:, :1]
+        for twist, compliance in bending(course, low, high, section.sections[beams[0].section], origin):
+            yield over, twist, compliance
 
 
 def load(twists: Twists, size: int) -> Loaded:
@@ -143,9 +171,9 @@ def load(twists: Twists, size: int) -> Loaded:
     n, (around, onward) = len(twists.twist), _ways(twists.network)
 
     def of(chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
-        edge, twist = twists.edge[chosen], twists.twist[:, :, chosen]
-        loops = around[:, edge][:, None] * twist[:, None]
-        return loops.reshape(n, 3 * len(around), len(edge)), onward[edge] * twist[:, :size]
+        within, twist = twists.within[:, :, chosen], twists.twist[:, :, chosen]
+        loops = (around @ within)[:, :, None] * twist[:, None]
+        return loops.reshape(n, 3 * len(around), twist.shape[2]), (onward @ within)[:, None] * twist[:, :size]
 
     compliance = twists.compliance[:, ~twists.free]
     statics = _Statics.of(*of(twists.free))
@@ -153,7 +181,7 @@ def load(twists: Twists, size: int) -> Loaded:
     bears, stress = _least_energy(statics, loops, way, compliance)
     strain = compliance[:, :, None] * bears
     total = bears.swapaxes(1, 2) @ strain
-    shift = np.zeros((n, len(twists.edge), size))
+    shift = np.zeros((n, len(twists.free), size))
     shift[:, ~twists.free] = strain
     shift[:, twists.free] = -statics.inverse @ (loops @ strain)
     held = _held((total + total.swapaxes(1, 2)) / 2, statics, twists.length, size)

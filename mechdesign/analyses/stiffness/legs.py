@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
+from mechdesign.analyses.stiffness.beams import Beams, beams_of
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
+from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Link, Term
 from mechdesign.study.stiffness_models import StiffnessSection
 
 
@@ -38,12 +37,12 @@ class Guide:
 
 @dataclass(frozen=True)
 class Beam:
-    """An elastic beam between two points; along the x axis of `axis` where given, so that no length is too short."""
+    """The beams of an elastic link between the feet of two points; see `mechdesign.analyses.stiffness.beams`."""
 
+    beams: Beams
     tail: str
     head: str
     section: str
-    axis: str | None = None
 
 
 @dataclass(frozen=True)
@@ -112,8 +111,6 @@ def find_legs(mechanism: Mechanism, link: str | None, at: str, section: Stiffnes
     ------
     NotSerialError
         Where the legs are not serial chains.
-    StudyError
-        Where what is asked does not move.
     """
     description = mechanism.description
     bodies = build_bodies(mechanism, link, at, section)
@@ -245,18 +242,8 @@ class _LegBuilder:
             own = {c.other(body) == rod_of(name): c for c in (entry, leave)}
             if True not in own or own[False].point != link.ends[0]:
                 raise NotSerialError(f"elastic leg '{name}' is joined elsewhere than at its ends")
-            return [Beam(*link.ends, section, name)]
-        nodes = self._way(link, entry.reach(body), leave.reach(body))
-        return [Beam(a, b, section) for a, b in pairwise(nodes)]
-
-    def _way(self, link: Link, entry: tuple[str, ...], leave: tuple[str, ...]) -> list[str]:
-        order = points_along(self.mechanism, link)
-        i, j = (order.index(reach[0]) if reach[0] in order else -1 for reach in (entry, leave))
-        if i < 0 or j < 0:
-            inner = [entry[0], leave[0]] if entry[0] != leave[0] else [entry[0]]
-        else:
-            inner = order[i : j + 1] if i <= j else order[j : i + 1][::-1]
-        return [*entry[:0:-1], *inner, *leave[1:]]
+            return [Beam(beams_of(link), *link.ends, section)]
+        return [Beam(beams_of(link), entry.at(body), leave.at(body), section)]
 
 
 def joint_elements(mechanism: Mechanism, contact: Contact, section: StiffnessSection) -> list[Element]:
@@ -275,24 +262,3 @@ def joint_elements(mechanism: Mechanism, contact: Contact, section: StiffnessSec
         ends = description.links[name].ends if name in description.links else None
         found.append(Bearing(name, contact.point if ends is None else ends[0], contact.slide, contact.give))
     return found
-
-
-def points_along(mechanism: Mechanism, link: Link) -> list[str]:
-    """Points along a link: as listed, and those on the line between the ends of a binary link where they lie.
-
-    Before them comes the origin of its frame, where a line goes through it.
-    """
-    points = list(link.points)
-    if link.ends is None:
-        origin = origin_of(link.name)
-        return [origin, *points] if origin in mechanism.graph.nodes else points
-
-    def number(term: Term) -> float:
-        return mechanism.nominal[term] if isinstance(term, str) else term
-
-    length = number(link.points[link.ends[1]][0])
-    place = {name: (number(x), number(y)) for name, (x, y) in link.points.items()}
-    between = [n for n, (x, y) in place.items() if 0 < x < length and abs(y) <= 1e-9 * length]
-    between.sort(key=lambda name: place[name][0])
-    rest = [name for name in points if name not in between and name not in link.ends]
-    return [link.ends[0], *between, link.ends[1], *rest]

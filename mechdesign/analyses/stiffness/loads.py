@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.force_method import Loaded
-from mechdesign.analyses.stiffness.legs import Beam
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import Array
 from mechdesign.mechanism import Configuration
@@ -25,7 +24,7 @@ class Effects:
     Parameters
     ----------
     forces : ndarray, shape (n, joints, loads, 3)
-        Force and moment about the joint's place, of the second body on the first, in the order of `joints_of`.
+        Force and moment about the joint's place, on the first body by the second, in the order of `joints_of`.
     moved : complex ndarray, shape (n, points, loads)
         Displacements of the points that `points_of` names.
     places : complex ndarray, shape (n, points)
@@ -53,9 +52,7 @@ class Effects:
 
 def joints_of(network: Network) -> list[int]:
     """Edges of the network that are joints, not beams, and bear something."""
-    return [
-        k for k, edge in enumerate(network.edges) if not any(isinstance(element, Beam) for element in edge.elements)
-    ]
+    return [k for k, edge in enumerate(network.edges) if not edge.beam]
 
 
 def points_of(network: Network) -> list[tuple[str, str, str]]:
@@ -89,14 +86,15 @@ def forces_table(study: Study, poses: Poses, network: Network, effects: Effects)
     count, joints, loads, _ = effects.forces.shape
     values = effects.forces.swapaxes(1, 2).reshape(-1, 3)
     units = study.units
+    body = "a link, 'asked' (the asked point), or the pin of a slot ('slot:') or of several links ('pin:')"
     columns = _of_loads(study, poses, loads, joints)
     columns += [
         Column("joint", np.tile([edge.name for edge in edges], count * loads), "", "point or slide"),
-        Column("from", np.tile([_link(edge.a) for edge in edges], count * loads), "", "what the force acts on"),
-        Column("to", np.tile([_link(edge.b) for edge in edges], count * loads), "", "what it comes from"),
-        Column("fx", values[:, 0], units.label("force"), "force in the joint, axes of the world"),
-        Column("fy", values[:, 1], units.label("force"), "force in the joint, axes of the world"),
-        Column("mz", values[:, 2], units.label("moment"), "moment about the joint's point"),
+        Column("on", np.tile([_link(edge.a) for edge in edges], count * loads), "", f"what the force acts on: {body}"),
+        Column("by", np.tile([_link(edge.b) for edge in edges], count * loads), "", "what exerts it"),
+        Column("fx", values[:, 0], units.label("force"), "force on the one by the other, axes of the world"),
+        Column("fy", values[:, 1], units.label("force"), "force on the one by the other, axes of the world"),
+        Column("mz", values[:, 2], units.label("moment"), "moment likewise, about the joint's point"),
     ]
     return Table("forces", tuple(columns), "what the joints bear under the study's loads")
 

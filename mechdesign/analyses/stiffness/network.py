@@ -1,7 +1,8 @@
 """Any mechanism as bodies held together by joints and beams: its loops, and what lies on the way to each body.
 
-Vertices are rigid bodies, and the nodes of elastic links; edges are joints and beams. A tree from the ground reaches
-every vertex; every other edge closes a loop. Motors that hold the angle between two links that no joint joins are edges
+Vertices are rigid bodies, and the places of elastic links where something sits on their beams; edges are joints and, of
+an elastic link, the way along its beams from their beginning to each such place. A tree from the ground reaches every
+vertex; every other edge closes a loop. Motors that hold the angle between two links that no joint joins are edges
 of their own: free to shift, held in turning.
 """
 
@@ -10,13 +11,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.analyses.stiffness.legs import Beam, Element, Hinge, joint_elements, points_along
+from mechdesign.analyses.stiffness.legs import Beam, Element, Hinge, joint_elements
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.study.stiffness_models import StiffnessSection
@@ -32,9 +34,9 @@ class Edge:
     Parameters
     ----------
     name : str
-        Of the joint's point or slide, or of the link that the beam is a part of.
+        Of the joint's point or slide, or of the link whose beams it goes along.
     point : str
-        Where it is; of a beam its second end.
+        Where it is; along beams, what sits at its end.
     """
 
     a: str
@@ -42,6 +44,11 @@ class Edge:
     elements: tuple[Element, ...]
     name: str
     point: str
+
+    @property
+    def beam(self) -> Beam | None:
+        """The way along the beams of a link; None of a joint."""
+        return next((element for element in self.elements if isinstance(element, Beam)), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +73,15 @@ class Network:
     loops: tuple[Way, ...]
     points: Mapping[str, tuple[tuple[str, str], ...]]
 
+    @cached_property
+    def ways_along_beams(self) -> tuple[tuple[int, ...], ...]:
+        """Of each elastic link that carries, the edges that go along its beams."""
+        found: dict[str, tuple[int, ...]] = {}
+        for k, edge in enumerate(self.edges):
+            if edge.beam:
+                found[edge.name] = (*found.get(edge.name, ()), k)
+        return tuple(found.values())
+
     def signs(self, way: Sequence[tuple[int, int]]) -> Signs:
         """Sign of each edge on a way, 0 where it is not on it, shape (edges,)."""
         found = np.zeros(len(self.edges))
@@ -83,11 +99,6 @@ def build_network(mechanism: Mechanism, link: str | None, at: str, section: Stif
         The asked link; None for the pin `at` itself.
     section : StiffnessSection
         What is elastic.
-
-    Raises
-    ------
-    StudyError
-        If the asked point does not move.
     """
     bodies = build_bodies(mechanism, link, at, section)
     builder = _Builder(mechanism, bodies, section)
@@ -104,19 +115,17 @@ class _Builder:
     section: StiffnessSection
 
     def edges(self) -> list[Edge]:
-        """All joints and beams, and the motors that sit at no joint."""
+        """All joints, the motors that sit at no joint, and the ways along the beams of elastic links."""
         found: list[Edge] = []
         for contact in self.bodies.contacts:
             elements = tuple(joint_elements(self.mechanism, contact, self.section))
             name = contact.point if contact.slide is None else self.mechanism.graph.slides[contact.slide]
             if contact.kind == "motor":
                 name = contact.drive or ""
-            found.append(
-                Edge(self._vertex(contact, contact.a, found), self._vertex(contact, contact.b, found), elements, name,
-                     contact.point)
-            )  # fmt: skip
-        for name, section in self.section.elastic.items():
-            found += self._beams(name, section)
+            a, b = (self._vertex(contact, body) for body in (contact.a, contact.b))
+            found.append(Edge(a, b, elements, name, contact.point))
+        for name in self.section.elastic:
+            found += self._beams(name)
         return found
 
     def points(self) -> dict[str, tuple[tuple[str, str], ...]]:
@@ -142,48 +151,54 @@ class _Builder:
             return body
         return f"{body}@{point}"
 
-    def _vertex(self, contact: Contact, body: str, found: list[Edge]) -> str:
-        """The vertex of a body at a contact; a slide on an elastic link grows with a beam of its own."""
-        if body in (GROUND, ASKED) or self.bodies.link_of(body) not in self.section.elastic:
-            return body
+    def _vertex(self, contact: Contact, body: str) -> str:
+        """The vertex of a body at a contact; what slides on an elastic link sits on its beams."""
         link = self.bodies.link_of(body)
+        if body in (GROUND, ASKED) or link not in self.section.elastic:
+            return body
         described = self.mechanism.description.links[link]
         if described.telescopic and described.ends is not None:
             if body == link:
                 return body
             inner = contact.slide is not None and contact.other(body) == link
             return f"{body}@{described.ends[0 if inner else 1]}"
-        reach = contact.reach(body)
-        vertex = f"{body}@{reach[0]}"
-        if len(reach) == 2:
-            # Of two slides on one line, each has a beam of its own.
-            tail, head = reach
-            vertex, root = f"{body}@{self.mechanism.graph.slides[contact.slide or 0]}", vertex
-            found.append(Edge(root, vertex, (Beam(tail, head, self.section.elastic[link]),), link, head))
-        return vertex
+        rides = contact.slide is not None and body == contact.a
+        return f"{body}@{self.mechanism.graph.slides[contact.slide or 0] if rides else contact.at(body)}"
 
-    def _beams(self, name: str, section: str) -> list[Edge]:
+    def _beams(self, name: str) -> list[Edge]:
+        """From the beginning of a link's beams to its other points and to what slides on it."""
         link = self.mechanism.description.links[name]
-        if link.telescopic and link.ends is not None:
-            rod, (tail, head) = rod_of(name), link.ends
-            return [Edge(f"{rod}@{tail}", f"{rod}@{head}", (Beam(tail, head, section, name),), name, head)]
+        beams, body = beams_of(link), rod_of(name) if link.telescopic else name
+        sitting = {point: point for point in beams.corners}
+        if not link.telescopic:
+            sitting |= {point: point for point in link.points}
+            riding = [c for c in self.bodies.contacts if c.slide is not None and c.a == name]
+            sitting |= {self.mechanism.graph.slides[contact.slide or 0]: contact.point for contact in riding}
+        root, *_ = sitting
+        section = self.section.elastic[name]
         return [
-            Edge(f"{name}@{a}", f"{name}@{b}", (Beam(a, b, section),), name, b)
-            for a, b in pairwise(points_along(self.mechanism, link))
-        ]
+            Edge(f"{body}@{root}", f"{body}@{seat}", (Beam(beams, root, point, section),), name, point)
+            for seat, point in sitting.items()
+            if seat != root
+        ]  # fmt: skip
 
 
 def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
-    """Edges that can carry a load from the asked vertex: what hangs by one edge is taken off, again and again."""
+    """Edges that can carry a load from the asked vertex: what hangs by one edge is taken off, again and again.
+
+    Along beams that carry, the way to a place where nothing is borne stays: what is bent before it moves it.
+    """
+    kept = edges
     while True:
         degree: dict[str, int] = {}
-        for edge in edges:
+        for edge in kept:
             for end in (edge.a, edge.b):
                 degree[end] = degree.get(end, 0) + 1
         loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, asked)}
         if not loose:
-            return edges
-        edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
+            bent = {edge.name for edge in kept if edge.beam}
+            return [edge for edge in edges if edge in kept or (edge.beam and edge.name in bent)]
+        kept = [edge for edge in kept if edge.a not in loose and edge.b not in loose]
 
 
 def _pinned(edges: list[Edge], bodies: Bodies) -> list[Edge]:

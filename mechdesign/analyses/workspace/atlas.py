@@ -107,7 +107,7 @@ class Atlas:
     @cached_property
     def _drawn(self) -> dict[str, float]:
         """Angles of the sketch: others lie within half a turn of them."""
-        return self.plan.mechanism.drawn_angles()
+        return self.plan.core.drawn_angles()
 
     @property
     def spacing(self) -> float:

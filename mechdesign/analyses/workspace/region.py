@@ -19,7 +19,7 @@ from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.pieces import Pieces
 from mechdesign.analyses.workspace.quadrature import Integral, integrate, simple_means
 from mechdesign.analyses.workspace.rays import Designs, Floats
-from mechdesign.errors import MechanismError, Problem, StudyError
+from mechdesign.errors import MechanismError, StudyError
 from mechdesign.memory import keep_freed_memory
 from mechdesign.study import Study
 from mechdesign.study.workspace_models import Over, WorkspaceSection
@@ -191,7 +191,7 @@ def _scan(section: WorkspaceSection, unit: float) -> tuple[float, float]:
 
 
 def _problem(study: Study, key: str, message: str) -> StudyError:
-    return StudyError((Problem(message, key, str(study.path or "")),))
+    return StudyError((study.problem(message, *key.split(".")),))
 
 
 def answer(question: Question, places: Places, count: int, effort: Effort) -> Answer:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words, solve_poses
 from mechdesign.analyses.stiffness.analysis import Asked, ask
+from mechdesign.analyses.stiffness.beams import course_of
 from mechdesign.analyses.stiffness.force_method import load, twists_of
-from mechdesign.analyses.stiffness.legs import Beam
+from mechdesign.analyses.stiffness.network import Edge
 from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
@@ -89,13 +91,9 @@ def _shapes(asked: Asked, configuration: Configuration, scene: Scene) -> list[tu
 
     shapes = [(np.array([at]), shift(network.asked, at)[None])]
     bent = set()
-    for edge in network.edges:
-        for element in edge.elements:
-            if isinstance(element, Beam) and edge.a in moved and edge.b in moved:
-                bent.add(edge.name)
-                tail, head = scene.points[element.tail], scene.points[element.head]
-                shapes.append(_beam(tail, head, shift(edge.a, tail), shift(edge.b, head),
-                                    moved[edge.a][2], moved[edge.b][2]))  # fmt: skip
+    for ways in network.ways_along_beams:
+        bent.add(network.edges[ways[0]].name)
+        shapes += _bent([network.edges[k] for k in ways], configuration, moved, shift)
     for link, points in network.points.items():
         borne = [(scene.points[name], vertex) for name, vertex in points if vertex in moved]
         if link in bent or len(borne) < 2:
@@ -104,6 +102,28 @@ def _shapes(asked: Asked, configuration: Configuration, scene: Scene) -> list[tu
         corners = hull(list(where))
         outline = [*corners, corners[0]] if len(corners) > 2 else corners
         shapes.append((np.array(outline), np.array([shift(where[place], place) for place in outline])))
+    return shapes
+
+
+def _bent(
+    ways: Sequence[Edge], configuration: Configuration, moved: Mapping[str, NDArray[np.float64]],
+    shift: Callable[[str, complex], Complexes],
+) -> list[tuple[Complexes, Complexes]]:  # fmt: skip
+    """The beams of an elastic link between the places where something sits, and its brackets."""
+    beam = ways[0].beam
+    assert beam is not None
+    course = course_of(beam.beams, configuration)
+    sitting = [(ways[0].a, beam.beams.corners[0]), *((edge.b, edge.point) for edge in ways)]
+    feet = [float(course.foot(point, configuration.point(point))[0]) for _, point in sitting]
+    bases = [complex(course.place(np.array([foot]))[0]) for foot in feet]
+    order = sorted(range(len(feet)), key=feet.__getitem__)
+    shapes = []
+    for one, other in pairwise(order):
+        (first, last), (tail, head) = (sitting[one][0], sitting[other][0]), (bases[one], bases[other])
+        shapes.append(_beam(tail, head, shift(first, tail), shift(last, head), moved[first][2], moved[last][2]))
+    for (vertex, point), base in zip(sitting, bases, strict=True):
+        bracket = np.array([base, complex(configuration.point(point)[0])])
+        shapes.append((bracket, np.array([shift(vertex, place) for place in bracket])))
     return shapes
 
 

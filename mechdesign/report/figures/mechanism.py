@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
+from mechdesign.report.figures.beams import draw_beams
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
 from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, fit, framed, scale_of
 from mechdesign.report.figures.labels import paper
@@ -17,7 +18,6 @@ from mechdesign.report.figures.scene import Scene, pose, travels
 from mechdesign.report.figures.sweep import solve_sweep
 
 if TYPE_CHECKING:
-    from mechdesign.mechanism import Mechanism
     from mechdesign.mechanism.configuration import Configuration
     from mechdesign.study import Study
 
@@ -41,7 +41,7 @@ def mechanism_figure(study: Study, title: str = "sketch pose") -> Figure:
     try:
         sweep = solve_sweep(study, _POSES)
     except MechdesignError:
-        return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.label("length"))
+        return _compose(study, panels, travels(_drawable(scenes)))
     poses = [pose(mechanism, sweep.configuration, k) for k in range(len(sweep.rows))]
     first = next((k for k, scene in enumerate(poses) if scene is not None), None)
     if first is not None:
@@ -51,7 +51,7 @@ def mechanism_figure(study: Study, title: str = "sketch pose") -> Figure:
             note = f"{title.removesuffix(' pose')} and {note}"
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
         scenes += poses
-    return _compose(mechanism, panels, travels(_drawable(scenes)), study.units.label("length"))
+    return _compose(study, panels, travels(_drawable(scenes)))
 
 
 def sketch_figure(study: Study) -> Figure:
@@ -72,6 +72,7 @@ def sketch_figure(study: Study) -> Figure:
         crosses.real, crosses.imag, "x", color=style.INK, alpha=0.5, markersize=7, markeredgewidth=1.6, zorder=4.5
     )  # fmt: skip
     axes.set_title("the sketch, assembled" + ("; crosses: where it is drawn" if len(rough) else ""), loc="left")
+    draw_beams(axes, study, mechanism.sketch_configuration)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=crosses)
     return figure
 
@@ -86,8 +87,9 @@ def _same(one: Scene | None, other: Scene | None) -> bool:
     return all(abs(one.points[name] - other.points[name]) <= _SAME * one.span for name in one.points)
 
 
-def _compose(mechanism: Mechanism, panels: list[Panel], travel: Travel, unit: str) -> Figure:
+def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
     """Panels beside or above each other, whichever shows the mechanism larger."""
+    mechanism, unit = study.mechanism, study.units.label("length")
     places: list[complex] = []
     for _, configuration, index in panels:
         scene = pose(mechanism, configuration, index)
@@ -122,6 +124,7 @@ def _compose(mechanism: Mechanism, panels: list[Panel], travel: Travel, unit: st
             axes.set_xlabel(style.axis_label("x", unit))
         else:
             axes.tick_params(labelbottom=False)
+        draw_beams(axes, study, configuration, index)
         draw_mechanism(axes, mechanism, configuration, index, travel=travel)
     return figure
 

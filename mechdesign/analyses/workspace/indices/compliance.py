@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate
 from mechdesign.analyses.workspace.indices.local import Floats
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import StudyError
 from mechdesign.mechanism.configuration import Configuration
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) 
     assert section is not None
     if not (section.elastic or section.actuators or section.bearings):
         message = "indices of stiffness need something that gives: elastic links, actuators or bearings"
-        raise StudyError((Problem(message, "stiffness", str(study.path or "")),))
+        raise StudyError((study.problem(message, "stiffness"),))
     return assembled_only(partial(_evaluate, ask(study), value, free))
 
 

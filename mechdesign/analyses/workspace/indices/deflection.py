@@ -9,7 +9,7 @@ import numpy as np
 from mechdesign.analyses.workspace.indices.compliance import of_compliance
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index
 from mechdesign.analyses.workspace.indices.local import Floats
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import StudyError
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
@@ -27,7 +27,7 @@ def prepare(study: Study) -> Evaluate:
     loads = np.array(study.stiffness.loads)
     if not len(loads):
         message = "the index 'deflection' needs loads, for example {loads: [[100, 0, 0]]}"
-        raise StudyError((Problem(message, "stiffness.loads", str(study.path or "")),))
+        raise StudyError((study.problem(message, "stiffness", "loads"),))
 
     def evaluate(soft: Floats) -> Floats:
         moved = np.einsum("nij,lj->nli", soft, loads[:, : soft.shape[1]])

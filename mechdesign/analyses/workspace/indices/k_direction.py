@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from mechdesign.analyses.stiffness.compliance import directional
 from mechdesign.analyses.workspace.indices.compliance import of_compliance
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import StudyError
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
@@ -25,7 +25,7 @@ def prepare(study: Study) -> Evaluate:
     direction = study.stiffness.direction
     if direction is None:
         message = "the index 'k_direction' needs a direction, for example {direction: 90}"
-        raise StudyError((Problem(message, "stiffness.direction", str(study.path or "")),))
+        raise StudyError((study.problem(message, "stiffness", "direction"),))
     turn = direction * study.units.angle_factor
     return of_compliance(study, lambda soft: directional(soft, turn), 0.0)
 

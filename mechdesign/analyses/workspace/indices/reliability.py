@@ -16,7 +16,7 @@ from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index, number
 from mechdesign.analyses.workspace.indices.local import Floats
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism
 
 if TYPE_CHECKING:
@@ -40,12 +40,12 @@ def prepare(study: Study) -> Evaluate:
     question = ask(study, study.reliability)
     if not question.limited:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
-        raise StudyError((Problem(message, "reliability.limits", str(study.path or "")),))
+        raise StudyError((study.problem(message, "reliability", "limits"),))
     rates = constant_rates(study, study.reliability)
     limited = {band.output for band in question.bands} | {part for disc in question.discs for part in (disc.x, disc.y)}
     if rates is None and any(question.channels[k].order for k in limited):
         message = "the index 'reliability' of velocities needs rates of the drives: those of a path are not known here"
-        raise StudyError((Problem(message, "reliability.limits", str(study.path or "")),))
+        raise StudyError((study.problem(message, "reliability", "limits"),))
     # Where only positions are limited, rates do not matter.
     rates = rates or Rates((0.0,) * len(study.mechanism.drives), (0.0,) * len(study.mechanism.drives))
     return assembled_only(partial(evaluate, study.mechanism, question, rates, sources, elasticity(study)[0]))
