@@ -82,6 +82,26 @@ class Goal:
         alike = designs > 0 and np.ptp(counts.sum(axis=1)) == 0
         return found, values[counts].reshape(designs, -1) if alike else None
 
+    def residuals(self, result: Result, designs: int = 1) -> NDArray[np.float64] | None:
+        """Errors whose squares have this goal's square as their sum, shape (designs, rows); None where it has none.
+
+        Parameters
+        ----------
+        result : Result
+            With the tables of targets and of the motion.
+        """
+        chosen = choose(result, self.column, dict(self.where))
+        outputs = {str(name) for name in chosen.table["output"][chosen.counts]} if chosen.table.name == "targets" else ()
+        if chosen.column != "rms" or len(outputs) != 1 or "motion" not in result.tables:
+            return None
+        (output,), motion = outputs, result.tables["motion"]
+        parts = [f"{output}_error"] if f"{output}.x_error" not in motion else [f"{output}.{k}_error" for k in "xy"]
+        errors = np.stack([motion[name].reshape(designs, -1) for name in parts], axis=1)
+        known = np.isfinite(errors)
+        number = np.maximum(known[:, 0].sum(axis=1), 1)
+        found = np.where(known, errors, 0.0) / np.sqrt(number)[:, None, None]
+        return np.asarray(found.reshape(designs, -1))
+
 
 def goal(name: str, *, smallest: bool = False) -> Goal:
     """Read a result's name, such as ``GII``, ``stiffness.k_min``, ``kinematics.extremes.C.x.range``.
