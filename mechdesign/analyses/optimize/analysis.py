@@ -160,7 +160,7 @@ def _ask(study: Study, judge: Judge, compute: Compute, budget: int, seed: int) -
         rows = _weights(study, len(goals)).tolist()
         judge.progress.start(budget, "designs")
         explorer = Explorer(evaluate, dimensions, budget, judge.parts(), rough=judge.rough)
-        return tuple(_doubts(searching.search(explorer, smallest, rows, seed), budget))
+        return tuple(_doubts(searching.search(explorer, smallest, rows, seed, patient=section.evaluations is not None), budget))
     from mechdesign.analyses.optimize import pareto
 
     judge.progress.start(budget, "designs")

@@ -21,7 +21,7 @@ from mechdesign.analyses.workspace.rays import Floats
 Integers = NDArray[np.intp]
 
 # Steps of differences, and half the widths of the boxes in which they are used, in parts of the ranges.
-LADDER = ((1e-3, 0.3), (1e-5, 0.1), (1e-5, 0.01))
+LADDER = ((1e-4, 0.3), (1e-5, 0.03))
 # Where values are known to a tolerance, differences over less than this are noise.
 ROUGH = ((1e-2, 0.3), (1e-3, 0.05))
 SQUARES_STEP, MOST_SQUARES, MOST_STEPS = 1e-5, 60, 60

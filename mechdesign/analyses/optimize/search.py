@@ -22,15 +22,16 @@ from mechdesign.analyses.workspace.rays import Floats
 START, STARTS, SLOW_START, MOST_STARTS = 500, 3, 60, 12
 # Points of a start's first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
 SAMPLE, MOST_VERTICES = 16, 4
-POPULATION, SMALLEST_POPULATION, PATIENCE = 8, 16, 6
+POPULATION, SMALLEST_POPULATION, PATIENCE = 8, 24, 8
 # The part of a start's evaluations that differential evolution may take.
 EVOLUTION = 0.5
 # An improvement below this fraction of the objective's range is left to the descents.
 ENOUGH = 1e-3
 # Descents at once; how far apart they begin, in parts of the ranges, and how much worse than the best, of all merits.
-ABREAST, APART = 6, 0.1
+ABREAST, APART = 6, 0.05
 # Evaluations of a descent, in those of its slopes.
 DESCENT = 20
+ROUNDS, MOST_ROUNDS = 2, 1000
 # Steps that may not improve the optimum, in parts of the ranges; evaluations kept for that, in those of slopes.
 CHECKED, MOST_CHECKS, CHECKS = 1e-4, 12, 30
 # Improvements below these parts of the objective, and of all its values, are rounding; of values known to a tolerance.
@@ -63,7 +64,9 @@ def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
     return STARTS * START * (dimensions + 1) * rows
 
 
-def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int) -> Ending:
+def search(
+    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int, *, patient: bool = True
+) -> Ending:
     """Fill an explorer's memory with what the goals' extremes and the best weighted sums need, while evaluations last.
 
     Parameters
@@ -72,6 +75,8 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
         Which goals are minimised.
     rows : sequence of sequence of float
         Weights, in the order of the goals.
+    patient : bool
+        Whether all evaluations are used; else it ends when two starts have found the same.
     """
     rng = np.random.default_rng(seed)
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
@@ -82,9 +87,18 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
         begins.append(budget - explorer.left)
         explorer.reserve = last + (budget - last) * (starts - 1 - k) // starts
         try:
-            _start(explorer, smallest, rows, own, begins[-1])
+            _start(explorer, smallest, rows, own, begins[-1], patient)
         except Spent:
             pass
+        known, done = explorer.known, [*begins, budget - explorer.left]
+        if not known.feasible.any():
+            # Too few for anything but to look around.
+            explorer(own.random((explorer.left - explorer.reserve, explorer.dimensions)))
+        elif not patient and k and all(
+            np.ptp(np.sort(ends)[:2]) <= ROUNDING * abs(ends.min()) + OF_ALL * np.ptp(known.values[known.feasible])
+            for ends in (_ends(known, _weighted(known, smallest, row), done) for row in rows)
+        ):  # fmt: skip
+            break
     begins.append(budget - explorer.left)
     explorer.reserve = 0
     try:
@@ -96,9 +110,10 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
 
 
 def _start(
-    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator, begin: int
+    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator, begin: int,
+    patient: bool,
 ) -> None:
-    """Search from points of its own until the evaluations of this start are used up.
+    """Search from points of its own until the evaluations of this start are used up, or after `ROUNDS` of descents.
 
     Parameters
     ----------
@@ -108,18 +123,18 @@ def _start(
     Raises
     ------
     Spent
-        If they are, which it always ends with unless nothing is left to be tried.
+        If they are.
     """
     n, allowed = explorer.dimensions, explorer.left - explorer.reserve
     explorer(sample(n, rng, SAMPLE * (n + 1), allowed // 3))
-    if begin == 0:
+    if begin == 0 and allowed > 4 * len(smallest) * DESCENT * (2 * n + 1):
         _extremes(explorer, smallest, rng, allowed)
     for row in rows:
         most = int(EVOLUTION * allowed) // len(rows)
         evolve(explorer, _weighted(explorer.known, smallest, row), rng, begin, most)
     ladder = ROUGH if explorer.rough else LADDER
     tried: list[list[int]] = [[] for _ in rows]
-    while True:
+    for _ in range(MOST_ROUNDS if patient else ROUNDS):
         room = (explorer.left - explorer.reserve) // (DESCENT * (2 * n + 1) * len(rows))
         found: list[tuple[Objective, int]] = []
         for row, done in zip(rows, tried, strict=True):
@@ -131,10 +146,8 @@ def _start(
             ends = descend(explorer, found, ladder)
             for (_, k), end in zip(found, ends, strict=True):
                 next(done for done in tried if k in done).append(end)
-        before = explorer.left
-        explorer(rng.random((SAMPLE, n)))
-        if explorer.left == before:
-            return
+        if len(found) < len(rows) * ABREAST:
+            explorer(rng.random((SAMPLE, n)))
 
 
 def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Generator, allowed: int) -> None:
