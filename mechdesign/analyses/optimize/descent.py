@@ -25,6 +25,8 @@ LADDER = ((1e-4, 0.3), (1e-5, 0.03))
 # Where values are known to a tolerance, differences over less than this are noise.
 ROUGH = ((1e-2, 0.3), (1e-3, 0.05))
 SQUARES_STEP, MOST_SQUARES, MOST_STEPS = 1e-5, 60, 60
+# Gains of a step, in parts of what a range changes, below which a descent ends.
+ENOUGH, ROUGH_ENOUGH = 1e-14, 1e-5
 # How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
 SLACK = 1e-9
 # An impossible point's objective above the last possible one's, in parts of what a range changes.
@@ -199,7 +201,7 @@ class _Descent:
             cost, np.concatenate([begin, tops]), jac=cost_slope, method="SLSQP",
             bounds=[*zip(low, high, strict=True), *[(None, None)] * more],
             constraints=[constraint] if len(owner) + len(lengths) else (),
-            options={"maxiter": MOST_STEPS, "ftol": 1e-14},
+            options={"maxiter": MOST_STEPS, "ftol": ROUGH_ENOUGH if self.explorer.rough else ENOUGH},
         )  # fmt: skip
 
     def _linear(self, ask: Ask, u: Floats, step: float) -> tuple[list[Floats], list[Floats]]:

@@ -21,7 +21,6 @@ from mechdesign.expressions import Number
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError, choose
 from mechdesign.study import Study
-from mechdesign.study.poses import stacked as stacked_poses
 from mechdesign.study.variants import faults, follows, variant
 
 EMPTY = "nothing of the workspace can be reached"
@@ -104,6 +103,7 @@ class Evaluator:
         problems = [problem for command in self._commands() for problem in self._look(command)]
         if problems:
             raise StudyError(problems)
+        self._formulas = {command: stacked.formulas_of(study, command) for command in self._together}
         # By command of which every pose must be valid: the columns of its clearances.
         self._clear: dict[str, slice] = {}
         for command, tables in self._together.items() if most_rows else ():
@@ -237,7 +237,8 @@ class Evaluator:
     ) -> None:
         places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
         wanted = {*tables, "motion"} if self.squares.intersection(*tables.values()) else set(tables)
-        stack = stacked.tables(self.study, command, wanted, len(rows), places, parameters, self._outputs)
+        stack = stacked.tables(self.study, command, wanted, len(rows), places, parameters, self._outputs,
+                               self._formulas[command])  # fmt: skip
         failed = FAILED_ARRAY[_first(stack.reason)]
         wrong = stack.reason != 0
         # The errors of the poses that are left would be the smaller the more of them are lost.
@@ -245,8 +246,10 @@ class Evaluator:
         batch.note(rows, wrong.any(axis=1) if whole else wrong.all(axis=1), failed)
         some = np.ones(len(rows), dtype=bool) if command in self._clear else batch.reasons[rows] != ""
         if self._graded and some.any():
-            poses = stacked_poses(self.study.poses(command), int(some.sum()), batch.take(batch.places, rows[some]),
-                                  batch.take(batch.parameters, rows[some]))  # fmt: skip
+            poses = stacked.poses_of(
+                self.study, command, int(some.sum()), batch.take(batch.places, rows[some]),
+                batch.take(batch.parameters, rows[some]), self._formulas[command],
+            )  # fmt: skip
             margins = clearances(self.study, poses)
             batch.shortfall[rows[some]] = shortfall(margins)
             if command in self._clear:

@@ -22,7 +22,9 @@ from mechdesign.analyses.workspace.rays import Floats
 START, STARTS, SLOW_START, MOST_STARTS = 500, 3, 60, 12
 # Points of a start's first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
 SAMPLE, MOST_VERTICES = 16, 4
-POPULATION, SMALLEST_POPULATION, PATIENCE = 8, 24, 8
+# The least part of a start's evaluations that its sample takes.
+LOOKED = 6
+POPULATION, SMALLEST_POPULATION, PATIENCE, ROUGH_PATIENCE = 8, 24, 8, 3
 # The part of a start's evaluations that differential evolution may take.
 EVOLUTION = 0.5
 # An improvement below this fraction of the objective's range is left to the descents.
@@ -47,7 +49,7 @@ class Ending:
     Parameters
     ----------
     checked : bool
-        Whether no small step improves any optimum.
+        Whether the evaluations were enough for descents, and no small step improves any optimum.
     ends : list of ndarray
         For each row of weights the objective's smallest value of every start, in the goal's own units where it weighs
         one; nan where a start found no feasible point.
@@ -82,14 +84,11 @@ def search(
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
     starts = int(np.clip(budget // (START * (explorer.dimensions + 1) * len(rows)), 1, MOST_STARTS))
     last = min(budget // 4, CHECKS * slope * len(rows))
-    begins = []
+    begins, whole = [], False
     for k, own in enumerate(rng.spawn(starts)):
         begins.append(budget - explorer.left)
         explorer.reserve = last + (budget - last) * (starts - 1 - k) // starts
-        try:
-            _start(explorer, smallest, rows, own, begins[-1], patient)
-        except Spent:
-            pass
+        whole |= _start(explorer, smallest, rows, own, begins[-1], patient)
         known, done = explorer.known, [*begins, budget - explorer.left]
         if not known.feasible.any():
             # Too few for anything but to look around.
@@ -102,7 +101,7 @@ def search(
     begins.append(budget - explorer.left)
     explorer.reserve = 0
     try:
-        checked = all([_confirmed(explorer, _weighted(explorer.known, smallest, row), rng) for row in rows])
+        checked = whole and all([_confirmed(explorer, _weighted(explorer.known, smallest, row), rng) for row in rows])
     except Spent:
         checked = False
     known = explorer.known
@@ -112,7 +111,7 @@ def search(
 def _start(
     explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator, begin: int,
     patient: bool,
-) -> None:
+) -> bool:
     """Search from points of its own until the evaluations of this start are used up, or after `ROUNDS` of descents.
 
     Parameters
@@ -120,34 +119,38 @@ def _start(
     begin : int
         First row of `explorer.known` that belongs to this start.
 
-    Raises
-    ------
-    Spent
-        If they are.
+    Returns
+    -------
+    bool
+        Whether the evaluations were enough for descents to come to their end.
     """
-    n, allowed = explorer.dimensions, explorer.left - explorer.reserve
-    explorer(sample(n, rng, SAMPLE * (n + 1), allowed // 3))
-    if begin == 0 and allowed > 4 * len(smallest) * DESCENT * (2 * n + 1):
-        _extremes(explorer, smallest, rng, allowed)
-    for row in rows:
-        most = int(EVOLUTION * allowed) // len(rows)
-        evolve(explorer, _weighted(explorer.known, smallest, row), rng, begin, most)
+    n, allowed, whole = explorer.dimensions, explorer.left - explorer.reserve, False
     ladder = ROUGH if explorer.rough else LADDER
     tried: list[list[int]] = [[] for _ in rows]
-    for _ in range(MOST_ROUNDS if patient else ROUNDS):
-        room = (explorer.left - explorer.reserve) // (DESCENT * (2 * n + 1) * len(rows))
-        found: list[tuple[Objective, int]] = []
-        for row, done in zip(rows, tried, strict=True):
-            objective = _weighted(explorer.known, smallest, row)
-            promising = _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, ABREAST)))
-            found += [(objective, k) for k in promising]
-            done += promising
-        if found:
-            ends = descend(explorer, found, ladder)
-            for (_, k), end in zip(found, ends, strict=True):
-                next(done for done in tried if k in done).append(end)
-        if len(found) < len(rows) * ABREAST:
-            explorer(rng.random((SAMPLE, n)))
+    try:
+        explorer(sample(n, rng, max(SAMPLE * (n + 1), allowed // LOOKED), allowed // 3))
+        if begin == 0 and allowed > 4 * len(smallest) * DESCENT * (2 * n + 1):
+            _extremes(explorer, smallest, rng, allowed)
+        for row in rows:
+            most = int(EVOLUTION * allowed) // len(rows)
+            evolve(explorer, _weighted(explorer.known, smallest, row), rng, begin, most)
+        for _ in range(MOST_ROUNDS if patient else ROUNDS):
+            room = (explorer.left - explorer.reserve) // (DESCENT * (2 * n + 1) * len(rows))
+            found: list[tuple[Objective, int]] = []
+            for row, done in zip(rows, tried, strict=True):
+                objective = _weighted(explorer.known, smallest, row)
+                done += (promising := _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, ABREAST))))
+                found += [(objective, k) for k in promising]
+            if found:
+                ends = descend(explorer, found, ladder)
+                whole = True
+                for (_, k), end in zip(found, ends, strict=True):
+                    next(done for done in tried if k in done).append(end)
+            if len(found) < len(rows) * ABREAST:
+                explorer(rng.random((SAMPLE, n)))
+    except Spent:
+        pass
+    return whole
 
 
 def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Generator, allowed: int) -> None:
@@ -254,6 +257,7 @@ def evolve(
     if len(first) < size:
         first = np.concatenate([first, rng.random((size - len(first), explorer.dimensions))])
     merits: list[float] = []
+    patience = ROUGH_PATIENCE if explorer.rough else PATIENCE
 
     def energies(u: Floats) -> Floats:
         rows = explorer(u.T)
@@ -263,10 +267,10 @@ def evolve(
     def stalls(x: Floats, convergence: float) -> bool:
         merit = explorer.known.merit(objective)[begin:]
         merits.append(float(merit.min()))
-        if len(merits) <= PATIENCE:
+        if len(merits) <= patience:
             return False
         inside = merit[merit < MISSES]
-        gained = merits[-1 - PATIENCE] - merits[-1]
+        gained = merits[-1 - patience] - merits[-1]
         return bool(gained <= ENOUGH * (float(np.ptp(inside)) if inside.size else abs(merits[-1])))
 
     begin_evolution(
