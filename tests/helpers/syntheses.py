@@ -134,8 +134,10 @@ def function_generator(ranges: Mapping[str, tuple[float, float]], formula: str, 
     return Problem(study, goal, ranges, cost)
 
 
-def timed_path(number: int, shape: Callable[[Floats], NDArray[np.complex128]], ranges: Mapping[str, tuple[float, float]],
-               *, more: Mapping[str, float] | None = None) -> Problem:  # fmt: skip
+def timed_path(
+    number: int, shape: Callable[[Floats], NDArray[np.complex128]], ranges: Mapping[str, tuple[float, float]], *,
+    more: Mapping[str, float] | None = None,
+) -> Problem:  # fmt: skip
     """A coupler point that passes points of a closed curve, one every so many degrees of the crank."""
     crank = np.arange(number) * 360 / number
     points = shape(np.radians(crank))
@@ -201,21 +203,41 @@ optimize:
 LINKS = {"a": (10, 60), "b": (60, 200), "c": (60, 200)}
 BESIDE = {**LINKS, "u": (-100, 200), "v": (-100, 200)}
 
-PROBLEMS = {
+GENERATOR = {**LINKS, "first": (0, 180)}
+RMS, WORST = "kinematics.targets.rocker.angle.rms", "kinematics.rocker.angle_error"
+POINT = {"u": (-100, 200), "v": (-100, 200)}
+GIVEN = {"a": 30, "b": 110, "c": 90, "x0": 0, "y0": 0}
+
+
+def square(x: Floats) -> Floats:
+    return (x - 20) ** 2 / 150
+
+
+def sine(x: Floats) -> Floats:
+    return np.asarray(40 * np.sin(np.radians(x - 20)))
+
+
+def ellipse(t: Floats) -> NDArray[np.complex128]:
+    return 60 * np.cos(t + 0.4) + 25j * np.sin(t + 0.4) + 40 + 60j
+
+
+def small_ellipse(t: Floats) -> NDArray[np.complex128]:
+    return 30 * np.cos(t) + 20j * np.sin(t) + 40 + 60j
+
+
+def eight(t: Floats) -> NDArray[np.complex128]:
+    return 40 * np.cos(t) + 20j * np.sin(2 * t) + 50 + 60j
+
+
+PROBLEMS: Mapping[str, Callable[[], Problem]] = {
     "tray": lambda: tray(None),
     "tray with conditioning": lambda: tray(0.25),
     "height, rms": lambda: held_height("kinematics.targets.C.y.rms", 40, 140, 5),
     "height, worst": lambda: held_height("kinematics.C.y_error", 40, 140, 5),
-    "height over a turn": lambda: held_height("kinematics.targets.C.y.rms", 0, 180, 10),
-    "square, rms": lambda: function_generator(
-        {**LINKS, "first": (0, 180)}, "(crank - 20)**2/150", lambda x: (x - 20) ** 2 / 150, "kinematics.targets.rocker.angle.rms"),
-    "sine, worst": lambda: function_generator(
-        {**LINKS, "first": (0, 180)}, "40*sin(crank - 20)", lambda x: 40 * np.sin(np.radians(x - 20)), "kinematics.rocker.angle_error"),
-    "ellipse": lambda: timed_path(
-        12, lambda t: 60 * np.cos(t + 0.4) + 25j * np.sin(t + 0.4) + 40 + 60j, {**BESIDE, "x0": (-100, 100), "y0": (-100, 100)}),
-    "ellipse, links given": lambda: timed_path(
-        12, lambda t: 30 * np.cos(t) + 20j * np.sin(t) + 40 + 60j, {"u": (-100, 200), "v": (-100, 200)},
-        more={"a": 30, "b": 110, "c": 90, "x0": 0, "y0": 0}),
-    "figure of eight": lambda: timed_path(
-        18, lambda t: 40 * np.cos(t) + 20j * np.sin(2 * t) + 50 + 60j, {**BESIDE, "y0": (-60, 60)}, more={"x0": 0}),
-}  # fmt: skip
+    "height over half a turn": lambda: held_height("kinematics.targets.C.y.rms", 0, 180, 10),
+    "square, rms": lambda: function_generator(GENERATOR, "(crank - 20)**2/150", square, RMS),
+    "sine, worst": lambda: function_generator(GENERATOR, "40*sin(crank - 20)", sine, WORST),
+    "ellipse, links given": lambda: timed_path(12, small_ellipse, POINT, more=GIVEN),
+    "figure of eight": lambda: timed_path(18, eight, {**BESIDE, "y0": (-60, 60)}, more={"x0": 0}),
+    "ellipse": lambda: timed_path(12, ellipse, {**BESIDE, "x0": (-100, 100), "y0": (-100, 100)}),
+}

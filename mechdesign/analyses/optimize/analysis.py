@@ -11,7 +11,7 @@ from mechdesign.analyses.optimize.cube import from_cube
 from mechdesign.analyses.optimize.designs import grid, in_words
 from mechdesign.analyses.optimize.explorer import Explorer, Outcome
 from mechdesign.analyses.optimize.files import optimum_files
-from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, goal
+from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, goals_of
 from mechdesign.analyses.optimize.judging import CHUNK, Batch, Designs, Judge
 from mechdesign.analyses.optimize.sensitivity import active_bounds, neighbours, sensitivity_table
 from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
@@ -106,7 +106,7 @@ def _goals(study: Study) -> tuple[Goal, ...]:
     section = study.optimize
     if section is None or not section.variables:
         raise StudyError((study.problem("an optimisation needs variables", "optimize", "variables"),))
-    goals = (*(goal(name) for name in section.maximize), *(goal(name, smallest=True) for name in section.minimize))
+    goals = goals_of(section)
     if not goals:
         message = "what is to be best? e.g. maximize: [GII, GRI, SUI], or minimize"
         raise StudyError((study.problem(message, "optimize", "maximize"),))
@@ -160,7 +160,9 @@ def _ask(study: Study, judge: Judge, compute: Compute, budget: int, seed: int) -
         rows = _weights(study, len(goals)).tolist()
         judge.progress.start(budget, "designs")
         explorer = Explorer(evaluate, dimensions, budget, judge.parts(), rough=judge.rough)
-        return tuple(_doubts(searching.search(explorer, smallest, rows, seed, patient=section.evaluations is not None), budget))
+        return tuple(
+            _doubts(searching.search(explorer, smallest, rows, seed, patient=section.evaluations is not None), budget)
+        )
     from mechdesign.analyses.optimize import pareto
 
     judge.progress.start(budget, "designs")

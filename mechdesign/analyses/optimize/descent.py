@@ -31,6 +31,8 @@ ENOUGH, ROUGH_ENOUGH = 1e-14, 1e-5
 SLACK = 1e-9
 # An impossible point's objective above the last possible one's, in parts of what a range changes.
 IMPOSSIBLE = 1e3
+# Slopes of conditions below this part of their values are none.
+FLAT = 1e-6
 TINY = float(np.finfo(float).tiny)
 
 
@@ -94,7 +96,7 @@ class _Descent:
         for step, width in self.ladder:
             self._programming(ask, step, width)
 
-    def _ask(self, ask: Ask, points: Floats) -> Integers:
+    def ask(self, ask: Ask, points: Floats) -> Integers:
         """Rows of points; the best of them, or of those before, is where the next stage begins."""
         rows = ask(points)
         known = self.explorer.known
@@ -103,7 +105,7 @@ class _Descent:
         self.best = int(among[np.argmin(merit)])
         return rows
 
-    def _terms(self, rows: Integers) -> tuple[Floats, Floats, Floats]:
+    def terms(self, rows: Integers) -> tuple[Floats, Floats, Floats]:
         """The smooth sum, shape (m, 1), rows that bound each worst, and what may not be positive; nan where unknown."""
         known = self.explorer.known
         lines = known.rows[rows]
@@ -119,7 +121,7 @@ class _Descent:
         (part,) = self.squares
 
         def residuals(u: Floats) -> Floats:
-            row = self._ask(ask, u[None])[0]
+            row = self.ask(ask, u[None])[0]
             return np.asarray(self.explorer.known.rows[row, part.place])
 
         def slopes(u: Floats) -> Floats:
@@ -129,14 +131,21 @@ class _Descent:
         begin = self.explorer.known.u[self.best]
         if np.isfinite(residuals(begin)).all():
             least_squares(
-                residuals, begin, jac=slopes, bounds=(0.0, 1.0), max_nfev=MOST_SQUARES, xtol=1e-12, ftol=1e-12, gtol=None
+                residuals,
+                begin,
+                jac=slopes,
+                bounds=(0.0, 1.0),
+                max_nfev=MOST_SQUARES,
+                xtol=1e-12,
+                ftol=1e-12,
+                gtol=None,
             )
 
     def _stencil(self, ask: Ask, u: Floats, step: float) -> tuple[Floats, Integers]:
         """A point, and those a step from it along each variable, inside the cube."""
         sides = [np.clip(u + sign * step * np.eye(len(u)), 0.0, 1.0) for sign in (-1, 1)]
         points = np.concatenate([u[None], *sides])
-        return points, self._ask(ask, points)
+        return points, self.ask(ask, points)
 
     def _programming(self, ask: Ask, step: float, width: float) -> None:
         """Sequential quadratic programming in a box about the best point."""
@@ -145,70 +154,93 @@ class _Descent:
         # Its stubs know no bounds of other than plain numbers.
         minimize: Any = scipy_minimize
         begin = self.explorer.known.u[self.best].copy()
-        n = len(begin)
-        more = len(self.edged)
+        n, more = len(begin), len(self.edged)
         lines = self.explorer.known.rows[[self.best]]
         owner = np.repeat(np.arange(more), [part.pieces(lines).shape[1] for part, _ in self.edged])
-        first, slope = self._linear(ask, begin, step)
-        scale = max(max(float(np.abs(part).max(initial=0.0)) for part in slope[:2]), TINY)
-        lengths = np.maximum(np.abs(slope[2]).max(axis=1, initial=0.0), TINY)
-        raised = np.eye(more)[owner]
-        last = [np.nan_to_num(part, nan=0.0) for part in first]
-        memo: dict[bytes, list[Floats]] = {}
-
-        def terms(y: Floats) -> list[Floats]:
-            key = y[:n].tobytes()
-            if key not in memo:
-                found = [part[0] for part in self._terms(self._ask(ask, y[None, :n]))]
-                if np.isnan(found[0]).any() or np.isnan(found[1]).any():
-                    # Impossible: too high for any line search to accept.
-                    found[0] = last[0] + IMPOSSIBLE * scale
-                    found[1] = last[1]
-                memo.clear()
-                memo[key] = [found[0], found[1], np.where(np.isnan(found[2]), last[2], found[2])]
-            return memo[key]
-
-        slopes_memo: dict[bytes, list[Floats]] = {}
-
-        def slopes(y: Floats) -> list[Floats]:
-            key = y[:n].tobytes()
-            if key not in slopes_memo:
-                slopes_memo.clear()
-                found, slope = self._linear(ask, y[:n], step)
-                last[:] = [np.where(np.isnan(new), old, new) for new, old in zip(found, last, strict=True)]
-                slopes_memo[key] = slope
-            return slopes_memo[key]
+        program = _Program(self, ask, begin, step)
+        raised, free = np.eye(more)[owner], np.zeros((len(program.lengths), more))
 
         def cost(y: Floats) -> float:
-            return float(terms(y)[0][0] / scale + y[n:].sum())
+            return float(program.terms(y[:n])[0][0] + y[n:].sum())
 
         def cost_slope(y: Floats) -> Floats:
-            return np.concatenate([slopes(y)[0][0] / scale, np.ones(more)])
+            return np.concatenate([program.slopes(y[:n])[0][0], np.ones(more)])
 
         def room(y: Floats) -> Floats:
-            _, pieces, limits = terms(y)
-            return np.concatenate([y[n:][owner] - pieces / scale, -limits / lengths - SLACK])
+            _, pieces, limits = program.terms(y[:n])
+            return np.concatenate([y[n:][owner] - pieces, -limits - SLACK])
 
         def room_slope(y: Floats) -> Floats:
-            _, pieces, limits = slopes(y)
-            free = np.zeros((len(limits), more))
-            return np.block([[-pieces / scale, raised], [-limits / lengths[:, None], free]])
+            _, pieces, limits = program.slopes(y[:n])
+            return np.block([[-pieces, raised], [-limits, free]])
 
-        tops = np.array([(last[1][owner == k] / scale).max() for k in range(more)])
+        pieces = program.terms(begin)[1]
+        tops = np.array([pieces[owner == k].max() for k in range(more)])
         low, high = np.maximum(begin - width, 0.0), np.minimum(begin + width, 1.0)
-        constraint = {"type": "ineq", "fun": room, "jac": room_slope}
         minimize(
             cost, np.concatenate([begin, tops]), jac=cost_slope, method="SLSQP",
             bounds=[*zip(low, high, strict=True), *[(None, None)] * more],
-            constraints=[constraint] if len(owner) + len(lengths) else (),
+            constraints=[{"type": "ineq", "fun": room, "jac": room_slope}] if len(owner) + len(free) else (),
             options={"maxiter": MOST_STEPS, "ftol": ROUGH_ENOUGH if self.explorer.rough else ENOUGH},
         )  # fmt: skip
 
-    def _linear(self, ask: Ask, u: Floats, step: float) -> tuple[list[Floats], list[Floats]]:
+    def linear(self, ask: Ask, u: Floats, step: float) -> tuple[list[Floats], list[Floats]]:
         """The terms at a point, and their slopes, each of shape (columns, n)."""
         points, rows = self._stencil(ask, u, step)
-        found = self._terms(rows)
+        found = self.terms(rows)
         return [part[0] for part in found], [np.nan_to_num(_differences(points, u, part)) for part in found]
+
+
+class _Program:
+    """What a descent makes small, in parts of what a range changes of it: its terms and their slopes at any point.
+
+    Where the goals have no value they go on as straight lines from the last point where they had, as long as a
+    condition or a clearance tells that nothing is to be had there; else they are too high for a step to be taken.
+    """
+
+    def __init__(self, descent: _Descent, ask: Ask, begin: Floats, step: float) -> None:
+        self._descent, self._ask, self._step = descent, ask, step
+        values, slopes = descent.linear(ask, begin, step)
+        scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), TINY)
+        steepest = np.abs(slopes[2]).max(axis=1, initial=0.0)
+        self.lengths = np.maximum(steepest, np.maximum(FLAT * np.abs(np.nan_to_num(values[2])), TINY))
+        self._scales = [np.array([scale]), np.full(len(values[1]), scale), self.lengths]
+        self._at, self._slopes = begin.copy(), [a / b[:, None] for a, b in zip(slopes, self._scales, strict=True)]
+        self._values = [np.nan_to_num(a / b) for a, b in zip(values, self._scales, strict=True)]
+        self._known: dict[bytes, list[Floats]] = {}
+        self._known_slopes = {self._at.tobytes(): self._slopes}
+
+    def terms(self, u: Floats) -> list[Floats]:
+        """The smooth sum, the rows that bound each worst, and what may not be positive."""
+        key = u.tobytes()
+        if key not in self._known:
+            rows = self._descent.ask(self._ask, u[None])
+            found = [part[0] / scale for part, scale in zip(self._descent.terms(rows), self._scales, strict=True)]
+            straight = [a + b @ (u - self._at) for a, b in zip(self._values, self._slopes, strict=True)]
+            impossible = np.isnan(found[0]).any() or np.isnan(found[1]).any()
+            told = bool((found[2] > 0).any())
+            found = [np.where(np.isnan(new), line, new) for new, line in zip(found, straight, strict=True)]
+            if impossible and not told:
+                found[0] = found[0] + IMPOSSIBLE
+            self._known = {key: found}
+        return self._known[key]
+
+    def slopes(self, u: Floats) -> list[Floats]:
+        """Slopes of the terms, each of shape (columns, n)."""
+        key = u.tobytes()
+        if key not in self._known_slopes:
+            values, slopes = self._descent.linear(self._ask, u, self._step)
+            values = [a / b for a, b in zip(values, self._scales, strict=True)]
+            slopes = [a / b[:, None] for a, b in zip(slopes, self._scales, strict=True)]
+            known = [np.isfinite(part) for part in values]
+            straight = [a + b @ (u - self._at) for a, b in zip(self._values, self._slopes, strict=True)]
+            self._slopes = [
+                np.where(good[:, None], new, old) for good, new, old in zip(known, slopes, self._slopes, strict=True)
+            ]
+            self._values = [np.where(good, new, line) for good, new, line in zip(known, values, straight, strict=True)]
+            self._at = u.copy()
+            self._known_slopes = {key: self._slopes}
+        return self._known_slopes[key]
 
 
 def _differences(points: Floats, u: Floats, values: Floats) -> Floats:

@@ -177,7 +177,8 @@ class Explorer:
         """Everything evaluated so far."""
         filled = self._table[: len(self._rows)]
         if not self._rows:
-            return Known(np.empty((0, self.dimensions)), *[np.empty((0, 0))] * 3, np.empty(0))
+            none = np.empty((0, 0))
+            return Known(np.empty((0, self.dimensions)), none, none, none, np.empty(0))
         u, values, margins, rows = (filled[:, a:b] for a, b in zip(self._ends[:4], self._ends[1:5], strict=True))
         return Known(u, values, margins, rows, filled[:, -1])
 

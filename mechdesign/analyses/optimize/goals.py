@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.assembling import clearances, shortfall
-from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal
+from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal, goals_of
 from mechdesign.analyses.poses import solve_poses
 from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.analyses.workspace.region import BRISK, GRID_TOLERANCE, Question, answer, questions, split
@@ -143,10 +143,10 @@ class Evaluator:
             for each in list(goals):
                 try:
                     chosen = choose(result, each.column, dict(each.where))
+                    self._count(each, result)
                 except UnknownColumnError:
                     continue
                 goals.remove(each)
-                self._count(each, result)
                 table = chosen.table.name
                 if table == "extremes":
                     self._outputs.update(chosen.table["output"][chosen.counts].tolist())
@@ -170,6 +170,12 @@ class Evaluator:
 
     def _count(self, each: Goal, result: Result) -> None:
         """Note how many rows a goal is the worst of, or the root mean square, by the study's own design."""
+        chosen = choose(result, each.column, dict(each.where))
+        # How poses come out, valid or not, may differ from design to design.
+        named = {name: value for name, value in each.where if chosen.table[name].dtype.kind != "b"}
+        if named and not choose(result, each.column, named).counts.any():
+            words = " and ".join(f"{name} {value}" for name, value in named.items())
+            raise UnknownColumnError(f"where: no row of {chosen.table.name} has {words}")
         rows, residuals = each.judged(result)[1], each.residuals(result)
         if residuals is not None:
             self.rows[each] = residuals.size
@@ -181,10 +187,11 @@ class Evaluator:
         """Where the study names a goal."""
         section = self.study.optimize
         assert section is not None
-        for key, names in (("maximize", section.maximize), ("minimize", section.minimize)):
-            for index, name in enumerate(names):
-                if goal(name, smallest=key == "minimize") == wanted:
-                    return "optimize", key, index
+        goals = goals_of(section)
+        if wanted in goals:
+            index = goals.index(wanted)
+            first = len(section.maximize)
+            return ("optimize", "maximize", index) if index < first else ("optimize", "minimize", index - first)
         for index, condition in enumerate(section.subject_to):
             if any(judged == wanted for judged, _, _ in bounds_of(condition)):
                 return "optimize", "subject_to", index
@@ -305,9 +312,7 @@ class Evaluator:
 class _Batch:
     """Designs of one call, and what is found of them."""
 
-    def __init__(
-        self, study: Study, designs: Mapping[str, Floats], count: int, evaluator: Evaluator
-    ) -> None:
+    def __init__(self, study: Study, designs: Mapping[str, Floats], count: int, evaluator: Evaluator) -> None:
         self.designs = {name: np.broadcast_to(np.asarray(v, dtype=float), count) for name, v in designs.items()}
         values = study.parameters.values(self.designs)
         self.parameters = {name: value for name, value in values.items() if np.ndim(value)}
@@ -376,4 +381,4 @@ def _plainly(error: MechdesignError) -> str:
     return NUMBER.sub("...", text)
 
 
-__all__ = ["Evaluated", "Evaluator", "Goal", "bounds_of", "goal"]
+__all__ = ["Evaluated", "Evaluator", "Goal", "bounds_of", "goal", "goals_of"]

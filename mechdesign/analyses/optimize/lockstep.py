@@ -51,7 +51,8 @@ def side_by_side(explorer: Explorer, tasks: Sequence[Callable[[Ask], None]]) -> 
     threads = [Thread(target=run, args=(k,), daemon=True) for k in range(len(tasks))]
     for thread in threads:
         thread.start()
-    running, waiting, wrong = set(range(len(tasks))), {}, None
+    running, wrong = set(range(len(tasks))), None
+    waiting: dict[int, Floats] = {}
     try:
         while running:
             while len(waiting) < len(running):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.workspace.region import COLUMNS, batched, split
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
-from mechdesign.study.optimize_models import Condition
+from mechdesign.study.optimize_models import Condition, OptimizeSection
 from mechdesign.study.sections import COMMANDS
 
 
@@ -91,7 +91,9 @@ class Goal:
             With the tables of targets and of the motion.
         """
         chosen = choose(result, self.column, dict(self.where))
-        outputs = {str(name) for name in chosen.table["output"][chosen.counts]} if chosen.table.name == "targets" else ()
+        outputs = (
+            {str(name) for name in chosen.table["output"][chosen.counts]} if chosen.table.name == "targets" else ()
+        )
         if chosen.column != "rms" or len(outputs) != 1 or "motion" not in result.tables:
             return None
         (output,), motion = outputs, result.tables["motion"]
@@ -103,13 +105,23 @@ class Goal:
         return np.asarray(found.reshape(designs, -1))
 
 
-def goal(name: str, *, smallest: bool = False) -> Goal:
+def goal(name: str, *, smallest: bool = False, where: Mapping[str, object] | None = None) -> Goal:
     """Read a result's name, such as ``GII``, ``stiffness.k_min``, ``kinematics.extremes.C.x.range``.
 
     Of an error the absolute value counts.
     """
     command, column = _parts(name)
-    return Goal(name, command, column, smallest, absolute=column.endswith("_error"))
+    rows = tuple((where or {}).items())
+    told = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
+    return Goal(told, command, column, smallest, column.endswith("_error"), rows)
+
+
+def goals_of(section: OptimizeSection) -> tuple[Goal, ...]:
+    """What a section maximises, then what it minimises."""
+    return (
+        *(goal(each.result, where=each.where) for each in section.maximize),
+        *(goal(each.result, smallest=True, where=each.where) for each in section.minimize),
+    )
 
 
 def bounds_of(condition: Condition) -> Iterator[tuple[Goal, float, bool]]:
@@ -117,7 +129,7 @@ def bounds_of(condition: Condition) -> Iterator[tuple[Goal, float, bool]]:
     command, column = _parts(condition.result)
     for bound, upper in ((condition.at_least, False), (condition.at_most, True)):
         if bound is not None:
-            name = f"{condition.result} {'at most' if upper else 'at least'} {bound:g}"
+            name = f"{condition.name} {'at most' if upper else 'at least'} {bound:g}"
             yield Goal(name, command, column, upper, condition.abs, tuple(condition.where.items())), bound, upper
 
 

@@ -101,7 +101,8 @@ def search(
     begins.append(budget - explorer.left)
     explorer.reserve = 0
     try:
-        checked = whole and all([_confirmed(explorer, _weighted(explorer.known, smallest, row), rng) for row in rows])
+        confirmed = [_confirmed(explorer, _weighted(explorer.known, smallest, row), rng) for row in rows]
+        checked = whole and all(confirmed)
     except Spent:
         checked = False
     known = explorer.known
@@ -109,7 +110,11 @@ def search(
 
 
 def _start(
-    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator, begin: int,
+    explorer: Explorer,
+    smallest: Sequence[bool],
+    rows: Sequence[Sequence[float]],
+    rng: np.random.Generator,
+    begin: int,
     patient: bool,
 ) -> bool:
     """Search from points of its own until the evaluations of this start are used up, or after `ROUNDS` of descents.

@@ -99,7 +99,9 @@ def _without_poses(study: Study) -> Study:
     return dataclasses.replace(
         study,
         resolved={
-            name: {k: v for k, v in part.items() if k != "poses" or v == "workspace"} if isinstance(part, dict) else part
+            name: {k: v for k, v in part.items() if k != "poses" or v == "workspace"}
+            if isinstance(part, dict)
+            else part
             for name, part in study.resolved.items()
         },
     )
