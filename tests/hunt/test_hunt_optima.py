@@ -12,6 +12,8 @@ import mechdesign
 
 STEP = 1e-4
 EVALUATIONS = 30_000
+# Problems of different kinds follow each other.
+SPREAD = 3
 
 
 def small_steps(problem, at, seed=0):
@@ -22,10 +24,14 @@ def small_steps(problem, at, seed=0):
     return float(problem.of_cube(np.clip(u + steps, 0, 1).T).min())
 
 
-@pytest.mark.parametrize("name", list(PROBLEMS))
-def test_no_worse_than_differential_evolution_and_no_small_step_improves(name):
-    problem = PROBLEMS[name]()
-    (row,) = mechdesign.optimize(study_of(problem.study)).main.rows()
+def test_no_worse_than_differential_evolution_and_no_small_step_improves(seeds):
+    for seed in seeds(3):
+        name = list(PROBLEMS)[(SPREAD * seed + 3) % len(PROBLEMS)]
+        compare(name, PROBLEMS[name](), seed)
+
+
+def compare(name, problem, seed):
+    (row,) = mechdesign.optimize(study_of(problem.study), seed=seed).main.rows()
     found, at = row[problem.goal], [row[key] for key in problem.ranges]
     # The closed form agrees where it ended.
     low, high = np.array(list(problem.ranges.values())).T
@@ -34,18 +40,17 @@ def test_no_worse_than_differential_evolution_and_no_small_step_improves(name):
     size = 15 * len(problem.ranges)
     evolved = differential_evolution(
         problem.of_cube, [(0, 1)] * len(problem.ranges), vectorized=True, updating="deferred", polish=False, tol=0,
-        maxiter=EVALUATIONS // size, rng=0,
+        maxiter=EVALUATIONS // size, rng=seed,
     ).fun  # fmt: skip
-    assert found <= 1.01 * evolved
-    assert small_steps(problem, at) >= found * (1 - 1e-6)
+    assert found <= 1.01 * evolved, (name, seed)
+    assert small_steps(problem, at) >= found * (1 - 1e-6), (name, seed)
 
 
 @pytest.mark.parametrize(("conditioning", "shortest"), [(None, 182.28), (0.25, 205.4549)])
-@pytest.mark.parametrize("seed", [1, 2])
-def test_shortest_links_that_serve_a_tray(conditioning, shortest, seed):
+def test_shortest_links_that_serve_a_tray(conditioning, shortest):
     """A find: seeds ended at 184 to 201, and at 206.0 to 214.5, for want of a slope where poses do not assemble."""
     problem = tray(conditioning)
-    result = mechdesign.optimize(study_of(problem.study), seed=seed)
+    result = mechdesign.optimize(study_of(problem.study))
     assert result.main["kinematics.S.x"][0] == pytest.approx(shortest, abs=2e-4)
 
 
@@ -60,13 +65,13 @@ def drawn_four_bar(rng):
 
 def test_coupler_curves_of_known_four_bars(seeds):
     """The curve is another four-bar's, with its timing: an error of zero exists."""
-    for seed in seeds(3):
+    for seed in seeds(1):
         known = drawn_four_bar(np.random.default_rng(seed))
         crank = np.arange(0, 331, 30.0)
         (points,), _, _ = four_bar(*known, crank, 100, 1)
         text = ", ".join(f"[{p.real!r}, {p.imag!r}]" for p in points.tolist())
         goal = "kinematics.targets.C.rms"
-        study = study_of(four_bar_study(BESIDE, f"C: [{text}]", goal, (0, 330, 30)), "optimize.evaluations=12000")
+        study = study_of(four_bar_study(BESIDE, f"C: [{text}]", goal, (0, 330, 30)), "optimize.evaluations=6000")
         (row,) = mechdesign.optimize(study, seed=seed).main.rows()
         assert row[goal] < 1e-6, seed
         assert [row[name] for name in BESIDE] == pytest.approx(known, abs=1e-3), seed
@@ -92,9 +97,12 @@ optimize:
 """)
         near, far = np.abs(points).min(), np.abs(points).max()
         # A linear programme: far <= r1 + r2, |r1 - r2| <= near.
+        def room(r, near=near, far=far):
+            return [r.sum() - far, near - r[0] + r[1], near - r[1] + r[0]]
+
         exact = minimize(
             lambda r: 2 * r[0] + 3 * r[1], (60, 60), method="SLSQP", bounds=[(5, 90)] * 2,
-            constraints={"type": "ineq", "fun": lambda r, n=near, f=far: [r[0] + r[1] - f, n - r[0] + r[1], n - r[1] + r[0]]},
+            constraints={"type": "ineq", "fun": room},
         ).fun  # fmt: skip
         found = mechdesign.optimize(study, seed=seed).main["kinematics.S.x"][0]
         assert found == pytest.approx(exact, rel=1e-6), seed

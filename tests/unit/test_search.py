@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from helpers.syntheses import OPEN, held_height, timed_path, tray
 
 import mechdesign
+from mechdesign.analyses.optimize.analysis import _doubts
 from mechdesign.analyses.optimize.cube import from_cube
 from mechdesign.analyses.optimize.explorer import Explorer, Objective, Outcome, Part, Spent
 from mechdesign.analyses.optimize.goals import Evaluator
+from mechdesign.analyses.optimize.lockstep import side_by_side
 from mechdesign.analyses.optimize.objectives import goal
-from mechdesign.analyses.optimize.search import search
+from mechdesign.analyses.optimize.search import Ending, search
 from mechdesign.errors import AssemblyError, StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -307,3 +310,78 @@ def test_wrong_weights_in_a_file_are_told_with_line_and_column():
 def test_what_a_method_needs(change, told):
     with pytest.raises(StudyError, match=told):
         study_of(ARM, change)
+
+
+def test_designs_that_do_not_assemble_have_a_slope():
+    """The longer the links of a tray's five-bar, the less its poses miss; none where all assemble."""
+    problem = tray(None)
+    evaluator = Evaluator(study_of(problem.study), [goal("kinematics.S.x", smallest=True)], most_rows=10_000)
+    l1 = np.linspace(60, 140, 30)
+    designs = {"l1": l1, "l2": l1 + 10, "y0": 0 * l1 + 150}
+    found = evaluator(designs)
+    open_ = problem.cost(*designs.values()) >= OPEN
+    assert 5 < open_.sum() < 25
+    assert [bool(reason) for reason in found.reasons] == open_.tolist()
+    assert (np.diff(found.shortfall[open_]) < 0).all()
+    assert (found.shortfall[~open_] == 0).all()
+    assert ((found.clearances < 0).any(axis=1) == open_).all()
+
+
+def test_residuals_are_what_a_root_mean_square_is_of():
+    problem = timed_path(6, lambda t: 30 * np.cos(t) + 20j * np.sin(t) + 60j, {"a": (10, 20), "b": (90, 99)},
+                         more={"c": 80, "u": 30, "v": 20, "x0": 3, "y0": 4})  # fmt: skip
+    each = goal(problem.goal, smallest=True)
+    evaluator = Evaluator(study_of(problem.study), [each], most_rows=10_000)
+    found = evaluator({"a": np.array([12.0, 18.0]), "b": np.array([95.0, 91.0])})
+    assert evaluator.squares == {each}
+    assert found.rows[each].shape == (2, 12)
+    exact = problem.cost(np.array([12.0, 18.0]), np.array([95.0, 91.0]))
+    assert np.sqrt((found.rows[each] ** 2).sum(axis=1)) == pytest.approx(exact, rel=1e-12)
+    assert found.values[each] == pytest.approx(exact, rel=1e-12)
+
+
+def test_errors_over_part_of_a_motion_are_no_optimum():
+    """Few poses may be near their target where the others do not assemble."""
+    problem = held_height("kinematics.targets.C.y.rms", 0, 360, 10)
+    result = mechdesign.optimize(study_of(problem.study, "optimize.evaluations=600"))
+    designs = result.tables["designs"]
+    cost = problem.cost(*(designs[name] for name in problem.ranges))
+    assert ((cost < OPEN) == designs["feasible"]).all()
+    assert 0 < designs["feasible"].sum() < len(designs)
+
+
+def test_searches_use_their_evaluations_and_tell_where_starts_disagree():
+    problem = held_height("kinematics.C.y_error", 40, 140, 20)
+    result = mechdesign.optimize(study_of(problem.study, "optimize.evaluations=6000"))
+    assert 0.9 * 6000 < result.counts["designs"] <= 6000
+    ends = search(explorer(rastrigin, 4, budget=5000), [True], [[1.0]], 0).ends[0]
+    assert len(ends) == 2
+    told = list(_doubts(Ending(True, [np.array([2.0, 1.0, np.nan, 1.001])]), 5000))
+    assert told == ["the 4 starts of the search ended between 1 and 2, 2 of them within 1 % of the best, 1 found no "
+                    "feasible design; allow more, e.g. optimize.evaluations: 20000"]  # fmt: skip
+
+
+def test_what_runs_side_by_side_is_asked_for_at_once():
+    asked = []
+    known = explorer(lambda u: asked.append(len(u)) or u.sum(axis=1), 1, budget=100)
+
+    def task(points):
+        def run(ask):
+            for u in points:
+                (row,) = ask(np.array([[u]]))
+                assert known.known.u[row, 0] == u
+
+        return run
+
+    side_by_side(known, [task([0.1, 0.2, 0.3]), task([0.4]), task([0.5, 0.6])])
+    assert asked == [3, 2, 1]
+    assert known.known.u[:, 0].tolist() == [0.1, 0.4, 0.5, 0.2, 0.6, 0.3]
+
+    def fails(ask):
+        ask(np.array([[0.7]]))
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(known, [fails, task(np.linspace(0.8, 0.9, 20))])
+    with pytest.raises(Spent):
+        side_by_side(known, [task(np.linspace(0.91, 0.92, 200))])

@@ -175,7 +175,7 @@ def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None,
         "targets",
         (
             Column("output", outputs, "", "what has a target"),
-            Column("rms", rms, "", "root of the mean square of the error (of a point: of its distance from the path), in `unit`"),
+            Column("rms", rms, "", "root of the mean square of the error (of a point: of its distance), in `unit`"),
             Column("mean", mean, "", "mean error, in `unit`"),
             Column("max_abs", largest, "", "largest absolute error, in `unit`"),
             Column("at", where, unit, f"{swept or 'row'} at the largest error"),

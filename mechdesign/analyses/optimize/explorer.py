@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.rays import Floats
 
-# Merits of points that miss a condition, of points without a value, and of those of which nothing is known: beyond any goal, with room for their order.
+# Merits of points that miss a condition, of points without a value, and of those of which nothing is known: beyond any
+# goal, with room for their order.
 MISSES, OPEN, UNKNOWN = 1e60, 1e90, 1e120
 # Column of the parts that are not of a goal or a condition: clearances, negative where a pose does not assemble.
 ASSEMBLY = -1

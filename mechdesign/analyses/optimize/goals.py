@@ -294,19 +294,26 @@ class Evaluator:
             left = batch.left.get(k, {})
             other = self._needed(other)
             for command in dict.fromkeys((*self._alone, *left)):
-                result = ask(other, command)
-                if result.failed:
-                    return _pose_reason(other, command)
-                for each in (*self._alone.get(command, ()), *left.get(command, ())):
+                result, asked = ask(other, command), (*self._alone.get(command, ()), *left.get(command, ()))
+                whole = any(choose(result, each.column, dict(each.where)).table.name == "targets" for each in asked)
+                if result.failed or (whole and _pose_reason(other, command)):
+                    return self._reason(batch, k, other, command)
+                for each in asked:
                     if np.isnan(batch.judge(each, result, row)).any():
-                        return _pose_reason(other, command) or f"{each.name} has no value"
+                        return self._reason(batch, k, other, command) or f"{each.name} has no value"
         except UnknownColumnError as error:
             return str(error)
         except AssemblyError as error:
-            return (_pose_reason(other, command) if command else "") or _plainly(error)
+            return (self._reason(batch, k, other, command) if command else "") or _plainly(error)
         except MechdesignError as error:
             return _plainly(error)
         return ""
+
+    def _reason(self, batch: _Batch, k: int, study: Study, command: str) -> str:
+        """Why poses of one design fail, and by how much; empty where none does."""
+        if self._graded and command != "workspace":
+            (batch.shortfall[k],) = shortfall(clearances(study, study.poses(command)))
+        return _pose_reason(study, command)
 
 
 class _Batch:
