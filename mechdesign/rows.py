@@ -12,12 +12,16 @@ from numpy.typing import NDArray
 
 from mechdesign.results import Result, Table
 
+# Values of a column that a message names.
 MOST_VALUES = 12
-"""Values of a column that a message names."""
+# In the meaning of a column whose unit is that of its row, in the table's column of that name.
+IN_UNIT = "in `unit`"
+# Rows in words that a message names.
+MOST_ROWS = 8
 
 
 class UnknownColumnError(Exception):
-    """A column that the result has not, or one of words."""
+    """A column that the result has not, one of words, or of rows that cannot be compared with each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,7 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
     Raises
     ------
     UnknownColumnError
-        If there is no such column, or it holds words.
+        If there is no such column, it holds words, or its rows have several units.
     """
     table, column, rows = _locate(result, path)
     counts = rows
@@ -66,9 +70,29 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
         if name not in table:
             raise UnknownColumnError(_unknown("where", name, table.names))
         counts = counts & _equal(table[name], wanted)
+    _one_unit(table, column, counts)
     numbers = values.astype(float)
     missing = "" if counts.any() else _missing(table, rows, where)
     return Chosen(table, column, np.abs(numbers) if absolute else numbers, counts, missing)
+
+
+def _one_unit(table: Table, column: str, counts: NDArray[np.bool_]) -> None:
+    """Check that the rows that count can be compared: that they are not millimetres and degrees."""
+    meaning = next(each.meaning for each in table.columns if each.name == column)
+    if IN_UNIT not in meaning or "unit" not in table:
+        return
+    units = np.asarray(table["unit"])[counts]
+    if len(set(units.tolist())) < 2:
+        return
+    words = next(each for each in table.columns if each.values.dtype.kind not in "fiub")
+    rows = list(
+        dict.fromkeys(f"{name} ({unit or 'no unit'})" for name, unit in zip(words.values[counts], units, strict=True))
+    )
+    told = ", ".join(rows[:MOST_ROWS]) + ", ..." * (len(rows) > MOST_ROWS)
+    raise UnknownColumnError(
+        f"the rows of {table.name} whose {column} is judged have several units: {told}; say which of them count by "
+        f"'where', e.g. where: {{{words.name}: {words.values[counts][0]}}}"
+    )
 
 
 def worst(values: NDArray[np.float64], counts: NDArray[np.bool_], *, largest: bool) -> NDArray[np.float64]:

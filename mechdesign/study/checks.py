@@ -188,7 +188,7 @@ class Checker:
             self.reporter.report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
         for key, goals in (("maximize", section.maximize), ("minimize", section.minimize)):
             for index, goal in enumerate(goals):
-                self._result(goal, (*root, key, index))
+                self._result(goal.result, (*root, key, index))
         self.conditions((*root, "subject_to"), section.subject_to)
 
     def is_angle(self, place: str) -> bool:

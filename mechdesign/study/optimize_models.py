@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
-from mechdesign.study.lists import CoordinateNames
 from mechdesign.study.models import Model
 from mechdesign.study.numbers import (
+    NAME_FORM,
     NUMBER_FORM,
     Bound,
     Choice,
@@ -42,11 +42,22 @@ class Variable(Model):
         return self
 
 
-class Condition(Model):
-    """A result and its bounds."""
+class Judged(Model):
+    """A result, and the rows of it that count."""
 
     result: CoordinateName
     where: dict[str, str | float | int] = Field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The result, and in parentheses which rows count."""
+        where = ", ".join(f"{column} {wanted}" for column, wanted in self.where.items())
+        return f"{self.result} ({where})" if where else self.result
+
+
+class Condition(Judged):
+    """A result and its bounds."""
+
     abs: bool = False
     at_least: Number | None = None
     at_most: Number | None = None
@@ -65,7 +76,7 @@ def _weight_row(raw: Any, info: ValidationInfo) -> Any:
     if "maximize" not in info.data or "minimize" not in info.data:
         # What is wrong with the goals is told; their weights cannot be judged.
         return ()
-    goals: tuple[str, ...] = info.data["maximize"] + info.data["minimize"]
+    goals = [goal.name for goal in info.data["maximize"] + info.data["minimize"]]
     if isinstance(raw, Mapping):
         for name in raw:
             if name not in goals:
@@ -92,20 +103,32 @@ WeightRow = Annotated[
 ]
 
 
+def _goal(raw: Any) -> Any:
+    return {"result": raw} if isinstance(raw, str) else raw
+
+
+# Names of results, or with `where` which of their rows count.
+Goals = Annotated[
+    tuple[Annotated[Judged, BeforeValidator(_goal), OrShort((NAME_FORM,))], ...],
+    BeforeValidator(lambda raw: [raw] if isinstance(raw, str | Mapping) else raw),
+    OrShort((NAME_FORM,)),
+]
+
+
 class OptimizeSection(Model):
     """Which dimensions are best?"""
 
     method: Annotated[str, Choice(("grid", "search", "pareto"))] = "grid"
     variables: dict[CoordinateName, Variable]
-    maximize: CoordinateNames = ()
-    minimize: CoordinateNames = ()
+    maximize: Goals = ()
+    minimize: Goals = ()
     weights: tuple[WeightRow, ...] | None = None
     subject_to: tuple[Condition, ...] = ()
     evaluations: Annotated[int, Whole(10, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _goals(self) -> OptimizeSection:
-        goals = self.maximize + self.minimize
+        goals = [goal.name for goal in self.maximize + self.minimize]
         twice = [goal for goal in goals if goals.count(goal) > 1]
         if twice:
             raise failure(f"{twice[0]!r} is named twice among the goals")

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.studies import study_of
+from helpers.syntheses import PROBLEMS
+from scipy.optimize import differential_evolution
 
 import mechdesign
 from mechdesign.analyses.optimize.goals import Evaluator
@@ -14,6 +17,8 @@ from mechdesign.analyses.optimize.objectives import goal
 
 STUDY = Path(__file__).parent / "three_variables.yaml"
 INDICES = ("GII", "GRI", "SUI")
+
+SEEDS, MORE = 10, 10
 
 
 def best_of_a_line(bounds: mechdesign.results.Table) -> float:
@@ -40,3 +45,25 @@ def test_front_of_two_indices(benchmark: Any) -> None:
     study = mechdesign.load(STUDY, changes)
     result = benchmark.pedantic(lambda: mechdesign.optimize(study, jobs=2), rounds=1)
     benchmark.extra_info.update(designs=result.counts["designs"], front=len(result.main))
+
+
+@pytest.mark.parametrize("name", list(PROBLEMS))
+def test_as_good_as_ten_times_the_evaluations_of_differential_evolution(benchmark: Any, name: str) -> None:
+    """On closed forms, which know nothing of the package; in nine of ten seeds."""
+    problem = PROBLEMS[name]()
+    study = study_of(problem.study)
+    results = benchmark.pedantic(lambda: [mechdesign.optimize(study, seed=k) for k in range(SEEDS)], rounds=1)
+    found = np.array([result.main[problem.goal][0] for result in results])
+    size = 15 * len(problem.ranges)
+    evolved = np.array([
+        differential_evolution(
+            problem.of_cube, [(0, 1)] * len(problem.ranges), vectorized=True, updating="deferred", polish=False, tol=0,
+            maxiter=MORE * result.counts["designs"] // size, rng=seed,
+        ).fun
+        for seed, result in enumerate(results)
+    ])  # fmt: skip
+    benchmark.extra_info.update(
+        designs=max(result.counts["designs"] for result in results), best=found.min(), worst=found.max(),
+        evolved=evolved.min(), evolved_worst=evolved.max(),
+    )  # fmt: skip
+    assert (found <= 1.01 * evolved).sum() >= SEEDS - 1

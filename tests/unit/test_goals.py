@@ -10,7 +10,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.optimize.goals import Evaluator, Goal, goal
+from mechdesign.analyses.optimize.goals import Evaluator, Goal, goal, goals_of
 from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.study import Study
 from mechdesign.study.optimize_models import Condition
@@ -343,7 +343,7 @@ def test_names_that_no_result_has_are_told_before_anything_is_computed(goals: st
     study = study_of(SLIDE + f"optimize: {{variables: {{r: {{from: 0, to: 1, number: 2}}}}, {goals}}}")
     section = study.optimize
     assert section is not None
-    asked = [*(goal(n) for n in section.maximize), *(goal(n, smallest=True) for n in section.minimize)]
+    asked = list(goals_of(section))
     asked += [judged for condition in section.subject_to for judged, _, _ in bounds_of(condition)]
     with pytest.raises(StudyError, match=message):
         Evaluator(study, asked)
@@ -387,3 +387,62 @@ def test_conditions_with_rows() -> None:
     assert (judged.command, judged.column, judged.where, bound, upper) == (
         "kinematics", "extremes.max", (("output", "P.x"),), 3, True,
     )  # fmt: skip
+
+
+SWUNG = """\
+mechanism:
+  parameters: {a: 30, b: 100, c: 80, y: 0}
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, a], coupler: [A, B, b], rocker: [D, B, c]}
+  drives: [crank]
+  sketch: {A: [30, 0], B: [90, 80]}
+kinematics: {sweep: {crank: {from: 0, to: 350, step: 10}}, outputs: [B.x, rocker.angle]}
+optimize:
+  method: grid
+  variables: {a: {from: 20, to: 40, number: 5}}
+  minimize: GOAL
+"""
+
+
+def test_goals_of_chosen_rows():
+    """The rocker's swing by the triangles of its two dead centres; its pin's travel beside it."""
+    choice = "{result: kinematics.extremes.range, where: {output: %s}}"
+    text = SWUNG.replace("GOAL", f"[{choice % 'rocker.angle'}, {choice % 'B.x'}]")
+    result = mechdesign.optimize(study_of(text))
+    designs = result.tables["designs"]
+    a, b, c, d = designs["a"], 100, 80, 100
+    ends = [np.arccos((c**2 + d**2 - (b + side * a) ** 2) / (2 * c * d)) for side in (1, -1)]
+    assert designs["kinematics.extremes.range (output rocker.angle)"] == pytest.approx(np.degrees(ends[0] - ends[1]))
+    travel = c * np.abs(np.cos(ends[0]) - np.cos(ends[1]))
+    assert designs["kinematics.extremes.range (output B.x)"] == pytest.approx(travel)
+    weighted = study_of(text, "optimize.weights=[{kinematics.extremes.range (output B.x): 1}]")
+    assert mechdesign.optimize(weighted).main["w_kinematics.extremes.range (output rocker.angle)"][0] == 0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "told"),
+    [
+        ("[kinematics.extremes.range]", r"minimize\.0: .* units: B\.x \(mm\), rocker\.angle \(deg\).*'where'"),
+        ("{result: kinematics.extremes.max, where: {output: B.y}}", r"minimize\.0: where: no row .* output B\.y"),
+        ("{result: kinematics.extremes.max, where: {outptu: B.x}}", r"minimize\.0: where: no column 'outptu'; did"),
+        ("[B.x, {result: kinematics.B.x, were: {}}]", r"minimize\.1\.were: unknown key; did you mean 'where'"),
+    ],
+)  # fmt: skip
+def test_goals_whose_rows_cannot_be_told(wanted, told):
+    with pytest.raises(StudyError, match=told):
+        mechdesign.optimize(study_of(SWUNG.replace("GOAL", wanted)))
+
+
+def test_conditions_do_not_compare_millimetres_with_degrees():
+    condition = "{result: kinematics.extremes.range, at_most: 9}"
+    changes = ("optimize.minimize=[kinematics.B.x]", f"optimize.subject_to=[{condition}]")
+    with pytest.raises(StudyError, match=r"subject_to\.0: .* several units"):
+        mechdesign.optimize(study_of(SWUNG, *changes))
+
+
+def test_listed_poses_that_follow_the_variables_are_solved_together():
+    """With one design's poses and dimensions after the other's, as one by one."""
+    poses = "[{A.y: a/2}, {A.y: 5}, {A.y: y + 2}]"
+    study = study_of(SWUNG.replace("GOAL", "kinematics.B.x"), f"kinematics={{poses: {poses}, outputs: [B]}}",
+                     "optimize.variables.y={from: -3, to: 9, number: 2}")  # fmt: skip
+    designs = {"a": np.array([20.0, 30.0, 25.0, 9.0]), "y": np.array([1.0, 4.0, -20.0, 9.0])}
+    agree(study, [goal("kinematics.B.x", smallest=True), goal("kinematics.B.y")], designs)

@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from helpers.syntheses import OPEN, held_height, timed_path, tray
 
 import mechdesign
+from mechdesign.analyses.optimize.analysis import _doubts
 from mechdesign.analyses.optimize.cube import from_cube
 from mechdesign.analyses.optimize.explorer import Explorer, Objective, Outcome, Part, Spent
 from mechdesign.analyses.optimize.goals import Evaluator
+from mechdesign.analyses.optimize.lockstep import side_by_side
 from mechdesign.analyses.optimize.objectives import goal
-from mechdesign.analyses.optimize.search import descend, evolve, sample, search
+from mechdesign.analyses.optimize.search import Ending, search
 from mechdesign.errors import AssemblyError, StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -61,10 +64,7 @@ def explorer(function, dimensions, margins=None, budget=3000):
 
 def least(function, dimensions, margins=None, seed=0):
     known = explorer(function, dimensions, margins)
-    rng = np.random.default_rng(seed)
-    known(sample(dimensions, rng, 16 * (dimensions + 1), 1000))
-    evolve(known, FIRST, rng)
-    descend(known, [FIRST])
+    search(known, [True], [[1.0]], seed)
     row = int(np.argmin(known.known.merit(FIRST)))
     return known.known.u[row], known.known.values[row, 0]
 
@@ -119,7 +119,7 @@ def worst_of(rows, dimensions, margins=None):
 
     places = slice(0, rows(np.zeros((1, dimensions))).shape[1])
     known = Explorer(outcome, dimensions, 5000, [Part(0, 1.0, True, places)])
-    assert search(known, [True], [[1.0]], 0)
+    assert search(known, [True], [[1.0]], 0).checked
     row = int(np.argmin(known.known.merit(FIRST)))
     return known.known.u[row], known.known.values[row, 0]
 
@@ -155,7 +155,7 @@ def test_two_worst_rows_weighed_under_a_condition_that_is_one():
     parts = [Part(0, 1.0, False, slice(0, 3, 2)), Part(1, 1.0, False, slice(1, 4, 2)),
              Part(2, 1.0, False, slice(4, 6), bound=0.4)]  # fmt: skip
     known = Explorer(outcome, 2, 5000, parts)
-    assert search(known, [True, True], [[1.0, 3.0]], 0)
+    assert search(known, [True, True], [[1.0, 3.0]], 0).checked
     best = int(np.argmin(known.known.merit(Objective(np.array([1.0, 3.0])))))
     assert known.known.u[best] == pytest.approx([0.4, 0.4], abs=1e-8)
 
@@ -178,8 +178,8 @@ def test_rows_of_goals_are_those_of_the_tables():
 
 def test_no_point_is_evaluated_twice_nor_more_than_allowed():
     asked = []
-    known = explorer(lambda u: asked.append(u.copy()) or u.sum(axis=1), 2, budget=60)
-    assert not search(known, [True], [[1.0]], 0)
+    known = explorer(lambda u: asked.append(u.copy()) or rastrigin(u), 2, budget=60)
+    assert not search(known, [True], [[1.0]], 0).checked
     points = np.concatenate(asked)
     assert len(points) == len(known.known.u) <= 60
     assert len(np.unique(points, axis=0)) == len(points)
@@ -190,7 +190,7 @@ def test_no_point_is_evaluated_twice_nor_more_than_allowed():
 def test_extremes_and_weighted_sum_of_two_goals():
     """Of (x, 1 - x^2), normalised, the equal-weight best is where 1 = 2 x."""
     known = explorer(lambda u: np.column_stack([u[:, 0], 1 - u[:, 0] ** 2]), 1)
-    assert search(known, [False, False], [[1.0, 1.0]], 0)
+    assert search(known, [False, False], [[1.0, 1.0]], 0).checked
     values = known.known.values
     assert values.min(axis=0) == pytest.approx([0, 0], abs=1e-12)
     assert values.max(axis=0) == pytest.approx([1, 1], abs=1e-12)
@@ -231,9 +231,9 @@ def test_optimum_at_a_bound_and_a_condition():
 
 
 def test_a_search_that_was_cut_short_says_so():
-    result = mechdesign.optimize(study_of(ARM, "optimize.evaluations=40"))
-    assert result.counts["designs"] <= 40
-    assert "the search ended with its 40 evaluations" in result.warnings[0]
+    result = mechdesign.optimize(study_of(ARM, "optimize.evaluations=30"))
+    assert result.counts["designs"] <= 30
+    assert "the search ended with its 30 evaluations" in result.warnings[0]
 
 
 def test_sensitivity_is_the_change_of_the_score_a_step():
@@ -310,3 +310,78 @@ def test_wrong_weights_in_a_file_are_told_with_line_and_column():
 def test_what_a_method_needs(change, told):
     with pytest.raises(StudyError, match=told):
         study_of(ARM, change)
+
+
+def test_designs_that_do_not_assemble_have_a_slope():
+    """The longer the links of a tray's five-bar, the less its poses miss; none where all assemble."""
+    problem = tray(None)
+    evaluator = Evaluator(study_of(problem.study), [goal("kinematics.S.x", smallest=True)], most_rows=10_000)
+    l1 = np.linspace(60, 140, 30)
+    designs = {"l1": l1, "l2": l1 + 10, "y0": 0 * l1 + 150}
+    found = evaluator(designs)
+    open_ = problem.cost(*designs.values()) >= OPEN
+    assert 5 < open_.sum() < 25
+    assert [bool(reason) for reason in found.reasons] == open_.tolist()
+    assert (np.diff(found.shortfall[open_]) < 0).all()
+    assert (found.shortfall[~open_] == 0).all()
+    assert ((found.clearances < 0).any(axis=1) == open_).all()
+
+
+def test_residuals_are_what_a_root_mean_square_is_of():
+    problem = timed_path(6, lambda t: 30 * np.cos(t) + 20j * np.sin(t) + 60j, {"a": (10, 20), "b": (90, 99)},
+                         more={"c": 80, "u": 30, "v": 20, "x0": 3, "y0": 4})  # fmt: skip
+    each = goal(problem.goal, smallest=True)
+    evaluator = Evaluator(study_of(problem.study), [each], most_rows=10_000)
+    found = evaluator({"a": np.array([12.0, 18.0]), "b": np.array([95.0, 91.0])})
+    assert evaluator.squares == {each}
+    assert found.rows[each].shape == (2, 12)
+    exact = problem.cost(np.array([12.0, 18.0]), np.array([95.0, 91.0]))
+    assert np.sqrt((found.rows[each] ** 2).sum(axis=1)) == pytest.approx(exact, rel=1e-12)
+    assert found.values[each] == pytest.approx(exact, rel=1e-12)
+
+
+def test_errors_over_part_of_a_motion_are_no_optimum():
+    """Few poses may be near their target where the others do not assemble."""
+    problem = held_height("kinematics.targets.C.y.rms", 0, 360, 10)
+    result = mechdesign.optimize(study_of(problem.study, "optimize.evaluations=600"))
+    designs = result.tables["designs"]
+    cost = problem.cost(*(designs[name] for name in problem.ranges))
+    assert ((cost < OPEN) == designs["feasible"]).all()
+    assert 0 < designs["feasible"].sum() < len(designs)
+
+
+def test_searches_use_their_evaluations_and_tell_where_starts_disagree():
+    problem = held_height("kinematics.C.y_error", 40, 140, 20)
+    result = mechdesign.optimize(study_of(problem.study, "optimize.evaluations=6000"))
+    assert 0.9 * 6000 < result.counts["designs"] <= 6000
+    ends = search(explorer(rastrigin, 4, budget=5000), [True], [[1.0]], 0).ends[0]
+    assert len(ends) == 2
+    told = list(_doubts(Ending(True, [np.array([2.0, 1.0, np.nan, 1.001])]), 5000))
+    assert told == ["the 4 starts of the search ended between 1 and 2, 2 of them within 1 % of the best, 1 found no "
+                    "feasible design; allow more, e.g. optimize.evaluations: 20000"]  # fmt: skip
+
+
+def test_what_runs_side_by_side_is_asked_for_at_once():
+    asked = []
+    known = explorer(lambda u: asked.append(len(u)) or u.sum(axis=1), 1, budget=100)
+
+    def task(points):
+        def run(ask):
+            for u in points:
+                (row,) = ask(np.array([[u]]))
+                assert known.known.u[row, 0] == u
+
+        return run
+
+    side_by_side(known, [task([0.1, 0.2, 0.3]), task([0.4]), task([0.5, 0.6])])
+    assert asked == [3, 2, 1]
+    assert known.known.u[:, 0].tolist() == [0.1, 0.4, 0.5, 0.2, 0.6, 0.3]
+
+    def fails(ask):
+        ask(np.array([[0.7]]))
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(known, [fails, task(np.linspace(0.8, 0.9, 20))])
+    with pytest.raises(Spent):
+        side_by_side(known, [task(np.linspace(0.91, 0.92, 200))])

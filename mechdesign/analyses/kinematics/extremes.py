@@ -96,16 +96,18 @@ def extremes(
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
     ratio[~np.isfinite(ratio)] = np.nan
     where = f"{swept or 'row'} at the"
+    units = np.array([study.units.label(quantity) for quantity in quantities], dtype=str)
     table = Table(
         "extremes",
         (
             Column("output", np.tile(np.array(names), shape[0]), "", "output or error, in its own unit"),
-            Column("min", low_ends[:, 0], "", "smallest value over the motion"),
+            Column("min", low_ends[:, 0], "", "smallest value over the motion, in `unit`"),
             Column("min_at", low_ends[:, 1], unit, f"{where} smallest value"),
-            Column("max", high_ends[:, 0], "", "largest value over the motion"),
+            Column("max", high_ends[:, 0], "", "largest value over the motion, in `unit`"),
             Column("max_at", high_ends[:, 1], unit, f"{where} largest value"),
-            Column("range", span, "", "max - min"),
+            Column("range", span, "", "max - min, in `unit`"),
             Column("time_ratio", ratio, "", "longer over shorter time between the extremes, constant speed"),
+            Column("unit", np.tile(units, shape[0]), "", "unit of min, max and range"),
         ),
         "extremes of the outputs over the motion",
     )

@@ -11,7 +11,7 @@ from mechdesign.analyses.optimize.cube import from_cube
 from mechdesign.analyses.optimize.designs import grid, in_words
 from mechdesign.analyses.optimize.explorer import Explorer, Outcome
 from mechdesign.analyses.optimize.files import optimum_files
-from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, goal
+from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, goals_of
 from mechdesign.analyses.optimize.judging import CHUNK, Batch, Designs, Judge
 from mechdesign.analyses.optimize.sensitivity import active_bounds, neighbours, sensitivity_table
 from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
@@ -64,9 +64,10 @@ def optimize(
     """
     goals = _goals(study)
     assert study.optimize is not None
-    budget = _budget(study, len(goals))
-    most_rows = MOST_KEPT // budget if study.optimize.method == "search" else 0
+    most_rows = MOST_KEPT if study.optimize.method == "search" else 0
     judge = Judge(study, goals, jobs, progress, journal, most_rows=most_rows)
+    budget = _budget(study, len(goals), slow=judge.slow)
+    judge.limit_rows(most_rows // budget)
     try:
         with judge.open() as compute:
             doubt = _ask(study, judge, compute, budget, study.seed if seed is None else seed)
@@ -107,7 +108,7 @@ def _goals(study: Study) -> tuple[Goal, ...]:
     section = study.optimize
     if section is None or not section.variables:
         raise StudyError((study.problem("an optimisation needs variables", "optimize", "variables"),))
-    goals = (*(goal(name) for name in section.maximize), *(goal(name, smallest=True) for name in section.minimize))
+    goals = goals_of(section)
     if not goals:
         message = "what is to be best? e.g. maximize: [GII, GRI, SUI], or minimize"
         raise StudyError((study.problem(message, "optimize", "maximize"),))
@@ -120,7 +121,7 @@ def _weights(study: Study, goals: int) -> Floats:
     return np.array(rows if rows else [[1.0] * goals], dtype=float).reshape(-1, goals)
 
 
-def _budget(study: Study, goals: int) -> int:
+def _budget(study: Study, goals: int, *, slow: bool) -> int:
     """How many designs may be evaluated where they are searched."""
     section = study.optimize
     assert section is not None
@@ -130,8 +131,8 @@ def _budget(study: Study, goals: int) -> int:
         from mechdesign.analyses.optimize import pareto
 
         return pareto.allowance(goals)
-    rows = _weights(study, goals).tolist()
-    return searching.allowance(len(section.variables), searching.objectives(goals, rows))
+    rows = _weights(study, goals)
+    return searching.allowance(len(section.variables), len(rows), goals, slow=slow)
 
 
 def _ask(study: Study, judge: Judge, compute: Compute, budget: int, seed: int) -> tuple[str, ...]:
@@ -150,24 +151,42 @@ def _ask(study: Study, judge: Judge, compute: Compute, budget: int, seed: int) -
         found = np.full((len(u), judge.width), np.nan)
         if given.any():
             found[given] = judge.evaluate(compute, _chunks({k: v[given] for k, v in designs.items()}, judge.chunk))
-        found[found[:, len(judge.wanted)] > 0] = np.nan
+        width = len(judge.wanted)
+        found[:, :width][found[:, width] > 0] = np.nan
         column = {each: k for k, each in enumerate(judge.wanted)}
         margins = [(bound - found[:, column[each]]) * (1 if upper else -1) for each, bound, upper in judge.conditions]
         stacked = np.stack(margins, axis=1) if margins else np.empty((len(u), 0))
-        return Outcome(found[:, : len(goals)], stacked, found[:, 2 * len(judge.wanted) + 1 :])
+        return Outcome(found[:, : len(goals)], stacked, found[:, 2 * width + 2 :], found[:, 2 * width + 1])
 
     if section.method == "search":
         rows = _weights(study, len(goals)).tolist()
         judge.progress.start(budget, "designs")
-        if searching.search(Explorer(evaluate, dimensions, budget, judge.parts()), smallest, rows, seed):
-            return ()
-        return (f"the search ended with its {budget} evaluations; allow more, e.g. optimize.evaluations: {4 * budget}",)
+        explorer = Explorer(evaluate, dimensions, budget, judge.parts(), rough=judge.rough)
+        return tuple(
+            _doubts(searching.search(explorer, smallest, rows, seed, patient=section.evaluations is not None), budget)
+        )
     from mechdesign.analyses.optimize import pareto
 
     judge.progress.start(budget, "designs")
     first = searching.sample(dimensions, np.random.default_rng(seed), pareto.population(budget), budget)
     pareto.evolve(Explorer(evaluate, dimensions, budget), np.where(smallest, 1.0, -1.0), first, seed)
     return ()
+
+
+def _doubts(ending: searching.Ending, budget: int) -> Iterator[str]:
+    """What speaks against the optima of a search."""
+    more = f"allow more, e.g. optimize.evaluations: {4 * budget}"
+    if not ending.checked:
+        yield f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
+    for row, ends in enumerate(ending.ends):
+        found = ends[np.isfinite(ends)]
+        agree = np.abs(found - found.min(initial=np.inf)) <= searching.AGREE * np.abs(found).min(initial=np.inf)
+        if len(ends) > 1 and agree.sum() < len(ends):
+            of = f" for row {row + 1} of the weights" if len(ending.ends) > 1 else ""
+            lost = f", {len(ends) - len(found)} found no feasible design" if len(found) < len(ends) else ""
+            spread = f"between {abs(found).min():.6g} and {abs(found).max():.6g}" if len(found) else "nowhere"
+            yield (f"the {len(ends)} starts of the search{of} ended {spread}, {agree.sum()} of them within "
+                   f"{100 * searching.AGREE:g} % of the best{lost}; {more}")  # fmt: skip
 
 
 def _chunks(designs: Batch, size: int) -> Iterator[Batch]:

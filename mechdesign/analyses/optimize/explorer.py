@@ -11,6 +11,13 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.rays import Floats
 
+# Merits of points that miss a condition, of points without a value, and of those of which nothing is known: beyond any
+# goal, with room for their order.
+MISSES, OPEN, UNKNOWN = 1e60, 1e90, 1e120
+# Column of the parts that are not of a goal or a condition: clearances, negative where a pose does not assemble.
+ASSEMBLY = -1
+FIRST_ROWS = 256
+
 
 class Spent(Exception):
     """The evaluations that were allowed are used up."""
@@ -35,12 +42,12 @@ class Objective:
 
 @dataclass(frozen=True)
 class Part:
-    """Rows that a goal or a condition is the worst of.
+    """Rows that a goal or a condition is the worst of, or the root mean square.
 
     Parameters
     ----------
     column : int
-        Of the goals, and after them of the conditions.
+        Of the goals, and after them of the conditions; or `ASSEMBLY`.
     sign : float
         1 where the largest row is the worst, -1 where the smallest is.
     absolute : bool
@@ -49,6 +56,8 @@ class Part:
         Columns of `Known.rows`.
     bound : float
         Of a condition.
+    squares : bool
+        Whether the goal is the root mean square of the rows.
     """
 
     column: int
@@ -56,6 +65,7 @@ class Part:
     absolute: bool
     place: slice
     bound: float = 0.0
+    squares: bool = False
 
     def pieces(self, rows: Floats) -> Floats:
         """What ``sign * (goal - bound)`` is the largest of, and by how much a condition is not met; smooth."""
@@ -69,11 +79,12 @@ class Part:
 
 
 class Outcome(NamedTuple):
-    """What an evaluation of points gives; see `Known`."""
+    """What an evaluation of points gives; see `Known`. Without shortfalls, points without a value are all alike."""
 
     values: Floats
     margins: Floats
     rows: Floats
+    shortfall: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -90,12 +101,15 @@ class Known:
         By how much each condition is met, negative where it is not.
     rows : ndarray, shape (points, rows)
         What goals and conditions are the worst of, as far as that is known; see `Part`.
+    shortfall : ndarray, shape (points,)
+        How far a point without a value is from having one; nan where that is not known.
     """
 
     u: Floats
     values: Floats
     margins: Floats
     rows: Floats
+    shortfall: Floats
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -108,19 +122,19 @@ class Known:
         return np.asarray(self.valid & (self.margins >= 0).all(axis=1))
 
     def merit(self, objective: Objective) -> Floats:
-        """What is made small, shape (points,): feasible points before the others, those by how much they miss.
+        """What is made small, shape (points,): the objective where it is feasible, always less than elsewhere.
 
-        [Deb, An efficient constraint handling method for genetic algorithms, 2000.]
+        Points that miss a condition follow by how much they miss, then those without a value by their shortfall
+        [Deb, An efficient constraint handling method for genetic algorithms, 2000]; inf where that is not known.
         """
         valid, feasible = self.valid, self.feasible
-        merit = np.full(len(self.u), np.inf)
+        merit = np.where(np.isnan(self.shortfall), np.inf, OPEN * (1.0 + self.shortfall))
         merit[feasible] = objective(self.values[feasible])
         missing = valid & ~feasible
         if missing.any():
             scale = np.abs(self.margins[valid]).max(axis=0)
             short = np.maximum(-self.margins[missing] / np.where(scale > 0, scale, 1.0), 0.0).sum(axis=1)
-            worst = merit[feasible].max() if feasible.any() else 0.0
-            merit[missing] = worst + (1.0 + short) * max(1.0, abs(worst))
+            merit[missing] = MISSES * (1.0 + short)
         return merit
 
 
@@ -135,22 +149,39 @@ class Explorer:
         How many points may be evaluated.
     parts : sequence of Part
         Which rows there are.
+    rough : bool
+        Whether values are known to a tolerance only, so that differences over small steps are noise.
+
+    Attributes
+    ----------
+    reserve : int
+        How many of the evaluations that are left are kept for later.
     """
 
     def __init__(
-        self, evaluate: Callable[[Floats], Outcome], dimensions: int, budget: int, parts: Sequence[Part] = ()
-    ) -> None:
+        self, evaluate: Callable[[Floats], Outcome], dimensions: int, budget: int, parts: Sequence[Part] = (),
+        *, rough: bool = False,
+    ) -> None:  # fmt: skip
         self._evaluate = evaluate
         self.dimensions = dimensions
         self.left = budget
+        self.reserve = 0
         self.parts = tuple(parts)
+        self.rough = rough
         self._rows: dict[bytes, int] = {}
-        self.known = Known(np.empty((0, dimensions)), *[np.empty((0, 0))] * 3)
+        # Columns of points, values, margins, rows and shortfall; more lines than are filled.
+        self._table = np.empty((0, 0))
+        self._ends = [0, dimensions, dimensions, dimensions, dimensions, dimensions]
 
-    def edged(self, objective: Objective) -> bool:
-        """Whether rows are known of a worst row that is made better."""
-        factors = objective.factors
-        return any(part.column < len(factors) and factors[part.column] * part.sign > 0 for part in self.parts)
+    @property
+    def known(self) -> Known:
+        """Everything evaluated so far."""
+        filled = self._table[: len(self._rows)]
+        if not self._rows:
+            none = np.empty((0, 0))
+            return Known(np.empty((0, self.dimensions)), none, none, none, np.empty(0))
+        u, values, margins, rows = (filled[:, a:b] for a, b in zip(self._ends[:4], self._ends[1:5], strict=True))
+        return Known(u, values, margins, rows, filled[:, -1])
 
     def __call__(self, u: Floats) -> NDArray[np.intp]:
         """Rows of `known` that hold these points, shape (m, dimensions).
@@ -165,13 +196,18 @@ class Explorer:
         new = {key: k for k, key in reversed(list(enumerate(keys))) if key not in self._rows}
         if new:
             order = sorted(new.values())
-            if len(order) > self.left:
+            if len(order) > self.left - self.reserve:
                 raise Spent
             self.left -= len(order)
-            found, begun = (u[order], *self._evaluate(u[order])), len(self.known.u)
-            before = (self.known.u, self.known.values, self.known.margins, self.known.rows)
-            self.known = Known(*(
-                np.concatenate([old, new]) if begun else new for old, new in zip(before, found, strict=True)
-            ))  # fmt: skip
+            found, begun = self._evaluate(u[order]), len(self._rows)
+            short = np.where(np.isnan(found.values).any(axis=1), 1.0, 0.0)
+            short = short if found.shortfall is None else found.shortfall
+            parts = [u[order], found.values, found.margins, found.rows, short[:, None]]
+            if begun + len(order) > len(self._table):
+                self._ends = np.cumsum([0, *(part.shape[1] for part in parts)]).tolist()
+                grown = np.empty((max(FIRST_ROWS, 2 * (begun + len(order))), self._ends[-1]))
+                grown[:begun] = self._table[:begun] if begun else 0.0
+                self._table = grown
+            self._table[begun : begun + len(order)] = np.concatenate(parts, axis=1)
             self._rows |= {keys[k]: begun + row for row, k in enumerate(order)}
         return np.array([self._rows[key] for key in keys], dtype=np.intp)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
-from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal
+from mechdesign.analyses.optimize.assembling import clearances, shortfall
+from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal, goals_of
 from mechdesign.analyses.poses import solve_poses
 from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.analyses.workspace.region import BRISK, GRID_TOLERANCE, Question, answer, questions, split
@@ -23,6 +24,8 @@ from mechdesign.study import Study
 from mechdesign.study.variants import faults, follows, variant
 
 EMPTY = "nothing of the workspace can be reached"
+# Tables that may be of some poses only.
+SOME = ("extremes",)
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 # By `mechdesign.mechanism.Reason`.
 FAILED = (
@@ -41,11 +44,17 @@ class Evaluated:
     Parameters
     ----------
     rows : dict of Goal to ndarray, shape (designs, rows)
-        What the goals in `Evaluator.rows` are the worst of.
+        What the goals in `Evaluator.rows` are the worst of, or in `Evaluator.squares` the root mean square.
+    shortfall : ndarray, shape (designs,)
+        How far each design's poses are from assembling, 0 where they do; nan where there is no such design.
+    clearances : ndarray, shape (designs, `Evaluator.clearances`)
+        Margins that every pose must have, negative where it does not assemble.
     """
 
     values: dict[Goal, Floats]
     rows: dict[Goal, Floats]
+    shortfall: Floats
+    clearances: Floats
     errors: dict[str, Floats]
     reasons: list[str]
 
@@ -59,8 +68,8 @@ class Evaluator:
     Parameters
     ----------
     most_rows : int
-        How many rows a design may have for them to be given, too, of goals that are the worst of several; `rows` has
-        their numbers.
+        How many rows a design may have for them to be given, too, of goals that are the worst of several (or the root
+        mean square, in `squares`) and of clearances; `rows` and `clearances` have their numbers.
 
     Raises
     ------
@@ -73,7 +82,10 @@ class Evaluator:
         self.study = study
         self.goals = list(dict.fromkeys(goals))
         self.rows: dict[Goal, int] = {}
+        self.squares: set[Goal] = set()
+        self.clearances = 0
         self.question: Question | None = None
+        self._graded = most_rows > 0
         self._columns = tuple(dict.fromkeys(("area", *(g.column for g in self.goals if g.regional))))
         names = study.optimize.variables
         if any(each.regional for each in self.goals):
@@ -91,13 +103,29 @@ class Evaluator:
         problems = [problem for command in self._commands() for problem in self._look(command)]
         if problems:
             raise StudyError(problems)
-        if sum(self.rows.values()) > most_rows:
-            self.rows.clear()
+        self._formulas = {command: stacked.formulas_of(study, command) for command in self._together}
+        # By command of which every pose must be valid: the columns of its clearances.
+        self._clear: dict[str, slice] = {}
+        for command, tables in self._together.items() if most_rows else ():
+            poses = study.poses(command)
+            if poses.listed or any(table not in SOME for table in tables):
+                begin = self.clearances
+                self.clearances += clearances(study, poses).shape[1]
+                self._clear[command] = slice(begin, self.clearances)
+        self.limit_rows(most_rows)
 
     @property
     def together(self) -> bool:
         """Whether all goals are tables that are found for all designs at once."""
         return not self._alone and not any(each.regional for each in self.goals)
+
+    def limit_rows(self, most: int) -> None:
+        """Leave out the rows of goals and clearances where a design has more than so many."""
+        if self.clearances + sum(self.rows.values()) > most:
+            self.rows.clear()
+            self.squares.clear()
+            self._clear.clear()
+            self.clearances = 0
 
     def _commands(self) -> list[str]:
         return list(dict.fromkeys(each.command for each in self.goals if not each.regional))
@@ -115,10 +143,10 @@ class Evaluator:
             for each in list(goals):
                 try:
                     chosen = choose(result, each.column, dict(each.where))
+                    self._count(each, result)
                 except UnknownColumnError:
                     continue
                 goals.remove(each)
-                self._count(each, result)
                 table = chosen.table.name
                 if table == "extremes":
                     self._outputs.update(chosen.table["output"][chosen.counts].tolist())
@@ -141,19 +169,29 @@ class Evaluator:
                 yield self.study.problem(str(error), *self._key(each))
 
     def _count(self, each: Goal, result: Result) -> None:
-        """Note how many rows a goal is the worst of, by the study's own design."""
-        rows = each.judged(result)[1]
-        if rows is not None and rows.size > 1:
+        """Note how many rows a goal is the worst of, or the root mean square, by the study's own design."""
+        chosen = choose(result, each.column, dict(each.where))
+        # How poses come out, valid or not, may differ from design to design.
+        named = {name: value for name, value in each.where if chosen.table[name].dtype.kind != "b"}
+        if named and not choose(result, each.column, named).counts.any():
+            words = " and ".join(f"{name} {value}" for name, value in named.items())
+            raise UnknownColumnError(f"where: no row of {chosen.table.name} has {words}")
+        rows, residuals = each.judged(result)[1], each.residuals(result)
+        if residuals is not None:
+            self.rows[each] = residuals.size
+            self.squares.add(each)
+        elif rows is not None and rows.size > 1:
             self.rows[each] = rows.size
 
     def _key(self, wanted: Goal) -> tuple[str | int, ...]:
         """Where the study names a goal."""
         section = self.study.optimize
         assert section is not None
-        for key, names in (("maximize", section.maximize), ("minimize", section.minimize)):
-            for index, name in enumerate(names):
-                if goal(name, smallest=key == "minimize") == wanted:
-                    return "optimize", key, index
+        goals = goals_of(section)
+        if wanted in goals:
+            index = goals.index(wanted)
+            first = len(section.maximize)
+            return ("optimize", "maximize", index) if index < first else ("optimize", "minimize", index - first)
         for index, condition in enumerate(section.subject_to):
             if any(judged == wanted for judged, _, _ in bounds_of(condition)):
                 return "optimize", "subject_to", index
@@ -162,7 +200,7 @@ class Evaluator:
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
         count = len(next(iter(designs.values())))
-        batch = _Batch(self.study, designs, count, self.goals, self.rows)
+        batch = _Batch(self.study, designs, count, self)
         if self.question is not None:
             self._workspaces(batch, np.flatnonzero(batch.feasible))
         for command, tables in self._together.items():
@@ -173,7 +211,8 @@ class Evaluator:
         for k in np.flatnonzero(batch.feasible).tolist():
             if alone or k in batch.left:
                 batch.reasons[k] = self._one(batch, k)
-        return Evaluated(batch.values, batch.rows, batch.errors, [str(reason) for reason in batch.reasons])
+        reasons = [str(reason) for reason in batch.reasons]
+        return Evaluated(batch.values, batch.rows, batch.shortfall, batch.clearances, batch.errors, reasons)
 
     def _workspaces(self, batch: _Batch, rows: NDArray[np.intp]) -> None:
         if not len(rows):
@@ -204,10 +243,24 @@ class Evaluator:
         self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: NDArray[np.intp]
     ) -> None:
         places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
-        stack = stacked.tables(self.study, command, tables.keys(), len(rows), places, parameters, self._outputs)
+        wanted = {*tables, "motion"} if self.squares.intersection(*tables.values()) else set(tables)
+        stack = stacked.tables(self.study, command, wanted, len(rows), places, parameters, self._outputs,
+                               self._formulas[command])  # fmt: skip
         failed = FAILED_ARRAY[_first(stack.reason)]
         wrong = stack.reason != 0
-        batch.note(rows, wrong.any(axis=1) if stack.listed else wrong.all(axis=1), failed)
+        # The errors of the poses that are left would be the smaller the more of them are lost.
+        whole = stack.listed or "targets" in tables
+        batch.note(rows, wrong.any(axis=1) if whole else wrong.all(axis=1), failed)
+        some = np.ones(len(rows), dtype=bool) if command in self._clear else batch.reasons[rows] != ""
+        if self._graded and some.any():
+            poses = stacked.poses_of(
+                self.study, command, int(some.sum()), batch.take(batch.places, rows[some]),
+                batch.take(batch.parameters, rows[some]), self._formulas[command],
+            )  # fmt: skip
+            margins = clearances(self.study, poses)
+            batch.shortfall[rows[some]] = shortfall(margins)
+            if command in self._clear:
+                batch.clearances[rows, self._clear[command]] = margins
         for table, goals in tables.items():
             left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
             for each in goals:
@@ -241,37 +294,45 @@ class Evaluator:
             left = batch.left.get(k, {})
             other = self._needed(other)
             for command in dict.fromkeys((*self._alone, *left)):
-                result = ask(other, command)
-                if result.failed:
-                    return _pose_reason(other, command)
-                for each in (*self._alone.get(command, ()), *left.get(command, ())):
+                result, asked = ask(other, command), (*self._alone.get(command, ()), *left.get(command, ()))
+                whole = any(choose(result, each.column, dict(each.where)).table.name == "targets" for each in asked)
+                if result.failed or (whole and _pose_reason(other, command)):
+                    return self._reason(batch, k, other, command)
+                for each in asked:
                     if np.isnan(batch.judge(each, result, row)).any():
-                        return _pose_reason(other, command) or f"{each.name} has no value"
+                        return self._reason(batch, k, other, command) or f"{each.name} has no value"
         except UnknownColumnError as error:
             return str(error)
         except AssemblyError as error:
-            return (_pose_reason(other, command) if command else "") or _plainly(error)
+            return (self._reason(batch, k, other, command) if command else "") or _plainly(error)
         except MechdesignError as error:
             return _plainly(error)
         return ""
+
+    def _reason(self, batch: _Batch, k: int, study: Study, command: str) -> str:
+        """Why poses of one design fail, and by how much; empty where none does."""
+        if self._graded and command != "workspace":
+            (batch.shortfall[k],) = shortfall(clearances(study, study.poses(command)))
+        return _pose_reason(study, command)
 
 
 class _Batch:
     """Designs of one call, and what is found of them."""
 
-    def __init__(
-        self, study: Study, designs: Mapping[str, Floats], count: int, goals: Sequence[Goal], sizes: Mapping[Goal, int]
-    ) -> None:
+    def __init__(self, study: Study, designs: Mapping[str, Floats], count: int, evaluator: Evaluator) -> None:
         self.designs = {name: np.broadcast_to(np.asarray(v, dtype=float), count) for name, v in designs.items()}
         values = study.parameters.values(self.designs)
         self.parameters = {name: value for name, value in values.items() if np.ndim(value)}
         self.places = study.parameters.places(self.designs)
-        self.values: dict[Goal, Floats] = {each: np.full(count, np.nan) for each in goals}
-        self.rows = {each: np.full((count, size), np.nan) for each, size in sizes.items()}
+        self.values: dict[Goal, Floats] = {each: np.full(count, np.nan) for each in evaluator.goals}
+        self.rows = {each: np.full((count, size), np.nan) for each, size in evaluator.rows.items()}
+        self._squares = evaluator.squares
+        self.clearances = np.full((count, evaluator.clearances), np.nan)
         self.errors: dict[str, Floats] = {}
         # What is still to be asked of single designs, by their row and by command.
         self.left: dict[int, dict[str, list[Goal]]] = {}
         self.reasons = np.array(faults(study, self.parameters, self.places, count), dtype=object)
+        self.shortfall = np.where(self.feasible, 1.0, np.nan)
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -289,6 +350,8 @@ class _Batch:
         """Note the values of a goal by a result of some designs; returns them."""
         values, listed = each.judged(result, len(rows))
         self.values[each][rows] = values
+        if each in self._squares:
+            listed = each.residuals(result, len(rows))
         if each in self.rows and listed is not None and listed.shape[1] == self.rows[each].shape[1]:
             self.rows[each][rows] = listed
         return values
@@ -325,4 +388,4 @@ def _plainly(error: MechdesignError) -> str:
     return NUMBER.sub("...", text)
 
 
-__all__ = ["Evaluated", "Evaluator", "Goal", "bounds_of", "goal"]
+__all__ = ["Evaluated", "Evaluator", "Goal", "bounds_of", "goal", "goals_of"]

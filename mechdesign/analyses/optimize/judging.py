@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.optimize.explorer import Part
+from mechdesign.analyses.optimize.explorer import ASSEMBLY, Part
 from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, bounds_of
 from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.journal import Journal, digest
@@ -97,27 +97,45 @@ class Judge:
         self._asked: list[Floats] = []
         self._rows: list[Floats] = []
 
+    def limit_rows(self, most: int) -> None:
+        """Leave out the rows behind the values where a design has more than so many."""
+        self._evaluator.limit_rows(most)
+
+    @property
+    def slow(self) -> bool:
+        """Whether each design costs as much alone as among others."""
+        return not self._evaluator.together
+
+    @property
+    def rough(self) -> bool:
+        """Whether values are known to a tolerance only."""
+        return any(each.regional for each in self.wanted)
+
     @property
     def chunk(self) -> int:
         """Designs of a batch where few are asked at once: of tables, many cost little more than one."""
-        return CHUNK if self._evaluator.together else SMALL_CHUNK
+        return SMALL_CHUNK if self.slow else CHUNK
 
     @property
     def width(self) -> int:
         """Columns of what `evaluate` gives."""
-        return 2 * len(self.wanted) + 1 + sum(self._evaluator.rows.values())
+        return 2 * (len(self.wanted) + 1) + sum(self._evaluator.rows.values()) + self._evaluator.clearances
 
     def parts(self) -> list[Part]:
-        """Which of the rows, after the other columns, belong to which goal or condition."""
-        sizes = self._evaluator.rows
+        """Which of the rows, after the other columns, belong to which goal or condition; the clearances come last."""
+        sizes, squares = self._evaluator.rows, self._evaluator.squares
         ends = pairwise(np.cumsum([0, *sizes.values()]).tolist())
         places = {each: slice(*pair) for each, pair in zip(sizes, ends, strict=True)}
         judged = [*((each, 0.0) for each in self.goals), *((each, bound) for each, bound, _ in self.conditions)]
-        return [
-            Part(column, 1.0 if each.smallest else -1.0, each.absolute, places[each], bound)
+        found = [
+            Part(column, 1.0 if each.smallest else -1.0, each.absolute, places[each], bound, each in squares)
             for column, (each, bound) in enumerate(judged)
-            if each in places
+            if each in places and (column < len(self.goals) or each not in squares)
         ]
+        if self._evaluator.clearances:
+            begin = sum(sizes.values())
+            found.append(Part(ASSEMBLY, -1.0, False, slice(begin, begin + self._evaluator.clearances)))
+        return found
 
     def open(self) -> AbstractContextManager[Callable[[Iterable[Batch]], Iterator[Evaluated]]]:
         """The workers, for as long as designs are asked for."""
@@ -129,8 +147,8 @@ class Judge:
         Returns
         -------
         ndarray, shape (designs, columns)
-            Values of `wanted`, a code that is 0 where the design can be built, estimated errors of `wanted`, and the
-            rows that `parts` tells of.
+            Values of `wanted`, a code that is 0 where the design can be built, estimated errors of `wanted`, the
+            shortfall, and the rows that `parts` tells of.
         """
         begun = len(self._rows)
         source = iter(chunks)
@@ -142,6 +160,8 @@ class Judge:
                 break
             self._keep(chunk, key, known)
         found = self._rows[begun:]
+        # Only who asked needs the rows behind the values.
+        self._rows[begun:] = [rows[:, : 2 * len(self.wanted) + 1].copy() for rows in found]
         return np.concatenate(found) if found else np.empty((0, self.width))
 
     def _compute(self, compute: Callable[[Iterable[Batch]], Iterator[Evaluated]], chunks: Iterator[Batch]) -> None:
@@ -165,7 +185,8 @@ class Judge:
                 reasons[k] = reasons[k] or f"{each.name} has no value"
         codes = [self._words.setdefault(reason, len(self._words)) for reason in reasons]
         errors = [found.errors.get(each.name, none) for each in self.wanted]
-        return np.column_stack([*values, np.array(codes, dtype=float), *errors, *found.rows.values()])
+        code, rows = np.array(codes, dtype=float), found.rows.values()
+        return np.column_stack([*values, code, *errors, found.shortfall, *rows, found.clearances])
 
     def _keep(self, chunk: Batch, key: bytes, rows: Floats) -> None:
         self._asked.append(np.column_stack([chunk[name] for name in self._names]))
@@ -177,7 +198,7 @@ class Judge:
     def designs(self) -> Designs:
         """Everything evaluated so far."""
         width = len(self.wanted)
-        rows = np.concatenate(self._rows) if self._rows else np.empty((0, self.width))
+        rows = np.concatenate(self._rows) if self._rows else np.empty((0, 2 * width + 1))
         asked = np.concatenate(self._asked) if self._asked else np.empty((0, len(self._names)))
         values = {each: rows[:, k] for k, each in enumerate(self.wanted)}
         errors = {each.name: rows[:, width + 1 + k] for k, each in enumerate(self.wanted)}

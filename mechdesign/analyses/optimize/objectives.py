@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.workspace.region import COLUMNS, batched, split
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
-from mechdesign.study.optimize_models import Condition
+from mechdesign.study.optimize_models import Condition, OptimizeSection
 from mechdesign.study.sections import COMMANDS
 
 
@@ -82,14 +82,46 @@ class Goal:
         alike = designs > 0 and np.ptp(counts.sum(axis=1)) == 0
         return found, values[counts].reshape(designs, -1) if alike else None
 
+    def residuals(self, result: Result, designs: int = 1) -> NDArray[np.float64] | None:
+        """Errors whose squares have this goal's square as their sum, shape (designs, rows); None where it has none.
 
-def goal(name: str, *, smallest: bool = False) -> Goal:
+        Parameters
+        ----------
+        result : Result
+            With the tables of targets and of the motion.
+        """
+        chosen = choose(result, self.column, dict(self.where))
+        outputs = (
+            {str(name) for name in chosen.table["output"][chosen.counts]} if chosen.table.name == "targets" else ()
+        )
+        if chosen.column != "rms" or len(outputs) != 1 or "motion" not in result.tables:
+            return None
+        (output,), motion = outputs, result.tables["motion"]
+        parts = [f"{output}_error"] if f"{output}.x_error" not in motion else [f"{output}.{k}_error" for k in "xy"]
+        errors = np.stack([motion[name].reshape(designs, -1) for name in parts], axis=1)
+        known = np.isfinite(errors)
+        number = np.maximum(known[:, 0].sum(axis=1), 1)
+        found = np.where(known, errors, 0.0) / np.sqrt(number)[:, None, None]
+        return np.asarray(found.reshape(designs, -1))
+
+
+def goal(name: str, *, smallest: bool = False, where: Mapping[str, object] | None = None) -> Goal:
     """Read a result's name, such as ``GII``, ``stiffness.k_min``, ``kinematics.extremes.C.x.range``.
 
     Of an error the absolute value counts.
     """
     command, column = _parts(name)
-    return Goal(name, command, column, smallest, absolute=column.endswith("_error"))
+    rows = tuple((where or {}).items())
+    told = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
+    return Goal(told, command, column, smallest, column.endswith("_error"), rows)
+
+
+def goals_of(section: OptimizeSection) -> tuple[Goal, ...]:
+    """What a section maximises, then what it minimises."""
+    return (
+        *(goal(each.result, where=each.where) for each in section.maximize),
+        *(goal(each.result, smallest=True, where=each.where) for each in section.minimize),
+    )
 
 
 def bounds_of(condition: Condition) -> Iterator[tuple[Goal, float, bool]]:
@@ -97,7 +129,7 @@ def bounds_of(condition: Condition) -> Iterator[tuple[Goal, float, bool]]:
     command, column = _parts(condition.result)
     for bound, upper in ((condition.at_least, False), (condition.at_most, True)):
         if bound is not None:
-            name = f"{condition.result} {'at most' if upper else 'at least'} {bound:g}"
+            name = f"{condition.name} {'at most' if upper else 'at least'} {bound:g}"
             yield Goal(name, command, column, upper, condition.abs, tuple(condition.where.items())), bound, upper
 
 

@@ -1,4 +1,4 @@
-"""Continuous and global search: a sample of the whole space, differential evolution, then quadratic models.
+"""Continuous and global search: independent starts, each a sample, differential evolution and descents.
 
 Every evaluated design serves every objective: the goals' single optima, in both directions, which normalise them, and
 the weighted sum of each row of weights.
@@ -7,43 +7,69 @@ the weighted sum of each row of weights.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.optimize.explorer import Explorer, Known, Objective, Spent
-from mechdesign.analyses.optimize.polish import NARROWEST, WIDTH, polish
+from mechdesign.analyses.optimize.descent import LADDER, ROUGH, descend
+from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Objective, Spent
 from mechdesign.analyses.workspace.rays import Floats
 
-# Points of the first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
-SAMPLE = 16
-MOST_VERTICES = 4
-POPULATION, SMALLEST_POPULATION = 5, 12
-GENERATIONS, PATIENCE = 40, 3
-# An improvement below this fraction of the objective's range is left to the last stage.
+# Evaluations of a start, a row of weights and a variable and one more; where the study does not say how many, and where
+# each evaluation takes long.
+START, STARTS, SLOW_START, MOST_STARTS = 500, 3, 60, 12
+# Points of a start's first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
+SAMPLE, MOST_VERTICES = 16, 4
+# The least part of a start's evaluations that its sample takes.
+LOOKED = 6
+POPULATION, SMALLEST_POPULATION, PATIENCE, ROUGH_PATIENCE = 8, 24, 8, 3
+# The part of a start's evaluations that differential evolution may take.
+EVOLUTION = 0.5
+# An improvement below this fraction of the objective's range is left to the descents.
 ENOUGH = 1e-3
-# How far apart the starts of two descents are, and how much worse than the best a start may be, of the range.
-APART, PROMISING = 0.2, 0.1
-# Half the width of the last box of the extremes' descents, and of the first one of descents that follow others.
-ROUGH, NEAR, NEAREST = 5e-3, 0.05, 1e-3
+# Descents at once; how far apart they begin, in parts of the ranges, and how much worse than the best, of all merits.
+ABREAST, APART = 6, 0.05
+# Evaluations of a descent, in those of its slopes.
+DESCENT = 20
+ROUNDS, MOST_ROUNDS = 2, 1000
+# Steps that may not improve the optimum, in parts of the ranges; evaluations kept for that, in those of slopes.
+CHECKED, MOST_CHECKS, CHECKS = 1e-4, 12, 30
+# Improvements below these parts of the objective, and of all its values, are rounding; of values known to a tolerance.
+ROUNDING, OF_ALL, NOISE = 1e-9, 1e-10, 1e-5
+# Starts that end within this part of the best agree.
+AGREE = 0.01
 
 
-# Starts of descents in search of the best worst row, whose valleys end anywhere.
-EDGED = 8
+@dataclass(frozen=True)
+class Ending:
+    """How a search ended.
+
+    Parameters
+    ----------
+    checked : bool
+        Whether the evaluations were enough for descents, and no small step improves any optimum.
+    ends : list of ndarray
+        For each row of weights the objective's smallest value of every start, in the goal's own units where it weighs
+        one; nan where a start found no feasible point.
+    """
+
+    checked: bool
+    ends: list[Floats]
 
 
-def allowance(dimensions: int, objectives: int) -> int:
-    """Evaluations of a search where the study says none: several times what smooth results need."""
-    return 200 * (dimensions + 1) + 300 * (dimensions + 1) * objectives
+def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
+    """Evaluations of a search where the study says none."""
+    if slow:
+        return SLOW_START * (dimensions + 1) * (rows + 2 * goals)
+    return STARTS * START * (dimensions + 1) * rows
 
 
-def objectives(goals: int, rows: Sequence[Sequence[float]]) -> int:
-    """Number of objectives of a search: each goal up and down, and the rows that weigh several."""
-    return 2 * goals + sum(sum(map(bool, row)) > 1 for row in rows)
-
-
-def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int) -> bool:
-    """Fill an explorer's memory with what the goals' extremes and the best weighted sums need.
+def search(
+    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int, *, patient: bool = True
+) -> Ending:
+    """Fill an explorer's memory with what the goals' extremes and the best weighted sums need, while evaluations last.
 
     Parameters
     ----------
@@ -51,36 +77,135 @@ def search(explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence
         Which goals are minimised.
     rows : sequence of sequence of float
         Weights, in the order of the goals.
+    patient : bool
+        Whether all evaluations are used; else it ends when two starts have found the same.
+    """
+    rng = np.random.default_rng(seed)
+    budget, slope = explorer.left, 2 * explorer.dimensions + 1
+    starts = int(np.clip(budget // (START * (explorer.dimensions + 1) * len(rows)), 1, MOST_STARTS))
+    last = min(budget // 4, CHECKS * slope * len(rows))
+    begins, whole = [], False
+    for k, own in enumerate(rng.spawn(starts)):
+        begins.append(budget - explorer.left)
+        explorer.reserve = last + (budget - last) * (starts - 1 - k) // starts
+        whole |= _start(explorer, smallest, rows, own, begins[-1], patient)
+        known, done = explorer.known, [*begins, budget - explorer.left]
+        if not known.feasible.any():
+            # Too few for anything but to look around.
+            explorer(own.random((explorer.left - explorer.reserve, explorer.dimensions)))
+        elif not patient and k and all(
+            np.ptp(np.sort(ends)[:2]) <= ROUNDING * abs(ends.min()) + OF_ALL * np.ptp(known.values[known.feasible])
+            for ends in (_ends(known, _weighted(known, smallest, row), done) for row in rows)
+        ):  # fmt: skip
+            break
+    begins.append(budget - explorer.left)
+    explorer.reserve = 0
+    try:
+        confirmed = [_confirmed(explorer, _weighted(explorer.known, smallest, row), rng) for row in rows]
+        checked = whole and all(confirmed)
+    except Spent:
+        checked = False
+    known = explorer.known
+    return Ending(checked, [_ends(known, _weighted(known, smallest, row), begins) for row in rows])
+
+
+def _start(
+    explorer: Explorer,
+    smallest: Sequence[bool],
+    rows: Sequence[Sequence[float]],
+    rng: np.random.Generator,
+    begin: int,
+    patient: bool,
+) -> bool:
+    """Search from points of its own until the evaluations of this start are used up, or after `ROUNDS` of descents.
+
+    Parameters
+    ----------
+    begin : int
+        First row of `explorer.known` that belongs to this start.
 
     Returns
     -------
     bool
-        Whether it came to its end with the evaluations that were allowed.
+        Whether the evaluations were enough for descents to come to their end.
     """
-    rng = np.random.default_rng(seed)
+    n, allowed, whole = explorer.dimensions, explorer.left - explorer.reserve, False
+    ladder = ROUGH if explorer.rough else LADDER
+    tried: list[list[int]] = [[] for _ in rows]
     try:
-        explorer(sample(explorer.dimensions, rng, SAMPLE * (explorer.dimensions + 1), explorer.left // 2))
-        ends = [_single(goal, sign, len(smallest)) for goal in range(len(smallest)) for sign in (1.0, -1.0)]
-        for goal, down in enumerate(smallest):
-            evolve(explorer, ends[2 * goal + (not down)], rng)
-        # To normalise by, extremes need not be known to the last digit.
-        # What is worst has not been looked for all over; it begins twice.
-        starts = [
-            start
-            for goal, down in enumerate(smallest)
-            for start in [EDGED if explorer.edged(ends[2 * goal + (not down)]) else 1, 2][:: 1 if down else -1]
-        ]
-        descend(explorer, ends, starts=starts, narrowest=ROUGH)
-        if explorer.known.feasible.any():
-            for row in rows:
-                if np.count_nonzero(row) > 1:
-                    evolve(explorer, _weighted(explorer.known, smallest, row), rng)
-            # Normalised by what has been found meanwhile, and once more where the descents have found more.
-            for width in (NEAR, NEAREST):
-                descend(explorer, [_weighted(explorer.known, smallest, row) for row in rows], width=width)
+        explorer(sample(n, rng, max(SAMPLE * (n + 1), allowed // LOOKED), allowed // 3))
+        if begin == 0 and allowed > 4 * len(smallest) * DESCENT * (2 * n + 1):
+            _extremes(explorer, smallest, rng, allowed)
+        for row in rows:
+            most = int(EVOLUTION * allowed) // len(rows)
+            evolve(explorer, _weighted(explorer.known, smallest, row), rng, begin, most)
+        for _ in range(MOST_ROUNDS if patient else ROUNDS):
+            room = (explorer.left - explorer.reserve) // (DESCENT * (2 * n + 1) * len(rows))
+            found: list[tuple[Objective, int]] = []
+            for row, done in zip(rows, tried, strict=True):
+                objective = _weighted(explorer.known, smallest, row)
+                done += (promising := _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, ABREAST))))
+                found += [(objective, k) for k in promising]
+            if found:
+                ends = descend(explorer, found, ladder)
+                whole = True
+                for (_, k), end in zip(found, ends, strict=True):
+                    next(done for done in tried if k in done).append(end)
+            if len(found) < len(rows) * ABREAST:
+                explorer(rng.random((SAMPLE, n)))
     except Spent:
-        return False
-    return True
+        pass
+    return whole
+
+
+def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Generator, allowed: int) -> None:
+    """Both ends of every goal, to normalise by; they need not be known to the last digit."""
+    goals = len(smallest)
+    for goal, down in enumerate(smallest) if goals > 1 else ():
+        evolve(explorer, _single(goal, 1.0 if down else -1.0, goals), rng, 0, int(EVOLUTION * allowed) // (4 * goals))
+    ends = [_single(goal, sign, goals) for goal in range(goals) for sign in (1.0, -1.0)]
+    descend(explorer, [(end, k) for end in ends for k in _apart(explorer.known, end, [], 0, 1)], ROUGH[1:])
+
+
+def _apart(known: Known, objective: Objective, tried: Sequence[int], begin: int, most: int) -> list[int]:
+    """Rows of the best points with a value that lie apart from each other and from those that were tried."""
+    merit = known.merit(objective)[begin:]
+    found: list[int] = []
+    free = np.isfinite(merit) & known.valid[begin:]
+    for k in tried:
+        free &= np.abs(known.u[begin:] - known.u[k]).max(axis=1) > APART
+    while free.any() and len(found) < most:
+        k = begin + int(np.argmin(np.where(free, merit, np.inf)))
+        found.append(k)
+        free &= np.abs(known.u[begin:] - known.u[k]).max(axis=1) > APART
+    return found
+
+
+def _confirmed(explorer: Explorer, objective: Objective, rng: np.random.Generator) -> bool:
+    """Whether no small step improves the best point any more; descends from where one does."""
+    n = explorer.dimensions
+    ladder = (ROUGH if explorer.rough else LADDER)[-1:]
+    for _ in range(MOST_CHECKS):
+        merit = explorer.known.merit(objective)
+        best = int(np.argmin(merit))
+        if not explorer.known.feasible[best]:
+            return False
+        steps = np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (2 * n, n))])
+        explorer(explorer.known.u[best] + CHECKED * steps)
+        merit = explorer.known.merit(objective)
+        better = int(np.argmin(merit))
+        all_ = float(np.ptp(merit[explorer.known.feasible]))
+        if merit[best] - merit[better] <= (NOISE if explorer.rough else ROUNDING) * abs(merit[best]) + OF_ALL * all_:
+            return True
+        descend(explorer, [(objective, better)], ladder)
+    return False
+
+
+def _ends(known: Known, objective: Objective, begins: Sequence[int]) -> Floats:
+    """The best that each start found, nan where that is not feasible."""
+    merit = np.where(known.feasible, known.merit(objective), np.nan)
+    parts = [merit[a:b] for a, b in pairwise(begins)]
+    return np.array([np.nan if np.isnan(part).all() else np.nanmin(part) for part in parts])
 
 
 def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> Floats:
@@ -99,41 +224,28 @@ def _single(goal: int, sign: float, goals: int) -> Objective:
 
 
 def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> Objective:
-    """The weighted sum of normalised goals [S1, eq. 28], turned round so that less is better."""
-    values = known.values[known.feasible]
-    low, high = values.min(axis=0), values.max(axis=0)
-    span = np.where(high > low, high - low, np.inf)
-    return Objective(np.asarray(row) * np.where(smallest, 1.0, -1.0) / span)
+    """The weighted sum of normalised goals [S1, eq. 28], turned round so that less is better; a goal alone as it is."""
+    signs = np.where(smallest, 1.0, -1.0)
+    if np.count_nonzero(row) == 1:
+        return Objective(signs * np.sign(row))
+    values = known.values[known.feasible if known.feasible.any() else known.valid]
+    span = np.ptp(values, axis=0) if len(values) else np.ones(len(row))
+    return Objective(np.asarray(row) * signs / np.where(span > 0, span, np.inf))
 
 
-def descend(
-    explorer: Explorer,
-    objectives: Sequence[Objective],
-    *,
-    starts: Sequence[int] | None = None,
-    width: float = WIDTH,
-    narrowest: float = NARROWEST,
+def evolve(
+    explorer: Explorer, objective: Objective, rng: np.random.Generator, begin: int = 0, most: int = 1000
 ) -> None:
-    """Polish each objective's best known points that lie apart."""
-    descents: list[tuple[Objective, int]] = []
-    for objective, most in zip(objectives, starts or [1] * len(objectives), strict=True):
-        merit = explorer.known.merit(objective)
-        finite = merit[np.isfinite(merit)]
-        enough = finite.min() + PROMISING * np.ptp(finite) if finite.size else -np.inf
-        begun: list[int] = []
-        for row in np.argsort(merit, kind="stable").tolist():
-            if len(begun) == most or not merit[row] <= enough:
-                break
-            if all(np.abs(explorer.known.u[row] - explorer.known.u[other]).max() > APART for other in begun):
-                begun.append(row)
-        descents += [(objective, row) for row in begun]
-    polish(explorer, descents, width, narrowest)
-
-
-def evolve(explorer: Explorer, objective: Objective, rng: np.random.Generator) -> None:
     """Differential evolution, a generation a batch, begun with the best known points and some others.
 
     [Storn & Price, Differential evolution, 1997; scipy.optimize.differential_evolution.]
+
+    Parameters
+    ----------
+    begin : int
+        First row of `explorer.known` that it may begin with.
+    most : int
+        Evaluations.
     """
     from scipy.optimize import differential_evolution
 
@@ -141,30 +253,32 @@ def evolve(explorer: Explorer, objective: Objective, rng: np.random.Generator) -
     begin_evolution: Any = differential_evolution
 
     size = max(SMALLEST_POPULATION, POPULATION * explorer.dimensions)
-    order = np.argsort(explorer.known.merit(objective), kind="stable")
+    if most < size:
+        return
+    order = begin + np.argsort(explorer.known.merit(objective)[begin:], kind="stable")
     best, others = order[: size // 2], order[size // 2 :]
     chosen = np.concatenate([best, rng.permutation(others)[: size - len(best)]])
-    begin = explorer.known.u[chosen]
-    if len(begin) < size:
-        begin = np.concatenate([begin, rng.random((size - len(begin), explorer.dimensions))])
+    first = explorer.known.u[chosen]
+    if len(first) < size:
+        first = np.concatenate([first, rng.random((size - len(first), explorer.dimensions))])
     merits: list[float] = []
+    patience = ROUGH_PATIENCE if explorer.rough else PATIENCE
 
     def energies(u: Floats) -> Floats:
         rows = explorer(u.T)
-        merit = explorer.known.merit(objective)
-        finite = merit[np.isfinite(merit)]
-        # Differential evolution compares; what cannot be built is worse than all else, but finite.
-        return np.asarray(np.where(np.isfinite(merit), merit, finite.max() + 1.0 if finite.size else 1.0)[rows])
+        merit = explorer.known.merit(objective)[rows]
+        return np.asarray(np.where(np.isfinite(merit), merit, UNKNOWN))
 
     def stalls(x: Floats, convergence: float) -> bool:
-        merit = explorer.known.merit(objective)
-        finite = merit[np.isfinite(merit)]
+        merit = explorer.known.merit(objective)[begin:]
         merits.append(float(merit.min()))
-        if len(merits) <= PATIENCE or not finite.size:
+        if len(merits) <= patience:
             return False
-        return merits[-1 - PATIENCE] - merits[-1] <= ENOUGH * float(np.ptp(finite))
+        inside = merit[merit < MISSES]
+        gained = merits[-1 - patience] - merits[-1]
+        return bool(gained <= ENOUGH * (float(np.ptp(inside)) if inside.size else abs(merits[-1])))
 
     begin_evolution(
-        energies, [(0.0, 1.0)] * explorer.dimensions, init=begin, vectorized=True, updating="deferred",
-        maxiter=GENERATIONS, polish=False, tol=1e-3, recombination=0.9, callback=stalls, seed=rng,
+        energies, [(0.0, 1.0)] * explorer.dimensions, init=first, vectorized=True, updating="deferred",
+        maxiter=most // size, polish=False, tol=1e-3, recombination=0.9, callback=stalls, seed=rng,
     )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +15,15 @@ from mechdesign.analyses.kinematics.motion import Motion, asked, move
 from mechdesign.analyses.kinematics.transmission import transmission_table
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
+from mechdesign.expressions import Expression
 from mechdesign.linearity import is_linear
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
+from mechdesign.study.units import QUANTITY
 from mechdesign.study.variants import follows, places_of
+
+Formulas = Mapping[tuple[int, str], Expression]
 
 # Poses of all designs that are solved together: their arrays fit the cache.
 BLOCK = 65536
@@ -68,7 +73,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
     """
     mechanism = study.mechanism
     places = places_of(study, names)
-    if command not in TABLES or follows(study, names, READ[command]):
+    if command not in TABLES or follows(_without_poses(study), names, READ[command]):
         return False
     graph = mechanism.graph
     # Angles of slides and clamps in a ring may contradict each other, which is found design by design.
@@ -87,6 +92,51 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
         links = [name for name in study.stiffness.elastic if len(mechanism.description.links[name].points) > 2]
         return not any(place.startswith(f"{link}.") for link in links for place in places)
     return True
+
+
+def _without_poses(study: Study) -> Study:
+    """The study without its listed poses, whose numbers may differ from design to design."""
+    return dataclasses.replace(
+        study,
+        resolved={
+            name: {k: v for k, v in part.items() if k != "poses" or v == "workspace"}
+            if isinstance(part, dict)
+            else part
+            for name, part in study.resolved.items()
+        },
+    )
+
+
+def formulas_of(study: Study, command: str) -> Formulas:
+    """Expressions of a command's listed poses, by the pose's number and the coordinate."""
+    for name in dict.fromkeys((command, "kinematics")):
+        section = getattr(study, name)
+        if section is not None and section.poses:
+            given = enumerate(study.resolved[name]["poses"])
+            texts = {(k, c): text for k, pose in given for c, text in pose.items() if isinstance(text, str)}
+            factor = study.units.angle_factor
+            parsed = {at: Expression.parse(text, factor) for at, text in texts.items() if not QUANTITY.fullmatch(text)}
+            return {at: formula for at, formula in parsed.items() if formula.names}
+        if section is not None and (section.sweep or section.path):
+            break
+    return {}
+
+
+def poses_of(
+    study: Study, command: str, designs: int, places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike],
+    formulas: Formulas,
+) -> Poses:  # fmt: skip
+    """Poses of a command for designs whose places and parameters have the given values, of shape (designs,)."""
+    one = study.poses(command)
+    poses = stacked(one, designs, places, parameters)
+    values: Mapping[str, Any] = {**study.parameters.nominal, **parameters}
+    for group in poses.groups if formulas else ():
+        which = group.rows.reshape(designs, -1)[0]
+        for column, k in enumerate(which.tolist()):
+            for name in group.names:
+                if (k, name) in formulas:
+                    group.values[name].reshape(designs, -1)[:, column] = formulas[k, name].evaluate(values)
+    return poses
 
 
 def _first_order(study: Study, names: Collection[str]) -> bool:
@@ -124,6 +174,7 @@ def size(study: Study, command: str) -> int:
 def tables(
     study: Study, command: str, wanted: Collection[str], designs: int,
     places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike], outputs: Collection[str] | None = None,
+    formulas: Formulas | None = None,
 ) -> Stack:  # fmt: skip
     """Answers of a command for designs whose places and parameters have the given values, of shape (designs,).
 
@@ -131,11 +182,13 @@ def tables(
     ----------
     wanted : collection of str
         Names of tables.
+    formulas : mapping, optional
+        As `formulas_of` gives them.
     outputs : collection of str, optional
         Of the extremes; all where left out.
     """
     one = study.poses(command)
-    poses = stacked(one, designs, places, parameters)
+    poses = poses_of(study, command, designs, places, parameters, formulas or {})
     torn = np.zeros(designs, dtype=bool)
     if command == "kinematics":
         found, reason, torn = _motion(study, wanted, poses, outputs)

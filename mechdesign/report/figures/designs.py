@@ -75,7 +75,7 @@ def designs_of(study: Study, result: Result) -> Designs:
     """The designs of an optimisation's result."""
     section = study.optimize
     assert section is not None
-    goals = {**dict.fromkeys(section.maximize, False), **dict.fromkeys(section.minimize, True)}
+    goals = {**{goal.name: False for goal in section.maximize}, **{goal.name: True for goal in section.minimize}}
     table = result.tables["designs"]
     return Designs(
         table, result.tables["optimum"], list(section.variables), goals, np.asarray(table["feasible"]).astype(bool)

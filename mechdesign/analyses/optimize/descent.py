@@ -1,0 +1,259 @@
+"""From a design to the optimum near it, by SciPy's least squares and sequential quadratic programming.
+
+The worst of several rows has edges where another row becomes the worst. Its rows are smooth: the worst of them is made
+small by its epigraph, ``min t`` where no row exceeds ``t``. Rows of conditions, and the clearances of the poses, are
+conditions of their own. [Nocedal & Wright, Numerical Optimization, 2006, ch. 10 and 18.] Derivatives are differences
+over steps, evaluated in one batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.optimize.explorer import ASSEMBLY, Explorer, Objective
+from mechdesign.analyses.optimize.lockstep import Ask, side_by_side
+from mechdesign.analyses.workspace.rays import Floats
+
+Integers = NDArray[np.intp]
+
+# Steps of differences, and half the widths of the boxes in which they are used, in parts of the ranges.
+LADDER = ((1e-4, 0.3), (1e-5, 0.03))
+# Where values are known to a tolerance, differences over less than this are noise.
+ROUGH = ((1e-2, 0.3), (1e-3, 0.05))
+SQUARES_STEP, MOST_SQUARES, MOST_STEPS = 1e-5, 60, 60
+# Gains of a step, in parts of what a range changes, below which a descent ends.
+ENOUGH, ROUGH_ENOUGH = 1e-14, 1e-5
+# How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
+SLACK = 1e-9
+# An impossible point's objective above the last possible one's, in parts of what a range changes.
+IMPOSSIBLE = 1e3
+# Slopes of conditions below this part of their values are none.
+FLAT = 1e-6
+TINY = float(np.finfo(float).tiny)
+
+
+def descend(
+    explorer: Explorer, descents: Sequence[tuple[Objective, int]], ladder: Sequence[tuple[float, float]] = LADDER
+) -> list[int]:
+    """Descend from known points, all at once: a batch of designs costs little more than one.
+
+    Parameters
+    ----------
+    descents : sequence of (Objective, int)
+        What is made small, and the row of `explorer.known` from which.
+    ladder : sequence of (float, float)
+        Steps of differences and half the widths of boxes.
+
+    Returns
+    -------
+    list of int
+        Rows of `explorer.known` where the descents ended.
+
+    Raises
+    ------
+    Spent
+        If the evaluations are used up.
+    """
+    running = [_Descent(explorer, objective, row, ladder) for objective, row in descents]
+    side_by_side(explorer, [each.run for each in running])
+    return [each.best for each in running]
+
+
+class _Descent:
+    """One descent: the best row so far, and the smooth parts of which its objective consists."""
+
+    def __init__(
+        self, explorer: Explorer, objective: Objective, row: int, ladder: Sequence[tuple[float, float]]
+    ) -> None:
+        self.explorer, self.objective, self.best, self.ladder = explorer, objective, row, ladder
+        self.plain, known = objective.factors.copy(), explorer.known
+        goals = len(self.plain)
+        self.edged, self.held, self.squares = [], [], []
+        self.conditions = np.ones(known.margins.shape[1], dtype=bool)
+        for part in explorer.parts:
+            if part.column == ASSEMBLY:
+                self.held.append(part)
+            elif part.column >= goals:
+                if np.isnan(known.rows[row, part.place]).any():
+                    continue
+                self.held.append(part)
+                self.conditions[part.column - goals] = False
+            elif part.squares:
+                self.squares += [part] if self.plain[part.column] > 0 else []
+            elif objective.factors[part.column] * part.sign > 0 and np.isfinite(known.rows[row, part.place]).all():
+                self.edged.append((part, abs(objective.factors[part.column])))
+                self.plain[part.column] = 0.0
+
+    def run(self, ask: Ask) -> None:
+        if not self.explorer.known.valid[self.best]:
+            return
+        if len(self.squares) == np.count_nonzero(self.objective.factors) == 1:
+            self._least_squares(ask)
+        for step, width in self.ladder:
+            self._programming(ask, step, width)
+
+    def ask(self, ask: Ask, points: Floats) -> Integers:
+        """Rows of points; the best of them, or of those before, is where the next stage begins."""
+        rows = ask(points)
+        known = self.explorer.known
+        among = np.concatenate([[self.best], rows])
+        merit = known.merit(self.objective)[among]
+        self.best = int(among[np.argmin(merit)])
+        return rows
+
+    def terms(self, rows: Integers) -> tuple[Floats, Floats, Floats]:
+        """The smooth sum, shape (m, 1), rows that bound each worst, and what may not be positive; nan where unknown."""
+        known = self.explorer.known
+        lines = known.rows[rows]
+        none = np.empty((len(rows), 0))
+        pieces = [part.pieces(lines) * factor for part, factor in self.edged]
+        limits = [-known.margins[rows][:, self.conditions], *(part.pieces(lines) for part in self.held)]
+        plain = known.values[rows] @ self.plain if self.plain.any() else np.zeros(len(rows))
+        return plain[:, None], np.concatenate([none, *pieces], axis=1), np.concatenate(limits, axis=1)
+
+    def _least_squares(self, ask: Ask) -> None:
+        from scipy.optimize import least_squares
+
+        (part,) = self.squares
+
+        def residuals(u: Floats) -> Floats:
+            row = self.ask(ask, u[None])[0]
+            return np.asarray(self.explorer.known.rows[row, part.place])
+
+        def slopes(u: Floats) -> Floats:
+            points, rows = self._stencil(ask, u, SQUARES_STEP)
+            return np.nan_to_num(_differences(points, u, self.explorer.known.rows[rows][:, part.place]))
+
+        begin = self.explorer.known.u[self.best]
+        if np.isfinite(residuals(begin)).all():
+            least_squares(
+                residuals,
+                begin,
+                jac=slopes,
+                bounds=(0.0, 1.0),
+                max_nfev=MOST_SQUARES,
+                xtol=1e-12,
+                ftol=1e-12,
+                gtol=None,
+            )
+
+    def _stencil(self, ask: Ask, u: Floats, step: float) -> tuple[Floats, Integers]:
+        """A point, and those a step from it along each variable, inside the cube."""
+        sides = [np.clip(u + sign * step * np.eye(len(u)), 0.0, 1.0) for sign in (-1, 1)]
+        points = np.concatenate([u[None], *sides])
+        return points, self.ask(ask, points)
+
+    def _programming(self, ask: Ask, step: float, width: float) -> None:
+        """Sequential quadratic programming in a box about the best point."""
+        from scipy.optimize import minimize as scipy_minimize
+
+        # Its stubs know no bounds of other than plain numbers.
+        minimize: Any = scipy_minimize
+        begin = self.explorer.known.u[self.best].copy()
+        n, more = len(begin), len(self.edged)
+        lines = self.explorer.known.rows[[self.best]]
+        owner = np.repeat(np.arange(more), [part.pieces(lines).shape[1] for part, _ in self.edged])
+        program = _Program(self, ask, begin, step)
+        raised, free = np.eye(more)[owner], np.zeros((len(program.lengths), more))
+
+        def cost(y: Floats) -> float:
+            return float(program.terms(y[:n])[0][0] + y[n:].sum())
+
+        def cost_slope(y: Floats) -> Floats:
+            return np.concatenate([program.slopes(y[:n])[0][0], np.ones(more)])
+
+        def room(y: Floats) -> Floats:
+            _, pieces, limits = program.terms(y[:n])
+            return np.concatenate([y[n:][owner] - pieces, -limits - SLACK])
+
+        def room_slope(y: Floats) -> Floats:
+            _, pieces, limits = program.slopes(y[:n])
+            return np.block([[-pieces, raised], [-limits, free]])
+
+        pieces = program.terms(begin)[1]
+        tops = np.array([pieces[owner == k].max() for k in range(more)])
+        low, high = np.maximum(begin - width, 0.0), np.minimum(begin + width, 1.0)
+        minimize(
+            cost, np.concatenate([begin, tops]), jac=cost_slope, method="SLSQP",
+            bounds=[*zip(low, high, strict=True), *[(None, None)] * more],
+            constraints=[{"type": "ineq", "fun": room, "jac": room_slope}] if len(owner) + len(free) else (),
+            options={"maxiter": MOST_STEPS, "ftol": ROUGH_ENOUGH if self.explorer.rough else ENOUGH},
+        )  # fmt: skip
+
+    def linear(self, ask: Ask, u: Floats, step: float) -> tuple[list[Floats], list[Floats]]:
+        """The terms at a point, and their slopes, each of shape (columns, n)."""
+        points, rows = self._stencil(ask, u, step)
+        found = self.terms(rows)
+        return [part[0] for part in found], [np.nan_to_num(_differences(points, u, part)) for part in found]
+
+
+class _Program:
+    """What a descent makes small, in parts of what a range changes of it: its terms and their slopes at any point.
+
+    Where the goals have no value they go on as straight lines from the last point where they had, as long as a
+    condition or a clearance tells that nothing is to be had there; else they are too high for a step to be taken.
+    """
+
+    def __init__(self, descent: _Descent, ask: Ask, begin: Floats, step: float) -> None:
+        self._descent, self._ask, self._step = descent, ask, step
+        values, slopes = descent.linear(ask, begin, step)
+        scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), TINY)
+        steepest = np.abs(slopes[2]).max(axis=1, initial=0.0)
+        self.lengths = np.maximum(steepest, np.maximum(FLAT * np.abs(np.nan_to_num(values[2])), TINY))
+        self._scales = [np.array([scale]), np.full(len(values[1]), scale), self.lengths]
+        self._at, self._slopes = begin.copy(), [a / b[:, None] for a, b in zip(slopes, self._scales, strict=True)]
+        self._values = [np.nan_to_num(a / b) for a, b in zip(values, self._scales, strict=True)]
+        self._known: dict[bytes, list[Floats]] = {}
+        self._known_slopes = {self._at.tobytes(): self._slopes}
+
+    def terms(self, u: Floats) -> list[Floats]:
+        """The smooth sum, the rows that bound each worst, and what may not be positive."""
+        key = u.tobytes()
+        if key not in self._known:
+            rows = self._descent.ask(self._ask, u[None])
+            found = [part[0] / scale for part, scale in zip(self._descent.terms(rows), self._scales, strict=True)]
+            straight = [a + b @ (u - self._at) for a, b in zip(self._values, self._slopes, strict=True)]
+            impossible = np.isnan(found[0]).any() or np.isnan(found[1]).any()
+            told = bool((found[2] > 0).any())
+            found = [np.where(np.isnan(new), line, new) for new, line in zip(found, straight, strict=True)]
+            if impossible and not told:
+                found[0] = found[0] + IMPOSSIBLE
+            self._known = {key: found}
+        return self._known[key]
+
+    def slopes(self, u: Floats) -> list[Floats]:
+        """Slopes of the terms, each of shape (columns, n)."""
+        key = u.tobytes()
+        if key not in self._known_slopes:
+            values, slopes = self._descent.linear(self._ask, u, self._step)
+            values = [a / b for a, b in zip(values, self._scales, strict=True)]
+            slopes = [a / b[:, None] for a, b in zip(slopes, self._scales, strict=True)]
+            known = [np.isfinite(part) for part in values]
+            straight = [a + b @ (u - self._at) for a, b in zip(self._values, self._slopes, strict=True)]
+            self._slopes = [
+                np.where(good[:, None], new, old) for good, new, old in zip(known, slopes, self._slopes, strict=True)
+            ]
+            self._values = [np.where(good, new, line) for good, new, line in zip(known, values, straight, strict=True)]
+            self._at = u.copy()
+            self._known_slopes = {key: self._slopes}
+        return self._known_slopes[key]
+
+
+def _differences(points: Floats, u: Floats, values: Floats) -> Floats:
+    """Slopes, shape (columns, n), of values at a point and at those below and above it along each variable.
+
+    Central where both sides are known, else one-sided; nan where neither is.
+    """
+    n = len(u)
+    below, above = values[1 : n + 1], values[n + 1 :]
+    down, up = u - np.diagonal(points[1 : n + 1]), np.diagonal(points[n + 1 :]) - u
+    with np.errstate(all="ignore"):
+        left = (values[0] - below) / down[:, None]
+        right = (above - values[0]) / up[:, None]
+        # Of unequal sides this is the slope of the parabola through the three points.
+        both = (left * up[:, None] + right * down[:, None]) / (up + down)[:, None]
+    return np.asarray(np.where(np.isfinite(both), both, np.where(np.isfinite(left), left, right)).T)
