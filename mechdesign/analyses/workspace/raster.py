@@ -101,13 +101,13 @@ class Raster:
         every = np.arange(len(self.low) + 1)
         first, held = np.searchsorted(design, every), _Held(intervals)
         owners, angles = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
-        for some, z in self._centres(some):
-            inside = self.inside[some].reshape(len(some), -1).T
+        for block, z in self._centres(some):
+            inside = self.inside[block].reshape(len(block), -1).T
             way = z - about
             theta = scan[0] + (np.angle(way) - scan[0]) % (2 * np.pi)
             radius = np.abs(way)
             at = np.empty(z.shape, dtype=np.intp)
-            for lane, k in enumerate(some):
+            for lane, k in enumerate(block):
                 rays = angle[first[k] : first[k + 1]]
                 at[:, lane] = first[k] + np.clip(np.searchsorted(rays, theta[:, lane]) - 1, 0, len(rays) - 2)
             before, after = held.at(at, radius), held.at(at + 1, radius)
@@ -116,13 +116,13 @@ class Raster:
                 continue
             # One ray for what hangs together, between the same two rays.
             size = self.inside.shape[1]
-            shape = (len(some), size, size)
+            shape = (len(block), size, size)
             kind = np.where(passed, np.where(inside, 1, 2), 0).T.reshape(shape)
             part = np.zeros(shape, dtype=np.intp)
             for value in (1, 2):
-                label, parts = ndimage.label(kind == value, PLANE)
+                label, _ = ndimage.label(kind == value, PLANE)
                 part[label > 0] = label[label > 0] + part.max()
-            flat = part.reshape(len(some), -1).T
+            flat = part.reshape(len(block), -1).T
             cells, lane = np.nonzero(passed)
             gap = at[cells, lane]
             aside = np.minimum(theta[cells, lane] - angle[gap], angle[gap + 1] - theta[cells, lane])
@@ -130,7 +130,7 @@ class Raster:
             key = np.stack([flat[cells, lane], gap])[:, order]
             new = np.append(True, (key[:, 1:] != key[:, :-1]).any(axis=0))
             chosen = order[new]
-            owners.append(some[lane[chosen]])
+            owners.append(block[lane[chosen]])
             angles.append(theta[cells[chosen], lane[chosen]])
         return np.concatenate(owners), np.concatenate(angles)
 

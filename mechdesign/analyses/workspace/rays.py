@@ -159,7 +159,7 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
     margin, ray, turn, x, start = _quadratic_roots(a, b, c)
     found = _intervals(margin, ray, turn, x * reach[ray], start, reach, slack)
     if not (quadratic.all() and not designs.field.same_assembly):
-        found = _others(designs, places, direction, found, quadratic, samples, slack * reach)
+        found = _others(designs, places, direction, found, quadratic, samples, slack * reach, reach)
     return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
 
 
@@ -204,6 +204,7 @@ def _others(
     quadratic: NDArray[np.bool_],
     samples: int,
     thin: Floats,
+    reach: Floats,
 ) -> Intervals:
     """Cut intervals where one of the margins that are not quadratic along their ray is negative or unknown."""
     extra = len(designs.field.labels) - len(quadratic)
@@ -249,7 +250,7 @@ def _others(
     turn = np.where(brackets.high[1] > 0, 1, -1)
     start = (~positive[:, 0][:, lanes]).sum(axis=0)
     part = _intervals(rows[margin], lane, turn, radius, start, found.outer[cut_of], 0.0)
-    return _replace(found, cut_of, part)
+    return _replace(found, cut_of, part, NOTHING * reach)
 
 
 def _idle(
@@ -271,10 +272,15 @@ def _within(dips: tuple[Ints, Ints, Floats, Floats], lanes: Ints) -> tuple[Ints,
     return dips[0][use], np.searchsorted(lanes, dips[1][use]), dips[2][use], dips[3][use]
 
 
-def _replace(found: Intervals, lanes: Ints, part: Intervals) -> Intervals:
-    """Intervals with those at `lanes` replaced by the parts of them that `part` has left."""
+def _replace(found: Intervals, lanes: Ints, part: Intervals, tie: Floats) -> Intervals:
+    """Intervals with those at `lanes` replaced by the parts of them that `part` has left.
+
+    A cut no farther from an end than `tie` (of each ray) is that end: rounding does not choose its name.
+    """
     source = lanes[part.ray]
-    at_start, at_end = part.enters < 0, part.leaves < 0
+    near = tie[found.ray[source]]
+    at_start = (part.enters < 0) | (part.inner - found.inner[source] <= near)
+    at_end = (part.leaves < 0) | (found.outer[source] - part.outer <= near)
     keep = np.ones(len(found.ray), dtype=bool)
     keep[lanes] = False
     owner = np.concatenate([found.ray[keep], found.ray[source]])
