@@ -98,11 +98,11 @@ def test_ends_of_intervals_lie_on_the_limits() -> None:
 
 def test_panels_end_where_the_active_limits_change() -> None:
     question = questions(study_of(LEGS, UPPER))[0]
-    panels = find_panels(Designs(question.field, {}, 1, 0j), (0.0, np.pi), Effort(16, 12))
+    panels = find_panels(Designs(question.field, {}, 1, 0j), (0.0, np.pi), Effort(16, 12, 24))
     assert panels.high == pytest.approx([np.pi / 2, np.pi], abs=1e-8)
     # A base that is not symmetric: the corners are where two circles meet.
     moved = {"ground.B1.x": np.array([1.3])}
-    panels = find_panels(Designs(question.field, moved, 1, 0j), (0.0, np.pi), Effort(16, 12))
+    panels = find_panels(Designs(question.field, moved, 1, 0j), (0.0, np.pi), Effort(16, 12, 24))
     corner = (1.3**2 - 1) / (2 * 2.3) + 0j
     corner += 1j * np.sqrt(9 - (corner.real + 1) ** 2)
     assert np.abs(panels.high - np.angle(corner)).min() < 1e-12

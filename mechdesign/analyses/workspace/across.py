@@ -42,6 +42,12 @@ class _Turned(Field):
         assert self.sliced is not None
         return tuple(self.sliced.labels[k] for k in self.rows) or (("limit", MARGIN),)
 
+    @property
+    def rounding(self) -> Floats:
+        """Of those margins."""
+        assert self.sliced is not None
+        return self.sliced.rounding[list(self.rows)] if self.rows else np.zeros(1)
+
     def margins(self, z: Complex, places: Places, *, assembly: bool = True) -> Floats:
         """Those margins, shape (margins, *z.shape)."""
         assert self.sliced is not None

@@ -8,6 +8,7 @@ import numpy as np
 
 from mechdesign.analyses.workspace.meetings import Meetings
 from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, trace
+from mechdesign.errors import AssemblyError
 
 # Panel ends nearer to each other than this are one (radians): what lies between them is lost in rounding.
 TOGETHER = 1e-7
@@ -16,6 +17,8 @@ TOGETHER = 1e-7
 BESIDE, APART = 1e-3, 1.5e-4
 # In a cell so small (as a part of it) nothing is looked at from farther away.
 WITHIN = 0.1
+# Rays of one design that may be traced; what is still not resolved by as many is rounding.
+BUDGET = 10_000
 # A ray is also looked at from so near (radians), as it may be the break itself.
 AT_END = 1e-9
 
@@ -64,8 +67,14 @@ class Search:
         Returns
         -------
         (design, angle)
+
+        Raises
+        ------
+        AssemblyError
+            If rounding makes rays differ however near they are.
         """
-        field = self.designs.field
+        field, centre = self.designs.field, self.designs.about
+        spent = np.zeros(self.designs.count, dtype=np.intp)
         owners, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
         codes, doubted = signatures(intervals, len(field.labels)), np.zeros(len(design), dtype=bool)
         while True:
@@ -100,6 +109,12 @@ class Search:
             order = np.lexsort((rays, of))
             rays, of, about = rays[order], of[order], about[order]
             both = design[of]
+            spent += np.bincount(both, minlength=len(spent))
+            if spent.max() > BUDGET:
+                raise AssemblyError(
+                    f"seen from ({centre.real:g}, {centre.imag:g}) the boundary of the region is lost in rounding: "
+                    "move scan.about nearer to the region or into it"
+                )
             intervals = trace(self.designs, both, rays, self.reach[both], self.samples)
             codes = signatures(intervals, len(field.labels))
             left = np.flatnonzero((codes[1:] != codes[:-1]) & (of[1:] == of[:-1]))

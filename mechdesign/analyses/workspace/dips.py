@@ -19,8 +19,28 @@ BOTTOM = 1e-9
 ROOM = 2.0
 
 
+def rounded(values: Floats, rounding: Floats) -> tuple[Floats, Floats]:
+    """Samples whose value is but rounding given the sign of both neighbours, and what rounding is (functions, lanes).
+
+    Parameters
+    ----------
+    values : ndarray, shape (functions, samples, lanes)
+    rounding : ndarray, shape (functions,)
+        Values below it have no sign of their own.
+    """
+    noise = np.broadcast_to(rounding[:, None], (len(values), values.shape[2]))
+    beside = np.sign(values[:, :-2])
+    with np.errstate(invalid="ignore"):
+        doubtful = (np.abs(values[:, 1:-1]) <= noise[:, None]) & (beside == np.sign(values[:, 2:]))
+    if not doubtful.any():
+        return values, noise
+    values = values.copy()
+    values[:, 1:-1] = np.where(doubtful, beside * noise[:, None], values[:, 1:-1])
+    return values, noise
+
+
 def hidden_places(
-    evaluate: Callable[[Ints, Ints, Floats], Floats], x: Floats, values: Floats
+    evaluate: Callable[[Ints, Ints, Floats], Floats], x: Floats, values: Floats, noise: Floats
 ) -> tuple[Ints, Ints, Floats, Floats]:
     """Places between samples at which a function has the other sign than at the samples on both sides.
 
@@ -35,6 +55,8 @@ def hidden_places(
         Samples, ascending.
     values : ndarray, shape (functions, samples, lanes)
         The functions there; nan is no sample.
+    noise : ndarray, shape (functions, lanes)
+        Values of the other sign that are no larger are rounding.
 
     Returns
     -------
@@ -74,7 +96,7 @@ def hidden_places(
             # What is convex stays above the line from either end through the lowest place.
             fall = np.maximum((fal - fbl) / (bl - al) * (cl - bl), (fcl - fbl) / (cl - bl) * (bl - al))
             hopeless = fbl > ROOM * fall
-        found[alive] = fbl < 0
+        found[alive] = fbl < -noise[function[alive], lane[alive]]
         alive = alive[~(found[alive] | hopeless | (cl - al <= BOTTOM * np.abs(cl)))]
         if not len(alive):
             break

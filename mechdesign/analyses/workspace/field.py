@@ -22,6 +22,9 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rates import Rates
 
 Places = Mapping[str, Value]
+# Determinants below this part of the largest of those at some distances (of the mechanism's size) from the point's
+# place in the sketch are rounding.
+ROUNDING, SHARES = 1e-12, (0.03, 0.1, 0.3, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +161,23 @@ class Field:
     def _signs(self) -> list[float]:
         sketch = self.mechanism.sketch_configuration
         return [float(np.sign(d)) for d in self._determinants(sketch)]
+
+    @cached_property
+    def rounding(self) -> NDArray[np.float64]:
+        """Values of each margin that have no sign of their own: of determinants what rounding leaves, else 0.
+
+        A determinant may touch zero along a whole curve (cranks that meet in one pin while the point goes round it);
+        each place there would have another sign.
+        """
+        found = np.zeros(len(self.labels))
+        if self.same_assembly:
+            turn, share = np.meshgrid(np.exp(1j * np.linspace(0, 2 * np.pi, 24, endpoint=False)), SHARES)
+            drawn = self.mechanism.sketch_configuration
+            at = complex(*(float(drawn.value(c)) for c in self.outputs[:2]))
+            around = np.append(at, at + self.mechanism.size * (turn * share).ravel())
+            sizes = np.abs(Field.margins(self, around, {}))[-len(self._signs) :]
+            found[-len(self._signs) :] = ROUNDING * np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
+        return found
 
     def _determinants(self, configuration: Configuration) -> list[Value]:
         return determinants(self.mechanism.linearize(configuration))

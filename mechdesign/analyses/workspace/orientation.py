@@ -22,7 +22,7 @@ from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.workspace_models import Over
 
-EFFORT = Effort(48, 16)
+EFFORT = Effort(48, 16, 96)
 # Rays of the table of the boundary, and the tolerance of means of which the area gets a tenth.
 RAYS, AREA = 181, 1e-5
 

@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.breaks import TOGETHER, Search, signatures
-from mechdesign.analyses.workspace.overlooked import overlooked
+from mechdesign.analyses.workspace.raster import Raster
 from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, curved, trace
 from mechdesign.errors import AssemblyError
 
 PROBES = 4
 DOUBLINGS = 16
+# Rounds in which rays are put where the raster shows what others pass by.
+LOOKS = 3
 
 
 @dataclass(frozen=True)
@@ -30,16 +32,17 @@ class Effort:
         Rays over the scan.
     samples : int
         Samples of each interval, for margins that are not quadratic along rays.
-    views : int
-        Rays about each of the other centres that a region is looked at from.
+    cells : int
+        Cells of the raster over the width and height of what the point can reach at most: pieces and holes that hold
+        a circle around a cell are never lost.
     closer : int or None
-        Where given, only designs with limits that are not quadratic along rays (angles, not distances) are looked at
-        from other centres, and by so many rays over the scan: such limits leave thin parts.
+        Where given, designs with limits that are not quadratic along rays (angles, not distances) are looked at by so
+        many rays over the scan: such limits leave thin parts.
     """
 
     rays: int
     samples: int
-    views: int = 96
+    cells: int
     closer: int | None = None
 
 
@@ -76,23 +79,27 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
         If the region has no end.
     """
     count, samples = designs.count, effort.samples
+    raster = Raster.of(designs, effort.cells, scan)
     design, angle = _scanned(count, np.linspace(*scan, PROBES + 1))
-    reach = _extent(designs, design, angle, _first_guess(designs), samples)[0]
-    some = np.arange(count)
+    least = raster.farthest(designs.about)
+    reach = _extent(designs, design, angle, np.where(least > 0, least, _first_guess(designs)), least, samples)[0]
+    some = np.arange(0)
     if effort.closer is not None:
         bent = curved(designs, design, angle, reach[design])
         limits = [kind == "limit" for kind, _ in designs.field.labels[: len(bent)]]
         some = np.unique(design[bent[limits].any(axis=0)])
     design, angle = _scanned(count, np.linspace(*scan, effort.rays + 1))
-    reach, intervals = _extent(designs, design, angle, reach, samples)
-    if some.size:
-        finer = np.linspace(*scan, (effort.closer or effort.rays) + 1)
-        owner, missed = overlooked(designs, some, reach, samples, effort.views, scan, design, angle, intervals)
-        more = np.repeat(some, len(finer)) + 1j * np.tile(finer, len(some))
-        rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * missed, more]))
-        if len(rays) > len(design):
-            design, angle = rays.real.astype(np.intp), rays.imag
-            reach, intervals = _extent(designs, design, angle, reach, samples)
+    reach, intervals = _extent(designs, design, angle, reach, least, samples)
+    finer = np.linspace(*scan, (effort.closer or effort.rays) + 1)
+    more = np.repeat(some, len(finer)) + 1j * np.tile(finer, len(some))
+    owner = np.arange(count)
+    for _ in range(LOOKS):
+        owner, hidden = raster.hidden(np.unique(owner), designs.about, scan, design, angle, intervals)
+        rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * hidden, more]))
+        if len(rays) == len(design):
+            break
+        design, angle = rays.real.astype(np.intp), rays.imag
+        reach, intervals = _extent(designs, design, angle, reach, least, samples)
     codes = signatures(intervals, len(designs.field.labels))
     cell = np.flatnonzero((codes[1:] != codes[:-1]) & (design[1:] == design[:-1]))
     search = Search(designs, reach, samples)
@@ -145,8 +152,13 @@ def _first_guess(designs: Designs) -> Floats:
     return np.broadcast_to(np.asarray(total + drawn, dtype=float), (designs.count,)).copy()
 
 
-def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int) -> tuple[Floats, Intervals]:
-    """Trace rays, doubling the reach until no ray ends inside; returns the reach needed and the intervals."""
+def _extent(
+    designs: Designs, design: Ints, theta: Floats, reach: Floats, least: Floats, samples: int
+) -> tuple[Floats, Intervals]:
+    """Trace rays, doubling the reach until no ray ends inside; returns the reach needed and the intervals.
+
+    The reach of a design is `least` at least.
+    """
     for _ in range(DOUBLINGS):
         intervals = trace(designs, design, theta, reach[design], samples)
         beyond = np.bincount(design, intervals.beyond, designs.count) > 0
@@ -160,4 +172,4 @@ def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats, sample
         )
     farthest = np.zeros(designs.count)
     np.maximum.at(farthest, design[intervals.ray], intervals.outer)
-    return np.where(farthest > 0, 1.2 * farthest, reach), intervals
+    return np.where(farthest > 0, 1.2 * np.maximum(farthest, least), reach), intervals

@@ -304,10 +304,7 @@ class _OnePiece(Designs):
         slot = pieces.slots_of(design[rays], theta[rays], part, samples)
         keep = np.ones(len(found.ray), dtype=bool)
         keep[some] = np.where(slot >= 0, pieces.piece[slot] == self.piece, self.piece == 0)
-        return replace(
-            found, ray=found.ray[keep], inner=found.inner[keep], outer=found.outer[keep], enters=found.enters[keep],
-            leaves=found.leaves[keep],
-        )  # fmt: skip
+        return found.kept(keep)
 
 
 def _is_turn(scan: tuple[float, float]) -> bool:

@@ -34,6 +34,8 @@ MOST_HALVINGS = 12
 ALONG, AREA = 0.6, 0.1
 # The area is integrated at least to this relative tolerance.
 FINEST_AREA = 1e-6
+# Places at which the integrals of one design may look; what is in doubt then stays so, and its error tells.
+BUDGET = 2_000_000
 # Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
 SINGLE = 0.01
 
@@ -116,16 +118,20 @@ def integrate(
     each = np.where(endless, np.inf, tolerance)
     allowed: Floats | None = None
     boundary: tuple[Ints, Floats, Floats] | None = None
+    spent = np.zeros(count)
     for _ in range(MOST_PASSES):
-        value, error, allowed, met = _evaluate(designs, integrands, fresh, panels.reach, samples, each, allowed, span)
+        value, error, allowed, met, looked = _evaluate(
+            designs, integrands, fresh, panels.reach, samples, each, allowed, span
+        )
         boundary = met if boundary is None else boundary
+        spent += looked
         done = fresh if done is None else _join(done, fresh)
         values, errors = np.concatenate([values, value], axis=1), np.concatenate([errors, error], axis=1)
         total, doubt = (np.stack([np.bincount(done.design, row, count) for row in rows]) for rows in (values, errors))
         with np.errstate(invalid="ignore"):
             wanted = np.stack([of_area * total[0], of_area * total[1], *np.fmax(each * total[2:], 0.0)])
             wanted[2:][endless] = np.inf
-        late = (doubt > wanted).any(axis=0)
+        late = (doubt > wanted).any(axis=0) & (spent < BUDGET)
         if not late.any():
             break
         # What is left of errors along rays looks like roughness in the angle: they get smaller with the cells.
@@ -137,7 +143,7 @@ def integrate(
             np.maximum.at(worst[row], done.design, share[row])
         # The worst cell, and those that exceed their equal share of the tolerance.
         over = (share >= np.minimum(worst, 1 / np.maximum(cells, 1))[:, done.design]) & (doubt > wanted)[:, done.design]
-        split = over.any(axis=0) & (done.stop - done.start > 2.0**-MOST_HALVINGS)
+        split = over.any(axis=0) & (done.stop - done.start > 2.0**-MOST_HALVINGS) & late[done.design]
         if not split.any():
             break
         fresh = done.pick(np.nonzero(split)[0]).halves()
@@ -159,10 +165,10 @@ def _evaluate(
     tolerance: Floats,
     allowed: Floats | None,
     span: Floats,
-) -> tuple[Floats, Floats, Floats, tuple[Ints, Floats, Floats]]:
+) -> tuple[Floats, Floats, Floats, tuple[Ints, Floats, Floats], Floats]:
     """Values and errors (rows, cells) of new cells, the error allowed along rays (integrands, designs), the boundary.
 
-    `tolerance` is of each integrand and design.
+    And how many places of each design were looked at. `tolerance` is of each integrand and design.
     """
     nodes, count = len(ANGLES.nodes), len(cells.low)
     middle, half = 0.5 * (cells.start + cells.stop), 0.5 * (cells.stop - cells.start)
@@ -173,6 +179,7 @@ def _evaluate(
     ray, inner, outer = intervals.ray, intervals.inner, intervals.outer
     area = np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta))
     value = error = np.zeros((len(integrands), len(theta)))
+    looked = np.bincount(design, minlength=designs.count) * float(samples)
     if integrands:
         parts = pieces(intervals, reach[design], designs.field.singular)
         at = parts.ray
@@ -182,7 +189,8 @@ def _evaluate(
             sums = [np.bincount(design[at], row * share[at], designs.count) for row in pilot[0]]
             allowed = np.asarray(ALONG * tolerance * np.maximum(sums, np.finfo(float).tiny), dtype=float)
         each = allowed[:, design] * np.maximum(1 / span[design], SINGLE / weight)
-        value, error = along(designs, integrands, design, theta, parts, pilot, each)
+        value, error, places = along(designs, integrands, design, theta, parts, pilot, each)
+        looked += np.bincount(design, places, designs.count)
     rows = (area, area * counted, *(value * counted))
     total, doubt = np.empty((2, len(rows), count))
     for k, row in enumerate(rows):
@@ -190,7 +198,7 @@ def _evaluate(
     for k in range(len(integrands)):
         doubt[2 + k] += ANGLES.weights @ (error[k] * weight * counted).reshape(nodes, -1)
     met = (np.tile(design[ray], 2), np.tile(theta[ray], 2), np.concatenate([inner, outer]))
-    return total, doubt, np.zeros_like(tolerance) if allowed is None else allowed, met
+    return total, doubt, np.zeros_like(tolerance) if allowed is None else allowed, met, looked
 
 
 def simple_means(

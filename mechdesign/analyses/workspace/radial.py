@@ -123,8 +123,8 @@ def along(
     parts: Pieces,
     pilot: Integrals,
     allowed: Floats,
-) -> tuple[Floats, Floats]:
-    """Integrals along rays and their estimated errors, both of shape (integrands, rays).
+) -> tuple[Floats, Floats, Ints]:
+    """Integrals along rays and their estimated errors, both of shape (integrands, rays), and the places looked at.
 
     Parameters
     ----------
@@ -139,6 +139,7 @@ def along(
     kinked = np.array([integrand.kinked for integrand in integrands])
     value, error = np.zeros((count, len(theta))), np.zeros((count, len(theta)))
     found, doubt, place, crossed = pilot
+    looked = np.bincount(parts.ray, minlength=len(theta))
     low, high = parts.limits
     with np.errstate(divide="ignore", invalid="ignore"):
         # What an inverse square root has within `NEAREST` of the boundary.
@@ -157,8 +158,9 @@ def along(
         parts = parts.pick(split)
         parts = parts.split(_refined(designs, design[parts.ray], theta[parts.ray], parts, share, crossed[split]))
         noise = np.concatenate([noise[:, split]] * 2, axis=1)
+        looked += np.bincount(parts.ray, minlength=len(theta))
         found, doubt, place, crossed = evaluate(designs, integrands, design[parts.ray], theta[parts.ray], parts)
-    return value, error
+    return value, error, looked * len(RADII.nodes)
 
 
 def _refined(

@@ -8,14 +8,14 @@ their roots.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.roots import bracketed_roots
-from mechdesign.analyses.workspace.dips import Brackets, hidden_places, sign_changes
+from mechdesign.analyses.workspace.dips import Brackets, hidden_places, rounded, sign_changes
 from mechdesign.analyses.workspace.field import Field, Places
 
 Floats = NDArray[np.float64]
@@ -27,6 +27,8 @@ ROUNDING = 1e-14
 SAME = 1e-9
 # Five samples that a parabola meets to this fraction of their size are of a quadratic function.
 QUADRATIC = 1e-13
+# Intervals no wider than this part of the reach are rounding's.
+NOTHING = 1e-10
 # First and last sample of an interval, as fractions of it.
 INSET = 1e-10
 FIVE = np.linspace(0.0, 1.0, 5)
@@ -54,6 +56,18 @@ class Designs:
     def of(self, index: Ints) -> Places:
         """Dimensions of the designs `index`, in the shape of `index`."""
         return {name: np.asarray(value)[index] for name, value in self.places.items()}
+
+    def inside(self, z: NDArray[np.complex128], design: Ints) -> NDArray[np.bool_]:
+        """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
+        field, places = self.field, self.of(design)
+        both = field.plan.iterative or not field.same_assembly
+        good: NDArray[np.bool_] = (field.margins(z, places, assembly=both) > 0).all(axis=0)
+        if not both:
+            # Determinants cost as much as all other margins: only where they decide.
+            place, lane = np.nonzero(good)
+            margins = field.margins(z[place, lane], {name: value[lane] for name, value in places.items()})
+            good[place, lane] = (margins > 0).all(axis=0)
+        return good
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
         """Intersect a block of rays with the region, as `trace` does."""
@@ -90,6 +104,13 @@ class Intervals:
     def counts(self) -> Ints:
         """Intervals of each ray."""
         return np.bincount(self.ray, minlength=len(self.beyond))
+
+    def kept(self, keep: NDArray[np.bool_]) -> Intervals:
+        """Some of the intervals, on the same rays."""
+        if keep.all():
+            return self
+        return replace(self, ray=self.ray[keep], inner=self.inner[keep], outer=self.outer[keep],
+                       enters=self.enters[keep], leaves=self.leaves[keep])  # fmt: skip
 
 
 def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float = 0.0) -> Intervals:
@@ -137,8 +158,9 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
         a, b, c = np.where(quadratic, a, 1.0), np.where(quadratic, b, 0.0), np.where(quadratic, c, 0.0)
     margin, ray, turn, x, start = _quadratic_roots(a, b, c)
     found = _intervals(margin, ray, turn, x * reach[ray], start, reach, slack)
-    whole = quadratic.all() and not designs.field.same_assembly
-    return found if whole else _others(designs, places, direction, found, quadratic, samples, slack * reach)
+    if not (quadratic.all() and not designs.field.same_assembly):
+        found = _others(designs, places, direction, found, quadratic, samples, slack * reach, reach)
+    return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
 
 
 def curved(designs: Designs, design: Ints, theta: Floats, reach: Floats) -> NDArray[np.bool_]:
@@ -182,6 +204,7 @@ def _others(
     quadratic: NDArray[np.bool_],
     samples: int,
     thin: Floats,
+    reach: Floats,
 ) -> Intervals:
     """Cut intervals where one of the margins that are not quadratic along their ray is negative or unknown."""
     extra = len(designs.field.labels) - len(quadratic)
@@ -196,6 +219,7 @@ def _others(
     # Roots that are known have ended the intervals.
     margin, lane = np.nonzero(known[rows][:, owner])
     values[margin, :, lane] = 1.0
+    values, noise = rounded(values, designs.field.rounding[rows])
     positive = values > 0
     thick = width > thin[owner]
 
@@ -204,7 +228,7 @@ def _others(
         found_there = designs.field.margins(z, {name: value[lane] for name, value in local.items()})
         return found_there[rows[function], np.arange(len(lane))]
 
-    dips = hidden_places(margin_at, radii, values)
+    dips = hidden_places(margin_at, radii, values, noise)
     cut = ~positive.all(axis=(0, 1)) & thick
     cut[dips[1]] |= thick[dips[1]]
     if not cut.any():
@@ -226,7 +250,7 @@ def _others(
     turn = np.where(brackets.high[1] > 0, 1, -1)
     start = (~positive[:, 0][:, lanes]).sum(axis=0)
     part = _intervals(rows[margin], lane, turn, radius, start, found.outer[cut_of], 0.0)
-    return _replace(found, cut_of, part)
+    return _replace(found, cut_of, part, NOTHING * reach)
 
 
 def _idle(
@@ -248,10 +272,15 @@ def _within(dips: tuple[Ints, Ints, Floats, Floats], lanes: Ints) -> tuple[Ints,
     return dips[0][use], np.searchsorted(lanes, dips[1][use]), dips[2][use], dips[3][use]
 
 
-def _replace(found: Intervals, lanes: Ints, part: Intervals) -> Intervals:
-    """Intervals with those at `lanes` replaced by the parts of them that `part` has left."""
+def _replace(found: Intervals, lanes: Ints, part: Intervals, tie: Floats) -> Intervals:
+    """Intervals with those at `lanes` replaced by the parts of them that `part` has left.
+
+    A cut no farther from an end than `tie` (of each ray) is that end: rounding does not choose its name.
+    """
     source = lanes[part.ray]
-    at_start, at_end = part.enters < 0, part.leaves < 0
+    near = tie[found.ray[source]]
+    at_start = (part.enters < 0) | (part.inner - found.inner[source] <= near)
+    at_end = (part.leaves < 0) | (found.outer[source] - part.outer <= near)
     keep = np.ones(len(found.ray), dtype=bool)
     keep[lanes] = False
     owner = np.concatenate([found.ray[keep], found.ray[source]])

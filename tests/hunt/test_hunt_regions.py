@@ -1,0 +1,341 @@
+"""Regions of random robots against plain rasters: the inverse problem solved here, by circles, slides and strokes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+from scipy import ndimage
+
+import mechdesign
+from mechdesign.results import Result
+
+Complex = np.ndarray
+Flags = np.ndarray
+# Which places are reached with the platform at an angle (radians), and the sign of the determinant there.
+Solve = Callable[[Complex, float], tuple[Flags, np.ndarray]]
+Seeds = Callable[[int], Iterator[int]]
+CELLS, LAYERS = 700, 41
+# A raster counts cells on the boundary wrongly by at most this share of their area.
+EDGE = 0.35
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A study, and the same robot solved here.
+
+    Parameters
+    ----------
+    point : complex
+        The point's place in the sketch, which is reached.
+    half : float
+        The region lies within a square of twice this side about the origin.
+    """
+
+    text: str
+    solve: Solve
+    point: complex
+    half: float
+
+
+def leg(z: Complex, base: complex, crank: float, rod: float, side: int) -> tuple[Flags, Complex]:
+    """Whether a leg of two links from a pin reaches places, and its elbow."""
+    k = z - base
+    along = (np.abs(k) ** 2 + crank**2 - rod**2) / (2 * np.abs(k))
+    square = crank**2 - along**2
+    return square > 0, base + k / np.abs(k) * (along + 1j * side * np.sqrt(np.maximum(square, 0)))
+
+
+def sliding(z: Complex, base: complex, turn: complex, rod: float, side: int) -> tuple[Flags, np.ndarray]:
+    """Whether a rod from a slide on a line reaches places, and how far along the line the slide is."""
+    k = (z - base) / turn
+    square = rod**2 - k.imag**2
+    return square > 0, k.real + side * np.sqrt(np.maximum(square, 0))
+
+
+def within(angle: np.ndarray, low: float, width: float) -> Flags:
+    """Whether angles in radians lie in a range in degrees, on any turn."""
+    return np.asarray((angle - np.radians(low)) % (2 * np.pi) < np.radians(width))
+
+
+def cross(a: Complex, b: Complex) -> np.ndarray:
+    return np.asarray((np.conj(a) * b).imag)
+
+
+def told(z: Complex | complex) -> str:
+    return f"[{np.real(z):.17g}, {np.imag(z):.17g}]"
+
+
+def somewhere(rng: np.random.Generator, solve: Solve, half: float, angle: float = 0.0) -> complex | None:
+    """A reached place whose neighbours are reached, too."""
+    z = half * (rng.uniform(-1, 1, 4000) + 1j * rng.uniform(-1, 1, 4000))
+    good = solve(z, angle)[0]
+    for step in 1e-2 * half * np.exp(0.5j * np.pi * np.arange(4)):
+        good &= solve(z + step, angle)[0]
+    return complex(z[good][0]) if good.any() else None
+
+
+def five_bar(rng: np.random.Generator) -> Robot | None:
+    """Two motors with ranges of angle, four links."""
+    h = rng.uniform(10, 40)
+    a, c, b, d = *rng.uniform(40, 120, 2), *rng.uniform(40, 150, 2)
+    low, width = rng.uniform(-180, 180, 2), rng.uniform(40, 330, 2)
+    sides = rng.choice([-1, 1], 2)
+
+    def elbows(z: Complex) -> tuple[Flags, Complex, Complex]:
+        good, one = leg(z, -h, a, b, sides[0])
+        also, two = leg(z, h, c, d, sides[1])
+        return good & also, one, two
+
+    def solve(z: Complex, _: float) -> tuple[Flags, np.ndarray]:
+        good, one, two = elbows(z)
+        good &= within(np.angle(one + h), low[0], width[0]) & within(np.angle(two - h), low[1], width[1])
+        return good, cross(z - one, z - two)
+
+    half = h + max(a + b, c + d)
+    point = somewhere(rng, solve, half)
+    if point is None:
+        return None
+    _, one, two = elbows(np.array(point))
+    text = f"""
+units: {{length: mm}}
+mechanism:
+  links:
+    ground: {{A: {told(-h)}, B: {told(h)}}}
+    left: [A, D, {a:.17g}]
+    right: [B, E, {c:.17g}]
+    fore_left: [D, P, {b:.17g}]
+    fore_right: [E, P, {d:.17g}]
+  drives: {{t1: {{angle: left}}, t2: {{angle: right}}}}
+  limits:
+    - {{drive: t1, min: {low[0]:.17g}, max: {low[0] + width[0]:.17g}}}
+    - {{drive: t2, min: {low[1]:.17g}, max: {low[1] + width[1]:.17g}}}
+  sketch: {{D: {told(one)}, E: {told(two)}, P: {told(point)}}}
+workspace: {{point: P, indices: []}}
+"""
+    return Robot(text, solve, point, half)
+
+
+def sliders(rng: np.random.Generator) -> Robot | None:
+    """Two slides with strokes on rails, a rod from each."""
+    bases = np.array([-1, 1]) * rng.uniform(0, 80) + 1j * rng.uniform(-30, 30, 2)
+    turns = np.exp(1j * rng.uniform(-np.pi, np.pi, 2))
+    rods, sides = rng.uniform(50, 150, 2), rng.choice([-1, 1], 2)
+    low, stroke = rng.uniform(-100, 20, 2), rng.uniform(30, 200, 2)
+
+    def slides(z: Complex) -> tuple[Flags, list[np.ndarray]]:
+        parts = [sliding(z, bases[k], turns[k], rods[k], sides[k]) for k in range(2)]
+        return parts[0][0] & parts[1][0], [part[1] for part in parts]
+
+    def solve(z: Complex, _: float) -> tuple[Flags, np.ndarray]:
+        good, moved = slides(z)
+        for k in range(2):
+            good &= (moved[k] > low[k]) & (moved[k] < low[k] + stroke[k])
+        return good, cross(*(z - bases[k] - moved[k] * turns[k] for k in range(2)))
+
+    half = 90 + 220 + max(rods)
+    point = somewhere(rng, solve, half)
+    if point is None:
+        return None
+    pins = [bases[k] + slides(np.array(point))[1][k] * turns[k] for k in range(2)]
+    directions = np.degrees(np.angle(turns))
+    text = f"""
+units: {{length: mm}}
+mechanism:
+  links:
+    ground: {{A: {told(bases[0])}, B: {told(bases[1])}}}
+    one: {{D: [0, 0]}}
+    two: {{E: [0, 0]}}
+    left: [D, P, {rods[0]:.17g}]
+    right: [E, P, {rods[1]:.17g}]
+  joints:
+    g1: {{prismatic: [ground, one], through: A, direction: {directions[0]:.17g}}}
+    g2: {{prismatic: [ground, two], through: B, direction: {directions[1]:.17g}}}
+  drives: {{s1: {{slide: g1}}, s2: {{slide: g2}}}}
+  limits:
+    - {{drive: s1, min: {low[0]:.17g}, max: {low[0] + stroke[0]:.17g}}}
+    - {{drive: s2, min: {low[1]:.17g}, max: {low[1] + stroke[1]:.17g}}}
+  sketch: {{D: {told(pins[0])}, E: {told(pins[1])}, P: {told(point)}}}
+workspace: {{point: P, indices: []}}
+"""
+    return Robot(text, solve, point, half)
+
+
+def slider_arm(rng: np.random.Generator) -> Robot | None:
+    """A slide on a rail and an arm on it, both with limits."""
+    rod, side, low, stroke = rng.uniform(50, 150), rng.choice([-1, 1]), rng.uniform(-100, 20), rng.uniform(30, 300)
+    start, width = rng.uniform(-180, 180), rng.uniform(30, 300)
+
+    def solve(z: Complex, _: float) -> tuple[Flags, np.ndarray]:
+        good, moved = sliding(z, 0, 1, rod, side)
+        good &= (moved > low) & (moved < low + stroke) & within(np.angle(z - moved), start, width)
+        return good, np.ones(z.shape)
+
+    half = 330 + rod
+    point = somewhere(rng, solve, half)
+    if point is None:
+        return None
+    text = f"""
+units: {{length: mm}}
+mechanism:
+  links:
+    ground: {{O: [0, 0]}}
+    block: {{D: [0, 0]}}
+    arm: [D, P, {rod:.17g}]
+  joints: {{rail: {{prismatic: [ground, block], through: O}}}}
+  drives: {{s: {{slide: rail}}, q: {{angle: arm}}}}
+  limits:
+    - {{drive: s, min: {low:.17g}, max: {low + stroke:.17g}}}
+    - {{drive: q, min: {start:.17g}, max: {start + width:.17g}}}
+  sketch: {{D: {told(float(sliding(np.array(point), 0, 1, rod, side)[1]))}, P: {told(point)}}}
+workspace: {{point: P, characteristic_length: 60, indices: []}}
+"""
+    return Robot(text, solve, point, half)
+
+
+def telescopes(rng: np.random.Generator) -> Robot | None:
+    """Two legs with strokes."""
+    h = rng.uniform(20, 100)
+    short, stroke = rng.uniform(20, 120, 2), rng.uniform(20, 120, 2)
+
+    def solve(z: Complex, _: float) -> tuple[Flags, np.ndarray]:
+        one, two = np.abs(z + h), np.abs(z - h)
+        good = (one > short[0]) & (one < short[0] + stroke[0]) & (two > short[1]) & (two < short[1] + stroke[1])
+        return good, z.imag
+
+    half = h + 250
+    point = somewhere(rng, solve, half)
+    if point is None:
+        return None
+    text = f"""
+units: {{length: mm}}
+mechanism:
+  links:
+    ground: {{A: {told(-h)}, B: {told(h)}}}
+    left: {{from: A, to: P, telescopic: true}}
+    right: {{from: B, to: P, telescopic: true}}
+  drives: {{l1: {{length: left}}, l2: {{length: right}}}}
+  limits:
+    - {{drive: l1, min: {short[0]:.17g}, max: {short[0] + stroke[0]:.17g}}}
+    - {{drive: l2, min: {short[1]:.17g}, max: {short[1] + stroke[1]:.17g}}}
+  sketch: {{P: {told(point)}}}
+workspace: {{point: P, indices: []}}
+"""
+    return Robot(text, solve, point, half)
+
+
+def platform(rng: np.random.Generator) -> Robot | None:
+    """Three legs to a platform that is held at its drawn angle, 0: of two links with driven cranks, or with strokes."""
+    places = np.exp(1j * (np.array([-150, -30, 90]) + rng.uniform(-30, 30, 3)) * np.pi / 180)
+    bases, corners = rng.uniform(120, 300, 3) * places, rng.uniform(20, 80, 3) * np.roll(places, rng.integers(3))
+    cranks, rods, sides = rng.uniform(60, 200, 3), rng.uniform(60, 200, 3), rng.choice([-1, 1], 3)
+    short, stroke = rng.uniform(50, 200, 3), rng.uniform(80, 250, 3)
+    telescopic = bool(rng.integers(2))
+
+    def feet(z: Complex, angle: float) -> tuple[Flags, list[Complex]]:
+        ends = [z + corner * np.exp(1j * angle) for corner in corners]
+        if telescopic:
+            lengths = [np.abs(ends[k] - bases[k]) for k in range(3)]
+            good = np.all([(lengths[k] > short[k]) & (lengths[k] < short[k] + stroke[k]) for k in range(3)], axis=0)
+            return good, [np.full(z.shape, base) for base in bases]
+        parts = [leg(ends[k], bases[k], cranks[k], rods[k], sides[k]) for k in range(3)]
+        return np.all([part[0] for part in parts], axis=0), [part[1] for part in parts]
+
+    def solve(z: Complex, angle: float) -> tuple[Flags, np.ndarray]:
+        good, pins = feet(z, angle)
+        arms = [corner * np.exp(1j * angle) for corner in corners]
+        bars = [z + arms[k] - pins[k] for k in range(3)]
+        # The platform's Jacobian: directions of the bars and their moments about the point.
+        rows = np.array([[bar.real, bar.imag, cross(np.full(z.shape, arm), bar)] for bar, arm in
+                         zip(bars, arms, strict=True)])  # fmt: skip
+        return good, np.linalg.det(np.moveaxis(rows, (0, 1), (-2, -1)))
+
+    half = 300.0
+    point = somewhere(rng, solve, half)
+    if point is None:
+        return None
+    pins = [complex(pin) for pin in feet(np.array(point), 0.0)[1]]
+    ends = [complex(point + corner) for corner in corners]
+    legs, drives, limits, drawn = [], [], [], []
+    for k in range(3):
+        if telescopic:
+            legs.append(f"    leg_{k}: {{from: O{k}, to: C{k}, telescopic: true}}")
+            drives.append(f"q{k}: {{length: leg_{k}}}")
+            limits.append(f"    - {{drive: q{k}, min: {short[k]:.17g}, max: {short[k] + stroke[k]:.17g}}}")
+        else:
+            legs.append(f"    crank_{k}: [O{k}, A{k}, {cranks[k]:.17g}]\n    rod_{k}: [A{k}, C{k}, {rods[k]:.17g}]")
+            drives.append(f"q{k}: {{angle: crank_{k}}}")
+            drawn.append(f"A{k}: {told(pins[k])}")
+        drawn.append(f"C{k}: {told(ends[k])}")
+    ground = ", ".join(f"O{k}: {told(bases[k])}" for k in range(3))
+    plate = ", ".join(f"C{k}: {told(corners[k])}" for k in range(3))
+    lines = "\n".join(legs)
+    text = f"""
+units: {{length: mm}}
+mechanism:
+  links:
+    ground: {{{ground}}}
+{lines}
+    platform: {{P: [0, 0], {plate}}}
+  drives: {{{", ".join(drives)}}}
+  limits:{" []" if not limits else ""}
+{chr(10).join(limits)}
+  sketch: {{{", ".join(drawn)}, P: {told(point)}}}
+workspace: {{point: P, at: {{platform.angle: 0}}, characteristic_length: 60, indices: []}}
+"""
+    return Robot(text, solve, point, half)
+
+
+FAMILIES = {"five_bar": five_bar, "sliders": sliders, "slider_arm": slider_arm, "telescopes": telescopes,
+            "platform": platform}  # fmt: skip
+
+
+def raster(robot: Robot, cells: int, angle: float, same: bool) -> tuple[Flags, float]:
+    """Cells of a square that are reached, in the assembly of the sketch or in any; and a cell's side."""
+    side = 2 * robot.half / cells
+    x = (np.arange(cells) + 0.5) * side - robot.half
+    with np.errstate(invalid="ignore", divide="ignore"):
+        good, sign = robot.solve(x + 1j * x[:, None], angle)
+        drawn = robot.solve(np.array(robot.point), 0.0)[1]
+    return np.asarray(good & (sign * drawn > 0) if same else good), side
+
+
+def holding(good: Flags, robot: Robot, side: float) -> Flags:
+    """The piece of a raster that holds the sketch's place."""
+    label, _ = ndimage.label(good)
+    row, column = (int((v + robot.half) / side) for v in (robot.point.imag, robot.point.real))
+    return np.asarray(label == label[row, column]) & (label[row, column] > 0)
+
+
+def area_of(good: Flags, side: float) -> tuple[float, float]:
+    """Area of a raster's cells, and what it is not known to."""
+    edge = good ^ ndimage.binary_erosion(good)
+    return float(good.sum()) * side**2, EDGE * float(edge.sum()) * side**2
+
+
+def truth(robot: Robot, same: bool) -> tuple[float, float] | None:
+    """Area of the region by a raster; None where it does not tell whether pieces hang together."""
+    good, side = raster(robot, CELLS, 0.0, same)
+    if not same:
+        return area_of(good, side)
+    area, doubt = area_of(holding(good, robot, side), side)
+    finer, fine_side = raster(robot, 2 * CELLS, 0.0, same)
+    other, _ = area_of(holding(finer, robot, fine_side), fine_side)
+    grown, _ = area_of(holding(ndimage.binary_dilation(good), robot, side) & good, side)
+    return (area, doubt) if abs(area - other) <= doubt and abs(grown - area) <= doubt else None
+
+
+def asked(robot: Robot, *changes: str) -> Result:
+    return mechdesign.workspace(study_of(robot.text, *changes))
+
+
+def compare(robot: Robot, same: bool, about: complex | None = None) -> None:
+    wanted = truth(robot, same)
+    if wanted is None:
+        return
+    centre = [] if about is None else [f"workspace.scan.about={told(about)}"]
+    found = asked(robot, f"workspace.assembly={'same' if same else 'any'}", *centre).main["area"][0]
+    assert abs(found - wanted[0]) <= wanted[1], (found, wanted)
