@@ -188,8 +188,21 @@ class Sources:
         """The same mechanisms with their pins elsewhere in their holes."""
         return Drawn(drawn.scalars, drawn.radii, [PIN_LAWS[pin.sampled].draw(rng, count) for pin in self.pins])
 
-    def at(self, u: Floats) -> Drawn:
-        """What varies at values of independent standard normal variables, shape (len(owners), count)."""
+    @property
+    def circles(self) -> list[tuple[int, int]]:
+        """The variables of `at` of which the direction alone counts: the places of pins in contact."""
+        found, row = [], len(self.scalars)
+        for pin in self.pins:
+            row += 2 + (pin.spread is not None)
+            if pin.sampled == "contact":
+                found.append((row - 2, row - 1))
+        return found
+
+    def at(self, u: Floats, *, directed: bool = False) -> Drawn:
+        """What varies at values of independent standard normal variables, shape (len(owners), count).
+
+        Where `directed`, the two of a pin in contact are the cosine and sine of its direction.
+        """
         count = len(self.scalars)
         normal = u[:count] if self.correlation is None else self.correlation.mix(u[:count])
         scalars = [scalar.law.at(row) for scalar, row in zip(self.scalars, normal, strict=True)]
@@ -198,7 +211,9 @@ class Sources:
         pins = []
         for pin in self.pins:
             radii.append(pin.radius if pin.spread is None else pin.radius + pin.spread.at(next(rest)))
-            pins.append(PIN_LAWS[pin.sampled].at(next(rest), next(rest)))
+            place = next(rest), next(rest)
+            given = directed and pin.sampled == "contact"
+            pins.append(place if given else PIN_LAWS[pin.sampled].at(*place))
         return Drawn(scalars, radii, pins)
 
     def made(self, drawn: Drawn) -> Made:

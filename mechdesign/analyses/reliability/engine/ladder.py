@@ -66,7 +66,9 @@ def climb(
         found = plainly(enough(found))
     if not precise(found):
         points = find(problem, rng)
-        rungs["form"] = form(problem, points)
+        if not len(problem.circles):
+            # The mean of tangents over directions costs more than what it checks.
+            rungs["form"] = form(problem, points)
         sampled = importance_sampling(problem, points, rng, most, precision)
         rungs["importance_sampling"] = sampled
         # Plain samples see every failure: what they exclude has missed some of them.
