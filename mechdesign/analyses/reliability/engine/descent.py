@@ -18,6 +18,8 @@ ITERATIONS = 30
 FRACTIONS = np.array([0.5, 0.25, 0.0625])
 # A point is a design point where a step is shorter than this, or nothing improves, and the margin this small.
 SHORT, ZERO = 5e-3, 1e-2
+# A step that leaves more than this share of what is made smaller gains little.
+GAIN = 0.95
 # Directions farther from each other than this are two.
 APART = 0.5
 
@@ -68,15 +70,19 @@ def descend(
         before = 0.5 * (at**2).sum(axis=0) + weight * np.abs(g)
         trial = at + step
         merit = _merit(problem, trial, limit[lanes], scale, weight)
-        worse = np.flatnonzero(~(merit < before))
+        far = np.linalg.norm(step, axis=0) >= SHORT * (1 + np.linalg.norm(at, axis=0))
+        # A whole step that gains little swings about the nearest point.
+        worse = np.flatnonzero(~(merit < np.where(far, GAIN, 1.0) * before))
         if worse.size:
             shorter = at[:, None, worse] + FRACTIONS[:, None] * step[:, None, worse]
             often = np.tile(worse, len(FRACTIONS))
             merits = _merit(problem, shorter.reshape(len(at), -1), limit[lanes[often]], scale, weight[often])
             merits = merits.reshape(len(FRACTIONS), -1)
             best, k = np.argmin(merits, axis=0), np.arange(len(worse))
+            nearer = merits[best, k] < merit[worse]
+            worse, best, k = worse[nearer], best[nearer], k[nearer]
             merit[worse], trial[:, worse] = merits[best, k], shorter[:, best, k]
-        done = (np.linalg.norm(step, axis=0) < SHORT * (1 + np.linalg.norm(at, axis=0))) | ~(merit < before)
+        done = ~far | ~(merit < before)
         good[lanes[done]] = np.abs(g[done]) < ZERO
         active[lanes[done]] = False
         better = merit < before
