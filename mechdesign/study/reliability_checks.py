@@ -18,6 +18,9 @@ from mechdesign.study.reliability_models import (
 if TYPE_CHECKING:
     from mechdesign.study.checks import Checker
 
+# Digits of a clearance beyond which its lowest value is zero.
+_ROUNDING = 1e-9
+
 _KINDS: dict[Quantity, tuple[str, str, str]] = {
     "length": ("length", "velocity", "acceleration"),
     "angle": ("angle", "angular_velocity", "angular_acceleration"),
@@ -119,6 +122,11 @@ def _clearance(checker: Checker, point: str, clearance: Clearance) -> Clearance 
             report((*path, "effect"), message)
     _spread_kind(checker, (*path, "tolerance"), "length")
     spread = clearance.radius_spread
+    if spread is not None and spread.tolerance is not None and clearance.radius + spread.tolerance[0] < -_ROUNDING:
+        factor = 1.0 if clearance.radial is not None else 2.0
+        size, lowest = factor * clearance.radius, clearance.tolerance[0]
+        message = f"a clearance of {size:g} that is {-lowest:g} smaller is negative: such a pin does not go in its hole"
+        report((*path, "tolerance"), message)
     if spread is not None and spread.distribution == "lognormal" and clearance.radius <= 0:
         report((*path, "distribution"), "what is lognormal is positive, and so is its nominal value")
     return clearance.model_copy(update={"link": link})

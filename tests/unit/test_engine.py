@@ -134,8 +134,8 @@ def test_nothing_fails() -> None:
     assert (found.failure, found.low, found.high, found.failures) == (0.0, 0.0, 1.0, 0)
     quasi = quasi_monte_carlo(problem, 1, 4096)
     # No failure among n samples: the upper end is 1 - tail^(1/n).
-    assert quasi.failure == quasi.high == pytest.approx(1 - 0.0015 ** (1 / 4096), rel=1e-9)
-    assert quasi.low == 0.0
+    assert quasi.high == pytest.approx(1 - 0.0015 ** (1 / 4096), rel=1e-9)
+    assert quasi.failure == quasi.low == 0.0
 
 
 @pytest.mark.parametrize("dead", [-1.0, np.nan])

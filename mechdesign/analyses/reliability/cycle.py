@@ -67,7 +67,7 @@ def with_cycle(found: Found, task: Task, before: Sequence[Found]) -> Found:
         return replace(found, cycle=bounds([found.estimates[setting.pose] for setting in task.settings]))
     known = [each.cycle for each in before if each.method in _SAMPLED[:2] and each.cycle is not None]
     if known and found.method in _SAMPLED[:2]:
-        return replace(found, cycle=_valued(found.method, known[0]))
+        return replace(found, cycle=known[0])
     return _simulated(found, task)
 
 
@@ -125,9 +125,9 @@ def _simulated(found: Found, task: Task) -> Found:
             if precision is not None and precision.reached(estimate.failure, estimate.low, estimate.high):
                 break
     except KeyboardInterrupt:
-        cycle = _valued(found.method, _estimate(total)) if total.samples else None
+        cycle = _estimate(total) if total.samples else None
         raise Partial(replace(found, cycle=cycle)) from None
-    return replace(found, cycle=_valued(found.method, _estimate(total)))
+    return replace(found, cycle=_estimate(total))
 
 
 def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk: int, count: int) -> Count:
@@ -173,9 +173,3 @@ def _estimate(count: Count) -> Estimate:
     low, high = binomial(count.failures, count.samples)
     value = count.failures / count.samples if count.samples else float("nan")
     return Estimate(value, low, high, count.evaluations, count.samples, count.failures, count.invalid)
-
-
-def _valued(method: str, estimate: Estimate) -> Estimate:
-    """With no failure seen, all but plain Monte Carlo give the upper end of the interval, never 0."""
-    value = estimate.failures / estimate.samples if estimate.failures or method == "monte_carlo" else estimate.high
-    return replace(estimate, failure=value)

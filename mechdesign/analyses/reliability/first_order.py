@@ -129,9 +129,16 @@ class FirstOrder:
         return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
 
     def worst_case(self, sensitivity: Floats) -> Floats:
-        """Sum of |sensitivity| times tolerance, shape (channels, poses)."""
-        reach = np.array([source.reach for source in self.sources])
+        """Sum of |sensitivity| times the larger end of the tolerance, shape (channels, poses)."""
+        reach = np.array([max(abs(end) for end in source.ends) for source in self.sources])
         return np.asarray(np.einsum("csp,s->cp", np.abs(sensitivity), reach))
+
+    def worst_ends(self, sensitivity: Floats) -> tuple[Floats, Floats]:
+        """Lowest and highest error with each source at the end of its tolerance that leads there, (channels, poses)."""
+        low, high = (sensitivity * np.array(ends)[:, None]
+                     for ends in zip(*(source.ends for source in self.sources), strict=True))  # fmt: skip
+        offset = 0.0 if self.offset is None else self.offset
+        return np.minimum(low, high).sum(axis=1) + offset, np.maximum(low, high).sum(axis=1) + offset
 
 
 def nominal_values(

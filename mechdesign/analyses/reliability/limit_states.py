@@ -1,4 +1,4 @@
-"""The limits of a mechanism's errors at one pose, over the space of independent standard normal variables."""
+"""The limits of a mechanism's errors at one pose, over independent normal variables and directions of contact."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
     setting = limited_part(setting)
 
     def margins(u: Floats) -> Floats:
-        errors, valid = errors_of(setting, sources.made(sources.at(u)), u.shape[1])
+        errors, valid = errors_of(setting, sources.made(sources.at(u, directed=True)), u.shape[1])
         found = np.stack([margin for margin, _ in _margins(setting, errors)])
         found[:, ~valid] = np.nan
         return found
 
     def gradients(u: Floats) -> tuple[Floats, Floats]:
         count = u.shape[1]
-        made = sources.made(sources.at(u))
+        made = sources.made(sources.at(u, directed=True))
         configuration = solve(setting, made)
         errors, valid = errors_of(setting, made, count)
         names, slopes = _slopes(sources, u)
@@ -54,8 +54,8 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
     try:
         gradients(np.zeros((len(sources.owners), 1)))
     except MechanismError:
-        return Problem(len(sources.owners), margins)
-    return Problem(len(sources.owners), margins, gradients)
+        return Problem(len(sources.owners), margins, circles=sources.circles)
+    return Problem(len(sources.owners), margins, gradients, sources.circles)
 
 
 def _margins(setting: Setting, errors: list[Floats]) -> list[tuple[Floats, list[tuple[int, Floats | float]]]]:
@@ -79,7 +79,7 @@ def _slopes(sources: Sources, u: Floats) -> tuple[list[str], Floats]:
     d, n = u.shape
     steps = _STEP * np.eye(d)[:, :, None]
     either = np.concatenate([(u + way * steps).swapaxes(0, 1).reshape(d, d * n) for way in (1, -1)], axis=1)
-    made = sources.made(sources.at(either))
+    made = sources.made(sources.at(either, directed=True))
     values = _all(made)
     slopes = np.empty((len(values), d, n))
     for row, value in zip(slopes, values.values(), strict=True):

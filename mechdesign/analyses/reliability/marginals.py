@@ -29,8 +29,8 @@ class Marginal(Protocol):
         """Mean, and second to fourth central moment."""
 
     @property
-    def reach(self) -> float:
-        """Largest magnitude of the deviation that a worst case counts with: of unbounded laws three sigma."""
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest deviation that a worst case counts with: of unbounded laws three sigma."""
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Independent deviations, shape (count,)."""
@@ -82,8 +82,8 @@ class Normal:
         return self.mean, self.sigma**2, 0.0, 3.0 * self.sigma**4
 
     @property
-    def reach(self) -> float:
-        return abs(self.mean) + SIGMAS * self.sigma
+    def ends(self) -> tuple[float, float]:
+        return self.mean - SIGMAS * self.sigma, self.mean + SIGMAS * self.sigma
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         return _shifted(rng.standard_normal(count), self.sigma, self.mean)
@@ -107,8 +107,8 @@ class TruncatedNormal:
         return self.mean, self.sigma**2 * second, 0.0, self.sigma**4 * (3.0 * second - SIGMAS**2 * tail)
 
     @property
-    def reach(self) -> float:
-        return abs(self.mean) + SIGMAS * self.sigma
+    def ends(self) -> tuple[float, float]:
+        return self.mean - SIGMAS * self.sigma, self.mean + SIGMAS * self.sigma
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         drawn = rng.standard_normal(count)
@@ -141,8 +141,8 @@ class Uniform:
         return 0.5 * (self.low + self.high), half**2 / 3.0, 0.0, half**4 / 5.0
 
     @property
-    def reach(self) -> float:
-        return max(abs(self.low), abs(self.high))
+    def ends(self) -> tuple[float, float]:
+        return self.low, self.high
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         return _shifted(rng.random(count), self.high - self.low, self.low)
@@ -170,8 +170,8 @@ class Triangular:
         return (a + b + c) / 3.0, second, third, 2.4 * second**2
 
     @property
-    def reach(self) -> float:
-        return max(abs(self.low), abs(self.high))
+    def ends(self) -> tuple[float, float]:
+        return self.low, self.high
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         if self.high == self.low:
@@ -209,8 +209,9 @@ class Lognormal:
         return self.mean - self.nominal, second, third, second**2 * (w**4 + 2 * w**3 + 3 * w**2 - 3.0)
 
     @property
-    def reach(self) -> float:
-        return abs(self.mean - self.nominal) + SIGMAS * self.sigma
+    def ends(self) -> tuple[float, float]:
+        middle = self.mean - self.nominal
+        return middle - SIGMAS * self.sigma, middle + SIGMAS * self.sigma
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         return self.at(rng.standard_normal(count))

@@ -249,8 +249,7 @@ def _bounded(setting: Setting, task: Task, evaluations: int) -> Estimate:
     simulate([setting], task.sources, task.seed, task.samples, 1, NULL, sums)
     assert sums[0] is not None
     found = counted(sums[0])
-    value = found.failure if found.failures else found.high
-    return replace(found, failure=value, evaluations=found.evaluations + evaluations)
+    return replace(found, evaluations=found.evaluations + evaluations)
 
 
 def wanted_precision(task: Task) -> Wanted:

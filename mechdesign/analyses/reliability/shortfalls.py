@@ -19,7 +19,7 @@ def unreached(study: Study, poses: Poses, found: Sequence[Found], task: Task) ->
     for each in found:
         for pose in each.rungs:
             estimate = each.estimates[pose]
-            # Of no failure at all the interval's upper end is told elsewhere.
+            # What no failure at all says is told elsewhere.
             if estimate.failures and not precision.reached(estimate.failure, estimate.low, estimate.high):
                 half = 0.5 * (estimate.high - estimate.low)
                 short[pose] = half / (WIDTH * estimate.failure) if precision.half_width is None else half

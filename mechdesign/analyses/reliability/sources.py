@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,6 +20,9 @@ from mechdesign.study.reliability_models import LOADS, Clearance
 
 Floats = NDArray[np.float64]
 
+# Of all that varies, in radians or in sizes of the mechanism; of loads.
+MOST, HEAVY = 1e6, 1e100
+
 
 @dataclass(frozen=True)
 class Source:
@@ -33,15 +36,15 @@ class Source:
         Per independent component (one, or a pin's x and y), derivatives of places, drives and loads (radians, lengths).
     mean, variance : float
         Of each component (a parameter's in its own unit, an angle's in radians).
-    reach : float
-        Largest magnitude, over all directions: the tolerance, or the largest radial clearance.
+    ends : (float, float)
+        Lowest and highest deviation: the tolerance, or of a pin the largest radial clearance in any direction.
     """
 
     name: str
     directions: tuple[Mapping[str, float], ...]
     mean: float
     variance: float
-    reach: float
+    ends: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -152,13 +155,13 @@ class Sources:
             if scalar.kind == "parameter":
                 # Of one that changes nothing there are none.
                 slopes = _geometric(self.study.parameters.derivatives(scalar.name))
-            found.append(Source(scalar.name, (slopes,), mean, variance, scalar.law.reach))
+            found.append(Source(scalar.name, (slopes,), mean, variance, scalar.law.ends))
         for pin in self.pins:
             mean, variance, _, _ = (0.0, 0.0, 0.0, 0.0) if pin.spread is None else pin.spread.moments
             spread = PIN_LAWS[pin.analytic].variance * (variance + (pin.radius + mean) ** 2)
-            reach = pin.radius + (0.0 if pin.spread is None else pin.spread.reach)
+            reach = pin.radius + (0.0 if pin.spread is None else pin.spread.ends[1])
             # Along a binary link the pin changes its length; across it, only in the second order.
-            found.append(Source(pin.name, tuple({name: 1.0} for name in pin.places), 0.0, spread, reach))
+            found.append(Source(pin.name, tuple({name: 1.0} for name in pin.places), 0.0, spread, (-reach, reach)))
         return tuple(found)
 
     def correlated(self) -> Floats | None:
@@ -188,8 +191,21 @@ class Sources:
         """The same mechanisms with their pins elsewhere in their holes."""
         return Drawn(drawn.scalars, drawn.radii, [PIN_LAWS[pin.sampled].draw(rng, count) for pin in self.pins])
 
-    def at(self, u: Floats) -> Drawn:
-        """What varies at values of independent standard normal variables, shape (len(owners), count)."""
+    @property
+    def circles(self) -> list[tuple[int, int]]:
+        """The variables of `at` of which the direction alone counts: the places of pins in contact."""
+        found, row = [], len(self.scalars)
+        for pin in self.pins:
+            row += 2 + (pin.spread is not None)
+            if pin.sampled == "contact":
+                found.append((row - 2, row - 1))
+        return found
+
+    def at(self, u: Floats, *, directed: bool = False) -> Drawn:
+        """What varies at values of independent standard normal variables, shape (len(owners), count).
+
+        Where `directed`, the two of a pin in contact are the cosine and sine of its direction.
+        """
         count = len(self.scalars)
         normal = u[:count] if self.correlation is None else self.correlation.mix(u[:count])
         scalars = [scalar.law.at(row) for scalar, row in zip(self.scalars, normal, strict=True)]
@@ -198,7 +214,9 @@ class Sources:
         pins = []
         for pin in self.pins:
             radii.append(pin.radius if pin.spread is None else pin.radius + pin.spread.at(next(rest)))
-            pins.append(PIN_LAWS[pin.sampled].at(next(rest), next(rest)))
+            place = next(rest), next(rest)
+            given = directed and pin.sampled == "contact"
+            pins.append(place if given else PIN_LAWS[pin.sampled].at(*place))
         return Drawn(scalars, radii, pins)
 
     def made(self, drawn: Drawn) -> Made:
@@ -258,10 +276,48 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
             quantity = mechanism.quantity(name) if kind == "drive" else mechanism.description.places[name].quantity
             factor = study.units.angle_factor if quantity == "angle" else 1.0
             nominal = mechanism.nominal[name] if kind == "place" else 0.0
+            if kind == "place":
+                warnings += _twice(study, name, section.dimensions)
         scalars.append(Scalar(name, kind, marginal(dimension, nominal, factor)))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
     pins = tuple(_pin(point, clearance) for point, clearance in section.clearances.items())
-    return Sources(study, tuple(scalars), pins, _correlation(study, scalars)), warnings
+    sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))
+    _check_sizes(sources)
+    return sources, warnings
+
+
+def _check_sizes(sources: Sources) -> None:
+    """Refuse what no mechanism of this size varies by: its squares are no numbers any more."""
+    study, mechanism = sources.study, sources.study.mechanism
+    for scalar in sources.scalars:
+        slopes = {scalar.name: 1.0}
+        if scalar.kind == "parameter":
+            slopes = _geometric(study.parameters.derivatives(scalar.name))
+        for name, slope in slopes.items():
+            drive = scalar.kind == "drive"
+            angle = scalar.kind != "load" and "angle" == (
+                mechanism.quantity(name) if drive else mechanism.description.places[name].quantity
+            )
+            most = HEAVY if scalar.kind == "load" else MOST * (1.0 if angle else mechanism.size or 1.0)
+            if not max(abs(slope * end) for end in scalar.law.ends) <= most:
+                size = "a million radians" if angle else "a million times the size of the mechanism"
+                message = f"varies by more than {'1e100' if scalar.kind == 'load' else size}"
+                raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
+    for pin in sources.pins:
+        if not pin.radius + (0.0 if pin.spread is None else pin.spread.ends[1]) <= MOST * (mechanism.size or 1.0):
+            message = "is more than a million times the size of the mechanism"
+            raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
+
+
+def _twice(study: Study, place: str, varying: Collection[str]) -> list[str]:
+    """What is to be known of a place that varies by itself and with a parameter that sets it."""
+    both = [name for name in study.parameters.nominal
+            if name in varying and study.parameters.derivatives(name).get(place)]  # fmt: skip
+    return [
+        f"'{place}' varies by its own tolerance, and with parameter '{name}': both count, as independent errors that "
+        "add up; leave one of them out if they are the same error"
+        for name in both
+    ]
 
 
 def _correlation(study: Study, scalars: Sequence[Scalar]) -> Correlation | None:

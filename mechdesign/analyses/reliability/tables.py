@@ -106,7 +106,9 @@ def moments(answer: Answer) -> Table:
     shape = (count, methods, channels)
     mean, sigma, worst = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
     nominal = np.broadcast_to(answer.nominal.T[:, None, :], shape)
-    worst[:] = (answer.linear.worst_case(answer.linear.sensitivity()).T * answer.scale)[:, None]
+    sensitivity = answer.linear.sensitivity()
+    worst[:] = (answer.linear.worst_case(sensitivity).T * answer.scale)[:, None]
+    ends = [np.broadcast_to((end.T * answer.scale)[:, None], shape) for end in answer.linear.worst_ends(sensitivity)]
     for m, each in enumerate(known):
         assert each.mean is not None
         assert each.sigma is not None
@@ -126,8 +128,11 @@ def moments(answer: Answer) -> Table:
         Column("nominal", nominal.ravel(), meaning="value of the nominal mechanism, in `unit`"),
         Column("mean", mean.ravel(), meaning="mean over made mechanisms, in `unit`"),
         Column("sigma", sigma.ravel(), meaning="standard deviation of the error, in `unit`"),
-        Column("worst_case", worst.ravel(), meaning="sum of |sensitivity| times tolerance, in `unit`"),
-        Column("unit", np.tile(unit, count * methods), meaning="unit of the four columns before"),
+        Column("worst_case", worst.ravel(), 
+               meaning="sum of |sensitivity| times the larger end of the tolerance, in `unit`"),
+        Column("worst_low", ends[0].ravel(), meaning="lowest error that the tolerances allow, in `unit`"),
+        Column("worst_high", ends[1].ravel(), meaning="highest error that the tolerances allow, in `unit`"),
+        Column("unit", np.tile(unit, count * methods), meaning="unit of the six columns before"),
         Column("valid", answer.reason[rows] == 0, meaning="1 where the nominal pose is assembled, within its limits"),
     ]
     return Table("moments", tuple(columns), "mean and standard deviation of outputs per pose and method")
@@ -171,7 +176,7 @@ def success(answer: Answer) -> Table:
         Column("reliability", 1.0 - failure, meaning="probability that every limit is kept"),
         Column("low", 1.0 - high, meaning=f"lower end of its interval, {kind}"),
         Column("high", 1.0 - low, meaning=f"upper end of its interval, {kind}"),
-        Column("failure", failure, meaning="1 - reliability, without loss of digits"),
+        Column("failure", failure, meaning="1 - reliability, without loss of digits; 0 where no failure was seen, and failure_high bounds it"),
         Column("failure_low", low, meaning=f"lower end of its interval, {kind}; of a cycle's bounds the worst pose's"),
         Column("failure_high", high, meaning=f"upper end of its interval, {kind}; of a cycle's bounds the poses' sum"),
         Column("error", error, meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),

@@ -7,13 +7,13 @@ sampling, 2000.]
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.design_points import EXPLORED, MOST, DesignPoints, explored_weights
 from mechdesign.analyses.reliability.engine.intervals import weighted
+from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.precision import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Floats, Problem, failed
 
@@ -28,55 +28,13 @@ GOOD = 2.0
 ADDED, LACKING, MANY = 0.05, (0.1, 10.0), 5
 # Share of the samples that stay with the design points, and with the least of them.
 FIXED, SMALLEST = 0.1, 0.02
-# A learned covariance is what it would be if so many samples a dimension of the standard normal law had been seen too.
-PRIOR = 0.25
+# Share of these beyond so much of the distance of the nearest design point: what was not found lies there too.
+BEYOND, NEAREST = 0.2, 0.9
 # First samples of the value, by which the rest is planned; so much more than what they ask for.
-FIRST, MARGIN = 2000, 1.1
+FIRST, MARGIN = 3000, 1.1
 BLOCK = 20_000
 # Beyond any density that counts, and the logarithm of such a one.
 TINY, MUCH = 1e-200, 600.0
-
-
-@dataclass(frozen=True, eq=False)
-class Mixture:
-    """Weighted normal densities.
-
-    Parameters
-    ----------
-    weight : ndarray, shape (parts,)
-    centre : ndarray, shape (parts, dimension)
-    root : ndarray, shape (parts, dimension, dimension)
-        Cholesky factors of the covariances.
-    """
-
-    weight: Floats
-    centre: Floats
-    root: Floats
-
-    @cached_property
-    def inverse(self) -> Floats:
-        """Inverse factors."""
-        return np.asarray(np.linalg.inv(self.root), dtype=np.float64)
-
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        """Points, shape (dimension, count)."""
-        part = rng.choice(len(self.weight), count, p=self.weight)
-        normal = rng.standard_normal((len(self.centre[0]), count))
-        u = np.empty_like(normal)
-        for k in range(len(self.weight)):
-            own = part == k
-            u[:, own] = self.root[k] @ normal[:, own] + self.centre[k][:, None]
-        return u
-
-    def logs(self, u: Floats) -> Floats:
-        """Logarithm of each part's weighted density over the standard normal one at 0, shape (parts, n)."""
-        found = np.empty((len(self.weight), u.shape[1]))
-        constant = np.log(self.weight) - np.log(np.diagonal(self.root, axis1=1, axis2=2)).sum(axis=1)
-        for row, one, inverse, centre in zip(found, constant, self.inverse, self.centre, strict=True):
-            z = inverse @ u
-            z -= (inverse @ centre)[:, None]
-            row[:] = one - 0.5 * np.einsum("dn,dn->n", z, z)
-        return found
 
 
 def importance_sampling(
@@ -111,7 +69,7 @@ def importance_sampling(
         u = mixture.draw(rng, count)
         margins = problem.margins(u)
         broken = failed(margins)
-        weights = _weights(mixture, u[:, broken])
+        weights = mixture.worth(u[:, broken])
         total, squares = total + float(weights.sum()), squares + float(weights @ weights)
         most = max(most, float(weights.max(initial=0.0)))
         done, failures = done + count, failures + int(broken.sum())
@@ -126,48 +84,55 @@ def importance_sampling(
     return Estimate(min(total / done, 1.0), low, high, problem.evaluations, done, failures, invalid)
 
 
-def _about(points: DesignPoints) -> Mixture:
-    """Standard normal densities moved to the design points, weighted by the tangents' probabilities."""
-    from scipy.special import log_ndtr
+def _about(problem: Problem, points: DesignPoints) -> Mixture:
+    """Parts about the design points, weighted by the tangents' probabilities, and what is beyond all of them."""
+    from scipy.special import i0e, log_ndtr
 
     near = points.distance <= points.distance.min() + FAR
-    centre = points.u[near]
-    logs = log_ndtr(-points.distance[near])
+    # A mean that fails itself is where most of the failures are.
+    centre = np.where(points.distance[near, None] > 0, points.u[near][:, problem.normals], 0.0)
+    logs = log_ndtr(-points.distance[near]) + np.log(i0e(np.linalg.norm(points.pull[near], axis=2))).sum(axis=1)
     weight = np.exp(logs - logs.max())
     weight = np.maximum(weight / weight.sum(), SMALLEST)
+    d = len(problem.normals)
     return Mixture(
-        weight / weight.sum(), centre, np.broadcast_to(np.eye(centre.shape[1]), (*centre.shape, centre.shape[1]))
-    )
+        problem, (1.0 - BEYOND) * weight / weight.sum(), centre, np.broadcast_to(np.eye(d), (len(centre), d, d)),
+        points.pull[near], NEAREST * _least(np.concatenate([centre.T, points.seen[problem.normals]], axis=1)),
+    )  # fmt: skip
 
 
-def _weights(mixture: Mixture, u: Floats) -> Floats:
-    """Standard normal density over that of the mixture, shape (n,)."""
-    logs = mixture.logs(u)
-    most = logs.max(axis=0, initial=-np.inf)
-    return np.asarray(np.exp(-0.5 * (u * u).sum(axis=0) - most) / np.exp(logs - most).sum(axis=0))
+def _least(normal: Floats) -> float:
+    return float(np.sqrt((normal * normal).sum(axis=0).min(initial=np.inf)))
 
 
 def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> Mixture:
     """The mixture nearest to the failures, beside the fixed one: one step of expectation and maximisation a round."""
-    fixed = _about(points)
-    parts, explored = fixed, explored_weights(points.seen)
+    fixed = _about(problem, points)
+    parts = replace(fixed, weight=(1.0 - SMALLEST) * fixed.weight / fixed.weight.sum())
+    explored = explored_weights(problem, points.seen)
     # Where many of them count, the samples that starts were taken from know of places without a design point.
     if float(explored.sum()) ** 2 > MANY * float(explored @ explored):
         parts = _covering(fixed, parts, points.seen, explored, EXPLORED)
     count = max(LEAST, SAMPLES * problem.dimension)
     seen, known = [], []
     for rounds in range(1, ROUNDS + 1):
-        mixture = _beside(fixed, parts)
+        mixture = parts.beside(fixed, FIXED)
         u = mixture.draw(rng, count)
         u = u[:, failed(problem.margins(u))]
-        weights = _weights(mixture, u)
+        weights = mixture.worth(u)
+        # What is nearer than the nearest design point was not found before.
+        beyond = min(fixed.beyond, NEAREST * _least(u[problem.normals]))
+        fixed, parts = replace(fixed, beyond=beyond), replace(parts, beyond=beyond)
         seen.append(u)
         known.append(weights)
         failures, worth = np.concatenate(seen, axis=1), np.concatenate(known)
-        parts = _covering(fixed, _fitted(parts, failures, worth), failures, worth, rounds * count)
+        if worth.sum() > 0:
+            parts = _covering(fixed, parts.fitted(failures, worth, SMALLEST), failures, worth, rounds * count)
         if count * float(weights @ weights) < (1.0 + GOOD) * float(weights.sum()) ** 2:
             break
-    return _beside(fixed, parts)
+    if worth.sum() > 0:
+        parts = parts.fitted(failures, worth, SMALLEST)
+    return parts.beside(fixed, FIXED)
 
 
 def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: int) -> Mixture:
@@ -183,8 +148,7 @@ def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: i
     total = float(worth.sum())
     if not total > 0:
         return parts
-    half = 0.5 * (u * u).sum(axis=0)
-    held, own = (np.exp(np.minimum(each.logs(u) + half, MUCH)).sum(axis=0) for each in (fixed, parts))
+    held, own = (np.exp(np.minimum(each.logs(u), MUCH)).sum(axis=0) for each in (fixed, parts))
     while len(parts.weight) < MOST:
         # Density of failures over that of the mixture: its mean over failures is 1 and the weights' relative variance.
         lack = drawn / (total * np.maximum(FIXED * held + (1 - FIXED) * own, TINY))
@@ -192,54 +156,7 @@ def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: i
         worst = int(np.argmax(adds))
         if adds[worst] < LACKING[0] or lack[worst] < LACKING[1]:
             break
-        part = Mixture(np.array([ADDED]), u[:, worst][None], np.eye(len(u))[None])
-        own = (1 - ADDED) * own + np.exp(np.minimum(part.logs(u)[0] + half, MUCH))
-        parts = Mixture(
-            np.append((1 - ADDED) * parts.weight, part.weight),
-            np.concatenate([parts.centre, part.centre]),
-            np.concatenate([parts.root, part.root]),
-        )
+        part = parts.about(u[:, worst])
+        own = (1 - ADDED) * own + ADDED * np.exp(np.minimum(part.logs(u)[0], MUCH))
+        parts = parts.beside(part, ADDED)
     return parts
-
-
-def _beside(fixed: Mixture, parts: Mixture) -> Mixture:
-    return Mixture(
-        np.concatenate([FIXED * fixed.weight, (1 - FIXED) * parts.weight]),
-        np.concatenate([fixed.centre, parts.centre]),
-        np.concatenate([fixed.root, parts.root]),
-    )
-
-
-def _fitted(parts: Mixture, u: Floats, weights: Floats) -> Mixture:
-    """Parts with the means and covariances of the failures that are theirs; as they were where none failed."""
-    logs = parts.logs(u)
-    share = np.exp(logs - logs.max(axis=0, initial=-np.inf))
-    share *= weights / share.sum(axis=0)
-    d = len(u)
-    weight, centres, roots = [], [], []
-    for own in share:
-        mass = float(own.sum())
-        if not mass > SMALLEST * weights.sum():
-            continue
-        effective = mass**2 / float((own * own).sum())
-        centre = u @ own / mass
-        apart = u - centre[:, None]
-        covariance = (own * apart) @ apart.T / mass
-        prior = PRIOR * d
-        covariance = (effective * covariance + prior * np.eye(d)) / (effective + prior)
-        weight.append(mass)
-        centres.append(centre)
-        roots.append(np.linalg.cholesky(_without_chance(covariance, d / effective)))
-    if not weight:
-        return parts
-    return Mixture(np.array(weight) / sum(weight), np.array(centres), np.array(roots))
-
-
-def _without_chance(covariance: Floats, ratio: float) -> Floats:
-    """Principal variances 1 where so few samples a dimension (`ratio` is one over it) may show what they do by chance.
-
-    [Marchenko & Pastur, 1967: the limits of the principal variances of standard normal samples.]
-    """
-    squares, axes = np.linalg.eigh(covariance)
-    chance = (squares > max(0.0, 1 - np.sqrt(ratio)) ** 2) & (squares < (1 + np.sqrt(ratio)) ** 2)
-    return np.asarray((axes * np.where(chance, 1.0, squares)) @ axes.T)

@@ -41,7 +41,7 @@ def climb(
     Returns
     -------
     estimate : Estimate
-        Its evaluations are those of all rungs. Where no failure was seen the value is the interval's upper end.
+        Its evaluations are those of all rungs.
     used : str
         The method that it comes from.
     rungs : dict of str to Estimate
@@ -66,7 +66,9 @@ def climb(
         found = plainly(enough(found))
     if not precise(found):
         points = find(problem, rng)
-        rungs["form"] = form(problem, points)
+        if not len(problem.circles):
+            # The mean of tangents over directions costs more than what it checks.
+            rungs["form"] = form(problem, points)
         sampled = importance_sampling(problem, points, rng, most, precision)
         rungs["importance_sampling"] = sampled
         # Plain samples see every failure: what they exclude has missed some of them.
@@ -76,8 +78,7 @@ def climb(
         if not missed and (precise(sampled) or sampled.high - sampled.low < found.high - found.low):
             found, used = sampled, "importance_sampling"
     total = problem.evaluations + rungs["monte_carlo"].evaluations
-    value = found.failure if found.failures else found.high
-    return replace(found, failure=value, evaluations=total), used, rungs
+    return replace(found, evaluations=total), used, rungs
 
 
 def disagree(one: Estimate, other: Estimate) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +55,9 @@ class Problem:
         negative; nan is a failure of its own kind (what cannot be assembled has no margins).
     gradients : callable, optional
         From points to margins and their derivatives, shape (limits, dimension, n); left out, difference quotients.
+    circles : sequence of (int, int)
+        Variables that are no normal ones: the cosine and the sine of a direction that is as likely as any other.
+        Derivatives by them are those of margins that go on off the circle.
     """
 
     def __init__(
@@ -62,11 +65,33 @@ class Problem:
         dimension: int,
         margins: Callable[[Floats], Floats],
         gradients: Callable[[Floats], tuple[Floats, Floats]] | None = None,
+        circles: Sequence[tuple[int, int]] = (),
     ) -> None:
         self.dimension = dimension
+        self.circles = np.array(circles, dtype=np.intp).reshape(-1, 2)
+        self.normals = np.setdiff1d(np.arange(dimension), self.circles)
         self.evaluations = 0
         self._margins = margins
         self._gradients = gradients
+
+    def draw(self, rng: np.random.Generator, count: int, spread: float = 1.0) -> Floats:
+        """Points, shape (dimension, count), normal variables with this standard deviation and all directions."""
+        return self.on_circles(
+            np.where(self.straight[:, None], spread, 1.0) * rng.standard_normal((self.dimension, count))
+        )
+
+    @property
+    def straight(self) -> NDArray[np.bool_]:
+        """Which of the variables are normal."""
+        return np.isin(np.arange(self.dimension), self.normals)
+
+    def on_circles(self, u: Floats) -> Floats:
+        """Points, shape (dimension, n), with their directions as cosine and sine again."""
+        for pair in self.circles:
+            length = np.linalg.norm(u[pair], axis=0)
+            u[pair[0]] = np.where(length > 0, u[pair[0]], 1.0)
+            u[pair] /= np.where(length > 0, length, 1.0)
+        return u
 
     def margins(self, u: Floats) -> Floats:
         """Margins at points `u` of shape (dimension, n): shape (limits, n)."""

@@ -49,11 +49,10 @@ def quasi_monte_carlo(problem: Problem, seed: int, samples: int) -> Estimate:
 
 
 def estimate(broken: Sequence[int], count: int, invalid: int) -> Estimate:
-    """Estimate from the failures of each replicate of `count` points; of none the interval's upper end."""
+    """Estimate from the failures of each replicate of `count` points."""
     failures, total = sum(broken), count * len(broken)
     if failures < FEW or total - failures < FEW:
         low, high = binomial(failures, total)
     else:
         low, high = replicated(np.array(broken) / count)
-    value = failures / total if failures else high
-    return Estimate(value, low, high, total, total, failures, invalid)
+    return Estimate(failures / total, low, high, total, total, failures, invalid)
