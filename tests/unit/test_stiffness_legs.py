@@ -24,7 +24,7 @@ import mechdesign
 from mechdesign.analyses.stiffness.beams import Beams
 from mechdesign.analyses.stiffness.legs import Beam, Guide, Hinge
 
-CRANK, ROD = Beams("crank", ("O", "A"), True), Beams("rod", ("A", "B"), True)
+CRANK, ROD = Beams("crank", ("O", "A"), False), Beams("rod", ("A", "B"), False)
 
 
 def test_two_link_legs_on_a_platform() -> None:
@@ -161,7 +161,7 @@ def test_points_on_a_binary_link_lie_along_it() -> None:
     )
     text += "  sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}\n  elastic: {a1: beam}\n"
     beams = [e for e in legs_of(text)[0].elements if isinstance(e, Beam)]
-    assert beams == [Beam(Beams("a1", ("O1", "E1"), True), "O1", "E1", "beam")]
+    assert beams == [Beam(Beams("a1", ("O1", "E1"), False), "O1", "E1", "beam")]
     plain = FIVE_BAR + "  sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}\n  elastic: {a1: beam}\n"
     assert matrix(ask_stiffness(text), "K") == pytest.approx(matrix(ask_stiffness(plain), "K"), rel=1e-9)
 

@@ -236,6 +236,20 @@ def test_a_lug_is_a_rigid_bracket_from_its_foot_on_the_boom(height: float, foot:
     assert matrix(ask_stiffness(boom(height, foot)), "C")[1, 1] == pytest.approx(by_energy(height, foot), rel=1e-9)
 
 
+def test_forces_along_a_prop_have_the_signs_of_the_columns() -> None:
+    """The strut pushes the lug up and the ground back; its rod, held by the boom, pushes its first part likewise."""
+    lug = 250 + 80j
+    line = (lug - (-100 - 300j)) / abs(lug - (-100 - 300j))
+    push = 1000 * 600 / (lug.conjugate() * line).imag
+    table = ask_stiffness(boom(80.0), "stiffness.loads=[[0, -1000, 0]]").tables["forces"]
+    found = {(row["joint"], row["on"], row["by"]): complex(row["fx"], row["fy"]) for row in table.rows()}
+    expected = {
+        ("D", "ground", "strut"): -push * line, ("strut", "strut", "strut"): -push * line,
+        ("M", "boom", "strut"): push * line, ("O", "ground", "boom"): push * line - 1000j,
+    }  # fmt: skip
+    assert {key: found[key] for key in expected} == {key: pytest.approx(force) for key, force in expected.items()}
+
+
 def test_a_lug_beside_the_line_is_continuous_with_one_on_it() -> None:
     on, beside, apart = (matrix(ask_stiffness(boom(height)), "C") for height in (0.0, 1e-6, 1.0))
     assert_allclose(beside, on, rtol=1e-7, atol=1e-8 * np.abs(on).max())

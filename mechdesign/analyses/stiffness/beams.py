@@ -25,16 +25,16 @@ NEAREST = 1e-9
 
 @dataclass(frozen=True)
 class Beams:
-    """The points between which the beams of a link run; `straight`: one beam, along the x axis of the link."""
+    """The points between which the beams of a link run; a telescopic one has a direction however short it is."""
 
     link: str
     corners: tuple[str, ...]
-    straight: bool
+    telescopic: bool
 
 
 def beams_of(link: Link) -> Beams:
     """The beams of an elastic link; a telescopic one is a single beam of its current length."""
-    return Beams(link.name, link.ends or tuple(link.points), link.ends is not None)
+    return Beams(link.name, link.ends or tuple(link.points), link.telescopic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def course_of(beams: Beams, configuration: Configuration) -> Course:
     corners = np.array([configuration.point(name) for name in beams.corners])
     spans = np.diff(corners, axis=0)
     lengths = np.abs(spans)
-    if beams.straight:
+    if beams.telescopic:
         along = configuration.rotation(beams.link)[None]
     else:
         along = np.divide(spans, lengths, out=np.ones(spans.shape, dtype=complex), where=lengths > 0)

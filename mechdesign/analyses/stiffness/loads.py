@@ -91,7 +91,12 @@ def forces_table(study: Study, poses: Poses, network: Network, effects: Effects)
     columns += [
         Column("joint", np.tile([edge.name for edge in edges], count * loads), "", "point or slide"),
         Column("on", np.tile([_link(edge.a) for edge in edges], count * loads), "", f"what the force acts on: {body}"),
-        Column("by", np.tile([_link(edge.b) for edge in edges], count * loads), "", "what exerts it"),
+        Column(
+            "by",
+            np.tile([_link(edge.b) for edge in edges], count * loads),
+            "",
+            "what exerts it; in a telescopic leg its rod, on the part at its first end",
+        ),
         Column("fx", values[:, 0], units.label("force"), "force on the one by the other, axes of the world"),
         Column("fy", values[:, 1], units.label("force"), "force on the one by the other, axes of the world"),
         Column("mz", values[:, 2], units.label("moment"), "moment likewise, about the joint's point"),
