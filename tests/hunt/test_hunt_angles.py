@@ -118,8 +118,8 @@ def test_sums_of_angles_along_a_motion(seeds: Seeds, step: int) -> None:
         formula = " + ".join(f"({weight})*{name}" for weight, name in zip(weights, names, strict=False))
         study = study_of(
             linkage.text()
-            + f"  measures: {{sum: {formula} + 17, swing: sum - ({weights[0]})*th, third: th/3, square: rod.angle**2/100}}\n"
-            + "  targets: {third: th/3}\n"
+            + f"  measures: {{sum: {formula} + 17, swing: sum - ({weights[0]})*th,"
+            + " third: th/3, square: rod.angle**2/100}\n  targets: {third: th/3}\n"
             + f"kinematics: {{sweep: {{th: {{from: {low:.17g}, to: {high:.17g}, number: {rows}}}}}, rates: {{th: 1}},"
             + " outputs: [sum, swing, third, square, rod.angle]}\n"
         )
