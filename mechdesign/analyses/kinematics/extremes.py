@@ -151,8 +151,9 @@ class _Between:
         for rows in windows(poses):
             line = Line(study, poses, self.swept, self.valid, curves.leaves, self.ends, rows)
             for k, name in enumerate(curves.names):
-                if curves.leaves[k].turning and name in self.arrays:
-                    line.align(k, self.arrays[name] * study.units.angle_factor)
+                known = self.arrays.get(name, poses.groups[0].values.get(name))
+                if curves.leaves[k].turning and known is not None:
+                    line.align(k, known * study.units.angle_factor)
             for end, peak in enumerate(peaks(line, curves.curves[: len(mine)], still[mine])):
                 self._take(peak, 1 - 2 * end, still, found[end], index[end], moving, mine)
             for end, sign in enumerate((1, -1) if wrong else ()):

@@ -72,7 +72,8 @@ def peaks(
     """Smallest values of curves, and of them times -1, where a slope is zero or the motion ends.
 
     A segment cannot hold a value below both its ends by more than half its length times its largest slope: links
-    hardly turn within it. Those that may hold the smallest of all are divided once more before slopes are compared.
+    hardly turn within it. Those that may hold the smallest of all are divided where their slope does not change evenly,
+    so that it might be zero twice: by its parabola, in the middle by a quarter of its larger end.
 
     Parameters
     ----------
@@ -93,8 +94,11 @@ def peaks(
             best = line.least(sign * values)[:, design]
             least = np.fmin(sign * values[:, line.begin], sign * values[:, line.end]) - drop
             likely.append(least < best)
+        rise = values[:, line.end] - values[:, line.begin]
+        with np.errstate(invalid="ignore"):
+            bent = ~(6 * np.abs(rise - (one + other) / 2) <= np.fmax(np.abs(one), np.abs(other)))
         if looks is not None and len(design):
-            line.divide(np.flatnonzero(np.logical_or.reduce(likely).any(axis=0)), looks)
+            line.divide(np.flatnonzero((np.logical_or.reduce(likely) & bent).any(axis=0)), looks)
     which, curve, segment = np.nonzero([
         some & (sign * one < 0) & (sign * other > 0) for sign, some in zip(signs, likely, strict=True)
     ])  # fmt: skip
