@@ -54,21 +54,21 @@ def circle(given: Circle, points: int | None, turn: float) -> Course:
 def arc(given: Arc, points: int | None, turn: float) -> Course:
     """Part of a circle, both ends included."""
     angles = 2 * np.pi / turn * np.linspace(given.from_, given.to, points or STRAIGHT)
-    return _round(complex(*given.center), given.radius, angles, np.sign(given.to - given.from_), closed=False)
+    return _round(complex(*given.center), given.radius, angles, float(np.sign(given.to - given.from_)), closed=False)
 
 
 def _round(center: complex, radius: float, angles: Floats, sign: float, *, closed: bool) -> Course:
-    outward: Plane = np.exp(1j * angles)
+    outward = np.exp(1j * angles).astype(np.complex128)
     way = radius * np.abs(angles - angles[0])
-    places: Plane = center + radius * outward
-    return Course(places, way, sign * 1j * outward, -outward / radius, closed)
+    return Course(center + radius * outward, way, complex(0.0, sign) * outward, outward / -radius, closed)
 
 
 def line(begin: complex, end: complex, points: int | None) -> Course:
     """A straight line between two different places, both included."""
     part = np.linspace(0.0, 1.0, points or STRAIGHT)
+    places: Plane = np.asarray(begin + part * (end - begin), dtype=np.complex128)
     direction = np.full(len(part), (end - begin) / abs(end - begin))
-    return Course(begin + part * (end - begin), part * abs(end - begin), direction, np.zeros(len(part), dtype=complex))
+    return Course(places, part * abs(end - begin), direction, np.zeros(len(part), dtype=complex))
 
 
 def polyline(places: Plane) -> Course:
