@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from helpers.syntheses import tray
 
 import mechdesign
 from mechdesign.analyses.optimize.explorer import Explorer, Outcome
@@ -112,6 +113,22 @@ def test_front_of_an_arm_and_its_knee():
         assert not (better & ((designs["kinematics.P.x"] < x) | (designs["kinematics.P.y"] > y))).any()
     assert f"r1: {float(r1[knee_row[0]])!r}" in result.files["knee.yaml"]
     assert len(designs) <= 2000
+
+
+def test_both_ends_of_a_front_are_searched_for():
+    """Between short links and good conditioning, where few designs assemble at all."""
+    problem = tray(None)
+    study = study_of(problem.study, "optimize.method=pareto", "optimize.maximize=[kinematics.conditioning]")
+    result = mechdesign.optimize(study)
+    table = result.main
+    assert table["kinematics.S.x"].min() == pytest.approx(182.28, abs=1e-3)
+    designs = result.tables["designs"]
+    assert table["kinematics.S.x"].min() == designs["kinematics.S.x"][designs["feasible"]].min()
+    values = np.column_stack([table["kinematics.S.x"], -table["kinematics.conditioning"]])
+    assert len(front(values)) == len(values) > 20
+    share = (values - values.min(axis=0)) / np.ptp(values, axis=0)
+    gaps = np.abs(share[:, None] - share[None]).max(axis=2)
+    assert gaps[~np.eye(len(gaps), dtype=bool)].min() > 1e-4
 
 
 def test_same_seed_same_bits():

@@ -64,7 +64,7 @@ def optimize(
     """
     goals = _goals(study)
     assert study.optimize is not None
-    most_rows = MOST_KEPT if study.optimize.method == "search" else 0
+    most_rows = 0 if study.optimize.method == "grid" else MOST_KEPT
     judge = Judge(study, goals, jobs, progress, journal, most_rows=most_rows)
     budget = _budget(study, len(goals), slow=judge.slow)
     judge.limit_rows(most_rows // budget)
@@ -158,18 +158,23 @@ def _ask(study: Study, judge: Judge, compute: Compute, budget: int, seed: int) -
         stacked = np.stack(margins, axis=1) if margins else np.empty((len(u), 0))
         return Outcome(found[:, : len(goals)], stacked, found[:, 2 * width + 2 :], found[:, 2 * width + 1])
 
+    judge.progress.start(budget, "designs")
+    explorer = Explorer(evaluate, dimensions, budget, judge.parts(), rough=judge.rough)
     if section.method == "search":
         rows = _weights(study, len(goals)).tolist()
-        judge.progress.start(budget, "designs")
-        explorer = Explorer(evaluate, dimensions, budget, judge.parts(), rough=judge.rough)
-        return tuple(
-            _doubts(searching.search(explorer, smallest, rows, seed, patient=section.evaluations is not None), budget)
-        )
+        patient = section.evaluations is not None
+        return tuple(_doubts(searching.search(explorer, smallest, rows, seed, patient=patient), budget))
     from mechdesign.analyses.optimize import pareto
 
-    judge.progress.start(budget, "designs")
-    first = searching.sample(dimensions, np.random.default_rng(seed), pareto.population(budget), budget)
-    pareto.evolve(Explorer(evaluate, dimensions, budget), np.where(smallest, 1.0, -1.0), first, seed)
+    # The ends of the front, and what is best on the whole, are searched for; between them it is spread.
+    explorer.left = budget // 2
+    alike = [[1.0] * len(goals)]
+    searching.search(explorer, smallest, [*np.eye(len(goals)).tolist(), *alike], seed, patient=False)
+    explorer.left += budget - budget // 2
+    size, signs = pareto.population(explorer.left), np.where(smallest, 1.0, -1.0)
+    begun = pareto.promising(explorer.known, signs, size // 2)
+    others = searching.sample(dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
+    pareto.evolve(explorer, signs, np.concatenate([explorer.known.u[begun], others]), seed)
     return ()
 
 

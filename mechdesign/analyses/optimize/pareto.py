@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.optimize.explorer import Explorer, Spent
+from mechdesign.analyses.optimize.explorer import Explorer, Known, Spent
 from mechdesign.analyses.workspace.rays import Floats
 
 # Evaluations where the study says none, a goal; and how many generations a population is given of them.
 ALLOWANCE, GENERATIONS = 1200, 25
+# Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ.
+CLOSE = 1e-4
 SMALLEST_POPULATION, LARGEST_POPULATION = 8, 200
 
 
@@ -42,11 +44,13 @@ def evolve(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
         rows = explorer(u)
         known = explorer.known
         valid = known.valid[rows]
-        # What cannot be built misses one condition more than there are, by more than any other.
+        # What cannot be built misses one condition more than there are, by more than any other, and the more so by how
+        # much it does not assemble.
         values = np.where(valid[:, None], known.values[rows] * signs, 0.0)
         missing = np.where(valid[:, None], np.maximum(-known.margins[rows], 0.0), 1.0)
         worst = missing.max(axis=0, initial=0.0)
-        return values, np.column_stack([missing / np.where(worst > 0, worst, 1.0), np.where(valid, 0.0, 1e3)])
+        open_ = 1e3 * (1.0 + np.nan_to_num(known.shortfall[rows], nan=1e9))
+        return values, np.column_stack([missing / np.where(worst > 0, worst, 1.0), np.where(valid, 0.0, open_)])
 
     try:
         conditions = outcome(first)[1].shape[1]
@@ -79,10 +83,38 @@ def front(values: Floats) -> NDArray[np.intp]:
     return np.sort(first[rows])
 
 
+def promising(known: Known, signs: Floats, count: int) -> NDArray[np.intp]:
+    """Rows to spread a population from: of the front so far those with the widest gaps about them.
+
+    Parameters
+    ----------
+    signs : ndarray, shape (goals,)
+        As `evolve` takes them.
+    """
+    feasible = np.flatnonzero(known.feasible)
+    if not len(feasible):
+        return feasible
+    values = known.values[feasible] * signs
+    rows = front(values)
+    widest = np.argsort(-crowding(values[rows]), kind="stable")[:count]
+    return np.asarray(feasible[rows[widest]])
+
+
 def normalised(values: Floats) -> Floats:
     """Values of a front as fractions of the way from each goal's best value on it to its worst."""
     low, span = values.min(axis=0), np.ptp(values, axis=0)
     return np.asarray((values - low) / np.where(span > 0, span, 1.0))
+
+
+def distinct(values: Floats) -> NDArray[np.intp]:
+    """Rows of a front, its ends among them, of which no two are closer than `CLOSE` in every goal."""
+    share = normalised(values)
+    ends = [int(np.lexsort((share.sum(axis=1), column))[0]) for column in share.T]
+    kept: list[int] = []
+    for k in (*ends, *range(len(share))):
+        if not kept or (np.abs(share[kept] - share[k]).max(axis=1) > CLOSE).all():
+            kept.append(k)
+    return np.sort(np.array(kept, dtype=np.intp))
 
 
 def knee(values: Floats) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.analyses.optimize.pareto import crowding, front, knee
+from mechdesign.analyses.optimize.pareto import crowding, distinct, front, knee
 from mechdesign.analyses.optimize.tables import Comparison, value_columns, variable_columns
 from mechdesign.results import Column, Table
 
@@ -16,6 +16,7 @@ def pareto_table(compared: Comparison) -> tuple[Table, dict[str, int]]:
     values = np.stack([designs.values[each][feasible] * (1 if each.smallest else -1) for each in designs.goals], axis=1)
     on_front = front(values)
     on_front = on_front[np.lexsort(values[on_front].T[::-1])]
+    on_front = on_front[distinct(values[on_front])]
     rows, values = feasible[on_front], values[on_front]
     marked = np.zeros(len(rows), dtype=bool)
     marked[knee(values)] = True
