@@ -14,6 +14,7 @@ from mechdesign.cli.options import Options
 def check_studies(paths: Sequence[Path | None], options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     from mechdesign.report.requirements import foresee
+    from mechdesign.study.pin_links import in_words
 
     worst = 0
     owners = Owners()
@@ -22,7 +23,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
             study = load_study(path, options)
             label = study_label(study)
             if not options.quiet:
-                terminal.emit(f"{label}: {study.name}\n{study.mechanism.describe()}\n")
+                terminal.emit("\n".join([f"{label}: {study.name}", study.mechanism.describe(), *in_words(study), ""]))
             foresee(study, COMMANDS)
             if options.plots:
                 from mechdesign.report.writer import write_sketch
