@@ -17,6 +17,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     from mechdesign.mechanism.describe import describe
     from mechdesign.report.requirements import foresee
+    from mechdesign.study.pin_links import in_words
 
     worst = 0
     owners = Owners()
@@ -25,7 +26,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
             study = load_study(path, options)
             label = study_label(study)
             if not options.quiet:
-                terminal.emit(f"{label}: {study.name}\n{describe(study.mechanism)}\n")
+                terminal.emit("\n".join([f"{label}: {study.name}", describe(study.mechanism), *in_words(study), ""]))
             for warning in study.warnings:
                 terminal.say(f"warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS)

@@ -13,6 +13,7 @@ from mechdesign.study.names import GROUND, Names
 from mechdesign.study.numbers import suggestion
 from mechdesign.study.optimize_models import Condition, OptimizeSection
 from mechdesign.study.parameters import Parameters
+from mechdesign.study.pin_links import split_link
 from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter
@@ -105,8 +106,9 @@ class Checker:
 
     def outputs(self, command: str, section: KinematicsSection | ReliabilitySection) -> None:
         seen: set[str] = set()
-        for index, name in enumerate(section.outputs or ()):
+        for index, given in enumerate(section.outputs or ()):
             path: Path = (command, "outputs", index)
+            name = split_link(self.names, given)[1] if command == "reliability" else given
             parts = [f"{name}.x", f"{name}.y"] if name in self.names.owners else [name]
             if name not in self.names.owners:
                 self.coordinate(name, path)

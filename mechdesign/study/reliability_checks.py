@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mechdesign.mechanism.model import Quantity
+from mechdesign.study import pin_links
 from mechdesign.study.document import Path
 from mechdesign.study.reliability_models import (
     LOADS,
@@ -29,11 +30,12 @@ _KINDS: dict[Quantity, tuple[str, str, str]] = {
 
 def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
     """Note what is wrong; returns the section with wildcards and the clearances' links filled in."""
+    meant = pin_links.said(checker, section)
     dimensions = _dimensions(checker, section)
     clearances = {
         point: found
         for point, clearance in section.clearances.items()
-        if (found := _clearance(checker, point, clearance)) is not None
+        if (found := _clearance(checker, point, clearance, meant.get(point))) is not None
     }
     for name, limit in section.limits.items():
         _limit(checker, section, name, limit)
@@ -52,7 +54,14 @@ def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
     if section.allocate is not None:
         _allocate(checker, section, dimensions, clearances)
     load = _load(checker, section, dimensions)
-    return section.model_copy(update={"dimensions": dimensions, "clearances": clearances, "load": load})
+    plain = {name: pin_links.split_link(checker.names, name)[1] for name in (*(section.outputs or ()), *section.limits)}
+    limits = {plain[name]: limit for name, limit in section.limits.items()}
+    if len(limits) < len(section.limits):
+        checker.reporter.report(("reliability", "limits"), "the same error is limited twice")
+    outputs = None if section.outputs is None else tuple(plain[name] for name in section.outputs)
+    return section.model_copy(
+        update={"dimensions": dimensions, "clearances": clearances, "load": load, "outputs": outputs, "limits": limits}
+    )
 
 
 def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension]) -> tuple[float, ...] | None:
@@ -103,7 +112,7 @@ def _varies(dimension: Dimension) -> bool:
     return bool(dimension.sigma) if dimension.tolerance is None else dimension.tolerance[0] < dimension.tolerance[1]
 
 
-def _clearance(checker: Checker, point: str, clearance: Clearance) -> Clearance | None:
+def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
     path: Path = ("reliability", "clearances", point)
     names, report = checker.names, checker.reporter.report
     if not checker.known(point, names.owners, "point", path, at_key=True):
@@ -112,7 +121,7 @@ def _clearance(checker: Checker, point: str, clearance: Clearance) -> Clearance 
     held = [*links, *(j.slot for j in names.section.joints.values() if j.slot and j.point == point)]
     if len(held) < 2:
         report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
-    link = clearance.link or links[-1]
+    link = clearance.link or pin_links.carrier(links, meant)
     if link not in links:
         checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
     elif clearance.effect == "length":
@@ -136,6 +145,7 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
     path: Path = ("reliability", "limits", name)
     names, report = checker.names, checker.reporter.report
     known = names.owners if limit.radius is not None else {**names.coordinates, **names.owners}
+    name = pin_links.split_link(names, name)[1]
     base, order = split_order(name, known.__contains__)
     if order and not (section.rates or section.accelerations or section.speed):
         report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)

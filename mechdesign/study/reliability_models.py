@@ -152,7 +152,11 @@ class PinModel(Model):
 
 
 class Clearance(Model):
-    """The clearance of a pin joint; exactly one of radial and diametral, to which tolerance and sigma belong."""
+    """The clearance of a pin joint; exactly one of radial and diametral, to which the tolerance belongs.
+
+    The pin moves in `link` (left out, the last link of the joint that no output is said to be of); the coordinates of
+    its point are those of the other links. An output or a limit may name the link that it is about: ``coupler.P.x``.
+    """
 
     radial: NonNegativeLength | None = None
     diametral: NonNegativeLength | None = None

@@ -18,7 +18,7 @@ from mechdesign.analyses.reliability.cycle import notes, with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
 from mechdesign.analyses.reliability.first_order import FirstOrder, Rates, linear_errors, nominal_values
 from mechdesign.analyses.reliability.methods import METHODS, MOST, Found, Partial, Task, analytic
-from mechdesign.analyses.reliability.question import Question, ask
+from mechdesign.analyses.reliability.question import Question, ask, unsaid
 from mechdesign.analyses.reliability.shortfalls import pointless, unassembled, unreached
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources, find_sources
@@ -76,7 +76,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     question = ask(study, section)
     poses = study.poses("reliability")
     nominal, elastic, doubts = loaded(study, NominalPoses.solve(study, poses, question), question)
-    warnings += doubts
+    warnings += [*doubts, *unsaid(study, question)]
     failures, failed = judge_failures(study, poses, nominal.reason)
     linear = first_order(study, nominal, question, sources, elastic)
     settings = _settings(study, nominal, question, linear, elastic, poses.listed)

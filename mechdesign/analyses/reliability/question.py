@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.study import Study
+from mechdesign.study.lists import as_list
+from mechdesign.study.pin_links import others
 from mechdesign.study.reliability_models import ReliabilitySection, split_order
 
 
@@ -103,3 +106,38 @@ def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
             return False
 
     return split_order(name, known)
+
+
+def unsaid(study: Study, question: Question) -> list[str]:
+    """A sentence for each output whose pin has a clearance, where the study does not say which link's point it is."""
+    section: dict[str, Any] = study.resolved["reliability"]
+    names = [*as_list(section.get("outputs")), *(section.get("limits") or {})]
+    sentences = []
+    for point, (link, rest) in others(study).items():
+        node = study.mechanism.graph.node(point)
+        about = [output.name for output in question.outputs if node in _nodes(output)]
+        told = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
+        if about and rest and not told:
+            sentences.append(
+                f"{', '.join(about)}: {point} has a clearance and is that of {' and '.join(rest)}, not of {link}, "
+                f"in which the pin moves; say so by {rest[0]}.{point}, or give reliability.clearances.{point} a 'link'"
+            )
+    return sentences
+
+
+def _named(name: str, point: str) -> bool:
+    rest = name.partition(".")[2]
+    return rest == point or rest.startswith((f"{point}.", f"{point}_"))
+
+
+def links_meant(study: Study, coordinate: Coordinate) -> str:
+    """The links whose points a coordinate is about, as far as their pins have clearances."""
+    nodes = _nodes(coordinate)
+    found = [" ".join(rest) for point, (_, rest) in others(study).items() if study.mechanism.graph.node(point) in nodes]
+    return " ".join(dict.fromkeys(found))
+
+
+def _nodes(coordinate: Coordinate) -> set[int]:
+    """Points that a coordinate depends on itself."""
+    own = {coordinate.node, coordinate.other} - {-1}
+    return own.union(*(_nodes(part) for part in coordinate.parts))

@@ -295,8 +295,9 @@ def _check_sizes(sources: Sources) -> None:
             slopes = _geometric(study.parameters.derivatives(scalar.name))
         for name, slope in slopes.items():
             drive = scalar.kind == "drive"
-            angle = scalar.kind != "load" and "angle" == (
-                mechanism.quantity(name) if drive else mechanism.description.places[name].quantity
+            angle = (
+                scalar.kind != "load"
+                and (mechanism.quantity(name) if drive else mechanism.description.places[name].quantity) == "angle"
             )
             most = HEAVY if scalar.kind == "load" else MOST * (1.0 if angle else mechanism.size or 1.0)
             if not max(abs(slope * end) for end in scalar.law.ends) <= most:

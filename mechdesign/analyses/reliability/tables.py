@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +13,13 @@ from mechdesign.analyses.reliability import drawn_tables
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
 from mechdesign.analyses.reliability.methods import Found
+from mechdesign.analyses.reliability.question import Question, links_meant
 from mechdesign.analyses.reliability.simulation import Sums
 from mechdesign.analyses.reliability.sobol import Indices
 from mechdesign.analyses.reliability.sobol import columns as index_columns
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-
-if TYPE_CHECKING:
-    from mechdesign.analyses.reliability.question import Question
 
 Floats = NDArray[np.float64]
 
@@ -128,8 +125,9 @@ def moments(answer: Answer) -> Table:
         Column("nominal", nominal.ravel(), meaning="value of the nominal mechanism, in `unit`"),
         Column("mean", mean.ravel(), meaning="mean over made mechanisms, in `unit`"),
         Column("sigma", sigma.ravel(), meaning="standard deviation of the error, in `unit`"),
-        Column("worst_case", worst.ravel(), 
-               meaning="sum of |sensitivity| times the larger end of the tolerance, in `unit`"),
+        Column(
+            "worst_case", worst.ravel(), meaning="sum of |sensitivity| times the larger end of the tolerance, in `unit`"
+        ),
         Column("worst_low", ends[0].ravel(), meaning="lowest error that the tolerances allow, in `unit`"),
         Column("worst_high", ends[1].ravel(), meaning="highest error that the tolerances allow, in `unit`"),
         Column("unit", np.tile(unit, count * methods), meaning="unit of the six columns before"),
@@ -176,7 +174,11 @@ def success(answer: Answer) -> Table:
         Column("reliability", 1.0 - failure, meaning="probability that every limit is kept"),
         Column("low", 1.0 - high, meaning=f"lower end of its interval, {kind}"),
         Column("high", 1.0 - low, meaning=f"upper end of its interval, {kind}"),
-        Column("failure", failure, meaning="1 - reliability, without loss of digits; 0 where no failure was seen, and failure_high bounds it"),
+        Column(
+            "failure",
+            failure,
+            meaning="1 - reliability, without loss of digits; 0 where no failure was seen, and failure_high bounds it",
+        ),
         Column("failure_low", low, meaning=f"lower end of its interval, {kind}; of a cycle's bounds the worst pose's"),
         Column("failure_high", high, meaning=f"upper end of its interval, {kind}; of a cycle's bounds the poses' sum"),
         Column("error", error, meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),
@@ -214,6 +216,14 @@ def contributions(answer: Answer) -> Table:
         Column("source", np.tile(names, count * channels), meaning="parameter, dimension, drive, or joint's clearance"),
         Column("output", np.tile(np.repeat(output, len(names)), count), meaning="coordinate"),
         Column("order", np.tile(np.repeat(order, len(names)), count), meaning="position, velocity or acceleration"),
+        Column(
+            "on",
+            np.tile(
+                np.repeat([links_meant(answer.study, c.coordinate) for c in answer.question.channels], len(names)),
+                count,
+            ),
+            meaning="links whose point the output is, where its pin has a clearance: the pin moves in another link",
+        ),
         Column(
             "sensitivity",
             np.moveaxis(sensitivity, 2, 0).ravel(),
