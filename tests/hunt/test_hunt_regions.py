@@ -339,3 +339,61 @@ def compare(robot: Robot, same: bool, about: complex | None = None) -> None:
     centre = [] if about is None else [f"workspace.scan.about={told(about)}"]
     found = asked(robot, f"workspace.assembly={'same' if same else 'any'}", *centre).main["area"][0]
     assert abs(found - wanted[0]) <= wanted[1], (found, wanted)
+
+
+@pytest.mark.parametrize("same", [False, True], ids=["any", "same"])
+@pytest.mark.parametrize(("family", "cases"), [("five_bar", 3), ("sliders", 2), ("slider_arm", 2), ("telescopes", 1),
+                                              ("platform", 1)])  # fmt: skip
+def test_areas_of_random_robots(seeds: Seeds, family: str, cases: int, same: bool) -> None:
+    for seed in seeds(cases):
+        robot = FAMILIES[family](np.random.default_rng(seed))
+        if robot is not None:
+            compare(robot, same)
+
+
+# Robots whose pieces were lost: beyond the reach that few rays had told, seen from the sketch's piece.
+@pytest.mark.parametrize(("family", "seed"), [("five_bar", 0), ("five_bar", 15), ("five_bar", 51), ("five_bar", 99),
+                                              ("sliders", 3), ("sliders", 71)])  # fmt: skip
+def test_pieces_that_were_lost(family: str, seed: int) -> None:
+    robot = FAMILIES[family](np.random.default_rng(seed))
+    assert robot is not None
+    compare(robot, same=False)
+
+
+@pytest.mark.parametrize(("family", "seed"), [("five_bar", 15), ("sliders", 3)])
+def test_the_area_is_the_same_from_everywhere(family: str, seed: int) -> None:
+    """Seen from the sketch's place, from outside, and from far away."""
+    robot = FAMILIES[family](np.random.default_rng(seed))
+    assert robot is not None
+    centres = [robot.point, 0.7 * robot.half * np.exp(1j), 3 * robot.half * np.exp(4j)]
+    areas = [
+        asked(robot, "workspace.assembly=any", f"workspace.scan.about={told(centre)}").main["area"][0]
+        for centre in centres
+    ]
+    assert areas == pytest.approx(np.full(3, areas[0]), rel=1e-5)
+
+
+def over(robot: Robot, degrees: float, same: bool) -> tuple[float, float] | None:
+    """Area of the region over a range of the platform's angle about the drawn one, by single angles."""
+    angles = np.radians(np.linspace(-degrees, degrees, LAYERS))
+    good, side = raster(robot, CELLS // 2, 0.0, same)
+    for angle in angles:
+        good |= raster(robot, CELLS // 2, float(angle), same)[0]
+    if not same:
+        return area_of(good, side)
+    area, doubt = area_of(holding(good, robot, side), side)
+    grown, _ = area_of(holding(ndimage.binary_dilation(good), robot, side) & good, side)
+    return (area, doubt) if abs(grown - area) <= doubt else None
+
+
+@pytest.mark.parametrize("same", [False, True], ids=["any", "same"])
+def test_platforms_over_a_range_of_orientations(seeds: Seeds, same: bool) -> None:
+    for seed in seeds(1):
+        robot = platform(np.random.default_rng(seed))
+        wanted = robot and over(robot, 12, same)
+        if robot is None or wanted is None:
+            continue
+        changes = (f"workspace.assembly={'same' if same else 'any'}", "workspace.at.platform.angle={from: -12, to: 12}")
+        found = asked(robot, *changes).main["area"][0]
+        # Between the angles there is a little more.
+        assert abs(found - wanted[0]) <= 1.5 * wanted[1], (found, wanted)
