@@ -26,7 +26,7 @@ from mechdesign.study.workspace_models import Over, WorkspaceSection
 
 # One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it, and
 # looked at more closely where limits of angles may leave thin parts.
-CLOSE, BRISK = Effort(128, 48, 256), Effort(16, 12, 24, 64)
+CLOSE, BRISK = Effort(128, 48, 192), Effort(16, 12, 24, 64)
 SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
 # Rays of the tables of local indices and of the boundary, unless the study says how many.
 RAYS = 181
