@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from mechdesign.study.lists import Numbers, as_list
 from mechdesign.study.models import Model
@@ -33,6 +34,10 @@ NEEDED = {
 }  # fmt: skip
 
 
+# A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
+WHOLE = 3e-6
+
+
 class Scan(Model):
     """Rays about a point; angles in the study's unit."""
 
@@ -40,6 +45,19 @@ class Scan(Model):
     from_: Angle | None = Field(None, alias="from")
     to: Angle | None = None
     rays: Annotated[int, Whole(2, 1_000_000)] | None = None
+
+    @field_validator("to")
+    @classmethod
+    def _within_a_turn(cls, to: float | None, info: ValidationInfo) -> float | None:
+        start, context = info.data.get("from_"), info.context
+        if to is not None and start is not None and context is not None:
+            turn = 2 * math.pi / context.units.angle_factor
+            if to - start > turn * (1 + WHOLE):
+                raise failure(
+                    f"{to:g} is more than a turn beyond 'from', {start:g}: rays would meet the region more than once; "
+                    f"at most {start + turn:g}"
+                )
+        return to
 
 
 class Integrate(Model):

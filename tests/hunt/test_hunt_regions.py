@@ -11,6 +11,7 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
+from mechdesign.analyses.workspace.region import BRISK, answer, questions
 from mechdesign.results import Result
 
 Complex = np.ndarray
@@ -339,3 +340,119 @@ def compare(robot: Robot, same: bool, about: complex | None = None) -> None:
     centre = [] if about is None else [f"workspace.scan.about={told(about)}"]
     found = asked(robot, f"workspace.assembly={'same' if same else 'any'}", *centre).main["area"][0]
     assert abs(found - wanted[0]) <= wanted[1], (found, wanted)
+
+
+@pytest.mark.parametrize("same", [False, True], ids=["any", "same"])
+@pytest.mark.parametrize(("family", "cases"), [("five_bar", 3), ("sliders", 2), ("slider_arm", 2), ("telescopes", 1),
+                                              ("platform", 1)])  # fmt: skip
+def test_areas_of_random_robots(seeds: Seeds, family: str, cases: int, same: bool) -> None:
+    for seed in seeds(cases):
+        robot = FAMILIES[family](np.random.default_rng(seed))
+        if robot is not None:
+            compare(robot, same)
+
+
+# Robots whose pieces were lost: beyond the reach that few rays had told, seen from the sketch's piece.
+@pytest.mark.parametrize(("family", "seed"), [("five_bar", 0), ("five_bar", 15), ("five_bar", 51), ("five_bar", 99),
+                                              ("sliders", 3), ("sliders", 71)])  # fmt: skip
+def test_pieces_that_were_lost(family: str, seed: int) -> None:
+    robot = FAMILIES[family](np.random.default_rng(seed))
+    assert robot is not None
+    compare(robot, same=False)
+    wanted = truth(robot, same=False)
+    assert wanted is not None
+    # As a design of many, looked at less closely.
+    question = questions(study_of(robot.text, "workspace.assembly=any"), 1e-4, ("area",))[0]
+    found = answer(question, {}, 1, BRISK).values["area"][0]
+    assert abs(found - wanted[0]) <= wanted[1], (found, wanted)
+
+
+@pytest.mark.parametrize(("family", "seed"), [("five_bar", 15), ("sliders", 3)])
+def test_the_area_is_the_same_from_everywhere(family: str, seed: int) -> None:
+    """Seen from the sketch's place, from outside, and from far away."""
+    robot = FAMILIES[family](np.random.default_rng(seed))
+    assert robot is not None
+    centres = [robot.point, 0.7 * robot.half * np.exp(1j), 3 * robot.half * np.exp(4j)]
+    areas = [
+        asked(robot, "workspace.assembly=any", f"workspace.scan.about={told(centre)}").main["area"][0]
+        for centre in centres
+    ]
+    assert areas == pytest.approx(np.full(3, areas[0]), rel=1e-5)
+
+
+def reached(robot: Robot, degrees: float, same: bool) -> Flags:
+    """Cells that are reached at one of many angles at least."""
+    angles = np.radians(np.linspace(-degrees, degrees, LAYERS)).tolist()
+    return np.any([raster(robot, CELLS // 2, angle, same)[0] for angle in angles], axis=0)
+
+
+def over(robot: Robot, degrees: float, same: bool) -> tuple[float, float] | None:
+    """Area of the region over a range of the platform's angle about the drawn one, by single angles."""
+    good, side = reached(robot, degrees, same), 2 * robot.half / (CELLS // 2)
+    if not same:
+        return area_of(good, side)
+    area, doubt = area_of(holding(good, robot, side), side)
+    grown, _ = area_of(holding(ndimage.binary_dilation(good), robot, side) & good, side)
+    return (area, doubt) if abs(grown - area) <= doubt else None
+
+
+@pytest.mark.parametrize("same", [False, True], ids=["any", "same"])
+def test_platforms_over_a_range_of_orientations(seeds: Seeds, same: bool) -> None:
+    for seed in seeds(1):
+        robot = platform(np.random.default_rng(seed))
+        wanted = robot and over(robot, 12, same)
+        if robot is None or wanted is None:
+            continue
+        changes = (f"workspace.assembly={'same' if same else 'any'}", "workspace.at.platform.angle={from: -12, to: 12}")
+        found = asked(robot, *changes).main["area"][0]
+        # Between the angles there is a little more.
+        assert abs(found - wanted[0]) <= 1.5 * wanted[1], (found, wanted)
+
+
+DIVIDED = """
+units: {length: m}
+mechanism:
+  measures: {aside: P.x*P.x}
+  links:
+    ground: {A1: [-0.6, 0], A2: [0.6, 0], A3: [0.3, -0.2]}
+    leg_1: {from: A1, to: B1, telescopic: true}
+    leg_2: {from: A2, to: B2, telescopic: true}
+    leg_3: {from: A3, to: B3, telescopic: true}
+    platform: {P: [0, 0], B1: [-0.2, 0], B2: [0.2, 0], B3: [0.25, 0.15]}
+  drives: {l1: {length: leg_1}, l2: {length: leg_2}, l3: {length: leg_3}}
+  limits:
+    - {drive: l1, min: 0.4, max: 1.4}
+    - {drive: l2, min: 0.4, max: 1.4}
+    - {drive: l3, min: 0.3, max: 1.6}
+    - {measure: aside, min: 0.04}
+  sketch: {P: [0.4, 1], B1: [0.2, 1], B2: [0.6, 1], B3: [0.65, 1.15]}
+workspace: {point: P, at: {platform.angle: {from: -12, to: 12}}, assembly: same}
+"""
+
+
+def test_over_a_range_only_the_sketchs_piece_counts() -> None:
+    """A platform on three strokes that may not pass a strip in the middle."""
+    bases, corners = np.array([-0.6, 0.6, 0.3 - 0.2j]), np.array([-0.2, 0.2, 0.25 + 0.15j])
+    low, high = np.array([0.4, 0.4, 0.3]), np.array([1.4, 1.4, 1.6])
+
+    def solve(z: Complex, angle: float) -> tuple[Flags, np.ndarray]:
+        arms = corners * np.exp(1j * angle)
+        bars = [z + arm - base for arm, base in zip(arms, bases, strict=True)]
+        good = np.all(
+            [(np.abs(bar) > a) & (np.abs(bar) < b) for bar, a, b in zip(bars, low, high, strict=True)], axis=0
+        )
+        rows = np.array([[bar.real, bar.imag, cross(np.full(z.shape, arm), bar)] for bar, arm in
+                         zip(bars, arms, strict=True)])  # fmt: skip
+        return good & (z.real**2 > 0.04), np.linalg.det(np.moveaxis(rows, (0, 1), (-2, -1)))
+
+    robot = Robot(DIVIDED, solve, 0.4 + 1j, 2.0)
+    one, every = over(robot, 12, same=True), area_of(reached(robot, 12, same=True), 4.0 / (CELLS // 2))
+    assert one is not None
+    assert one[0] < 0.9 * every[0]
+    result = asked(robot)
+    pieces = result.tables["pieces"]
+    assert abs(result.main["area"][0] - one[0]) <= 1.5 * one[1]
+    assert result.main["area"][0] == pytest.approx(pieces["area"][0], rel=1e-5)
+    assert pieces["sketch"].tolist() == [1] + [0] * (len(pieces["piece"]) - 1)
+    assert set(result.tables["boundary"]["piece"]) == set(pieces["piece"])
+    assert any("do not hang together" in warning for warning in result.warnings)

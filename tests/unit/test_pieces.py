@@ -12,6 +12,7 @@ from scipy import ndimage
 import mechdesign
 from mechdesign.analyses.optimize.goals import Evaluator, goal
 from mechdesign.analyses.workspace.nodes import workspace_nodes
+from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 
 FIVE_BAR = """
@@ -269,3 +270,53 @@ def test_poses_all_over_the_workspace_are_of_the_same_piece() -> None:
     filled = Filled(five_bar(), 0.85)
     z = group.values["P.x"] + 1j * group.values["P.y"]
     assert filled.at(0, -0.25) not in {0, *(filled.at(p.real, p.imag) for p in z)}
+
+
+# A five-bar whose cranks reach to the middle between the motors and whose limits touch where the legs are folded: with
+# the elbows inwards the determinant touches zero along a whole circle.
+FOLDED = """
+units: {length: m}
+mechanism:
+  links:
+    ground: {A: [0.1, 0], B: [-0.1, 0]}
+    one: [A, C, 0.1]
+    upper_one: [C, P, 0.215]
+    two: [B, D, 0.1]
+    upper_two: [D, P, 0.215]
+  drives: {t1: {angle: one}, t2: {angle: two}}
+  limits: [{distance: [A, P], min: 0.115, max: 0.315}, {distance: [B, P], min: 0.115, max: 0.315}]
+  sketch: {C: [-0.05, 0.05], D: [0.05, 0.05], P: [0, 0.18]}
+workspace: {point: P, indices: []}
+"""
+
+
+@pytest.mark.parametrize("about", ["[0, -0.18]", "[0, -0.157]", "[3, 1]", "[90, 0]"])
+def test_a_determinant_that_touches_zero_on_a_circle_divides_nothing(about: str) -> None:
+    """The two rings' common part below the motors, from anywhere: by a fine grid."""
+    result = mechdesign.workspace(study_of(FOLDED, f"workspace.scan.about={about}"))
+    x = (np.arange(2000) + 0.5) * 0.7 / 2000 - 0.35
+    z = x + 1j * x[:, None]
+    one, two = np.abs(z - 0.1), np.abs(z + 0.1)
+    good = (one > 0.115) & (two > 0.115) & (one < 0.315) & (two < 0.315) & (z.imag < 0)
+    assert result.main["area"][0] == pytest.approx(good.sum() * (0.7 / 2000) ** 2, rel=3e-3)
+    assert "pieces" not in result.tables
+
+
+def test_an_empty_region_says_where() -> None:
+    with pytest.raises(AssemblyError, match=r"point P reaches nothing on the scan about \(0, 0\)"):
+        mechdesign.workspace(study_of(FOLDED, "workspace.scan={about: [0, 0], from: 0, to: 180}"))
+
+
+TOO_WIDE = [
+    ("workspace.scan={about: [0, 0], from: 0, to: 3600}",),
+    ("units.angle=rad", "workspace.scan={about: [0, 0], from: 1, to: 7.3}"),
+]
+
+
+@pytest.mark.parametrize("changes", TOO_WIDE)
+def test_a_scan_is_a_turn_at_most(changes: tuple[str, ...]) -> None:
+    with pytest.raises(StudyError, match="more than a turn beyond 'from'"):
+        study_of(FOLDED, *changes)
+    area = [mechdesign.workspace(study_of(FOLDED, "units.angle=rad", f"workspace.scan={scan}")).main["area"][0]
+            for scan in ("{about: [0, -0.18]}", "{about: [0, -0.18], from: 0, to: 6.2832}")]  # fmt: skip
+    assert area[1] == pytest.approx(area[0], rel=1e-6)

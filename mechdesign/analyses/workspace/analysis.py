@@ -29,9 +29,11 @@ from mechdesign.analyses.workspace.tables import (
     PIECE,
     held_columns,
     inscribed_columns,
+    left_out,
     outlines,
     piece_columns,
     stacked,
+    where,
 )
 from mechdesign.errors import AssemblyError
 from mechdesign.progress import NULL, Progress
@@ -40,6 +42,8 @@ from mechdesign.study import Study
 from mechdesign.study.workspace_models import Over
 from mechdesign.threads import one_thread
 
+# An error of the area beyond this part of it is told.
+AREA_SURE = 1e-3
 ROOTLESS = (
     "without a closed form of the inverse problem the workspace grows from the sketch, and with the held values the "
     "mechanism does not reach the point's place in it; draw it nearer to them"
@@ -82,7 +86,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
         if singular_everywhere(question):
             question = replace(question, field=replace(question.field, same_assembly=False))
             given = without_indices(question, CLOSE)
-            warnings.append(f"every pose{_where(question)} is a forward singularity: indices have no value")
+            warnings.append(f"every pose{where(question)} is a forward singularity: indices have no value")
         else:
             given = answer(question, {}, 1, CLOSE)
             warnings += _doubts(question, given)
@@ -99,12 +103,12 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             pieces.append(piece_columns(study, question, found, areas, drawn))
             several |= len(areas) > 1
             if others:
-                warnings.append(_left_out(study, question, areas, drawn))
+                warnings.append(left_out(study, question, areas, drawn))
         else:
             shapes.append((NO_CIRCLE, NO_RECTANGLE))
         progress.update(1)
     if not local:
-        raise AssemblyError(_unreachable(study, asked[0]))
+        raise AssemblyError(_unreachable(study, asked))
     tables = [
         Table("indices", (*_indices(study, asked, answers), *inscribed_columns(study, shapes)),
               "performance indices over the region"),
@@ -118,42 +122,36 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
                   {"regions": len(asked), "empty": empty})  # fmt: skip
 
 
-def _unreachable(study: Study, question: Question) -> str:
+def _unreachable(study: Study, asked: Sequence[Question]) -> str:
     assert study.workspace is not None
-    if question.field.rootless:
-        return f"point {study.workspace.point} reaches nothing: {ROOTLESS}"
+    field, about = asked[0].field, asked[0].about
+    held = [", ".join(f"{name} = {value:g}" for name, value in question.held.items()) for question in asked]
+    there = f" at {'; '.join(held)}" if held[0] else ""
+    if field.rootless:
+        return f"point {study.workspace.point} reaches nothing{there}: {ROOTLESS}"
+    assembly = " in the sketch's assembly" if field.same_assembly else ""
     return (
-        f"point {study.workspace.point} reaches nothing on the scan about ({question.about.real:g}, "
-        f"{question.about.imag:g}): its links cannot close there in the sketch's assembly, or a limit forbids it"
-    )
-
-
-def _where(question: Question) -> str:
-    where = ", ".join(f"{name} = {value:g}" for name, value in question.held.items())
-    return f" at {where}" if where else ""
-
-
-def _left_out(study: Study, question: Question, areas: Sequence[float], drawn: bool) -> str:
-    """That the indices are of one piece, and what is left out."""
-    one = "of the piece that holds the sketch" if drawn else "of the largest (the sketch lies in none)"
-    many, unit = len(areas) - 1, study.units.label("area")
-    left = f"{'another' if many == 1 else f'{many} others, together'} of area {sum(areas[1:]):.4g} {unit}".rstrip()
-    return (
-        f"the region{_where(question)} has {len(areas)} pieces that do not hang together: indices are {one}; "
-        f"{left} {'is' if many == 1 else 'are'} left out ('assembly: any' counts all)"
+        f"point {study.workspace.point} reaches nothing{there} on the scan about ({about.real:g}, {about.imag:g}): "
+        f"its links cannot close there{assembly}, or a limit forbids it"
     )
 
 
 def _doubts(question: Question, given: Answer) -> Iterator[str]:
-    where = _where(question)
+    there = where(question)
     if not given.panels.closes[0]:
         assembly = " in the sketch's assembly" if question.field.same_assembly else ""
-        yield f"nothing is reachable{where}" + (f": {ROOTLESS}" if question.field.rootless else assembly)
+        yield f"nothing is reachable{there}" + (f": {ROOTLESS}" if question.field.rootless else assembly)
         return
+    area, error = given.values["area"][0], given.errors["area"][0]
+    if error > AREA_SURE * area:
+        yield (
+            f"the area{there} is only known to {error:.2g}: a raster of places that are reached shows more than the "
+            "integral has found"
+        )
     for name in ("GII", "GRI"):
         error, value = given.errors[name][0], given.values[name][0]
         if question.rule == "gauss" and not error <= 2 * question.tolerance * abs(value):
-            yield f"{name}{where} is only known to {error:.1g}, not to the tolerance asked for"
+            yield f"{name}{there} is only known to {error:.1g}, not to the tolerance asked for"
 
 
 def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Answer]) -> Iterator[Column]:

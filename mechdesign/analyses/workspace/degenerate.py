@@ -28,11 +28,13 @@ def singular_everywhere(question: Question) -> bool:
         return False
     designs = Designs(field, {}, 1, question.about)
     panels = find_panels(designs, question.scan, BRISK)
+    if not panels.closes[0]:
+        return False
     theta = 0.5 * (panels.low + panels.high)
     none = np.zeros(len(theta), dtype=np.intp)
     found = trace(designs, none, theta, panels.reach[none], BRISK.samples)
     z = question.about + 0.5 * (found.inner + found.outer) * np.exp(1j * theta[found.ray])
-    return len(z) > 0 and singular(field, z)
+    return singular(field, z)
 
 
 def singular(field: Field, z: NDArray[np.complex128]) -> bool:

@@ -9,13 +9,15 @@ import numpy as np
 
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.workspace.bounding import bounding_box
-from mechdesign.analyses.workspace.curves import Patch, patches
+from mechdesign.analyses.workspace.curves import Patch, patches_of_pieces
 from mechdesign.analyses.workspace.loci import causes
-from mechdesign.analyses.workspace.panels import Effort, find_panels
-from mechdesign.analyses.workspace.quadrature import FINEST_AREA, integrate
+from mechdesign.analyses.workspace.panels import Effort, Panels, find_panels
+from mechdesign.analyses.workspace.pieces import Pieces
+from mechdesign.analyses.workspace.quadrature import FINEST_AREA, Integral, integrate
 from mechdesign.analyses.workspace.ranged import Endings, RangedDesigns
+from mechdesign.analyses.workspace.rays import Designs
 from mechdesign.analyses.workspace.region import Question, questions
-from mechdesign.analyses.workspace.tables import held_columns, stacked
+from mechdesign.analyses.workspace.tables import PIECE, held_columns, left_out, piece_columns, stacked
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.progress import Progress
 from mechdesign.results import Column, Result, Table
@@ -44,20 +46,39 @@ def reachable(study: Study, progress: Progress) -> Result:
     progress.start(len(asked), "regions")
     rows: list[tuple[Question, float, float, float]] = []
     outlines: list[list[Column]] = []
+    pieces: list[list[Column]] = []
+    warnings: list[str] = []
+    several = False
     for question in asked:
-        designs = RangedDesigns(question.field, {}, 1, question.about)
-        panels = find_panels(designs, question.scan, EFFORT)
+        whole = RangedDesigns(question.field, {}, 1, question.about)
+        panels = find_panels(whole, question.scan, EFFORT)
+        found = Pieces.of(whole, panels, question.scan, EFFORT.samples)
         area = error = box = 0.0
         if panels.closes[0]:
-            integral = integrate(designs, panels, AREA, EFFORT.samples, question.scan, (), np.zeros((0, 1), dtype=bool))
+            designs, part = found.only(0) if question.field.same_assembly else (whole, panels)
+            integral = _integral(designs, part, question)
             area, error = float(integral.area[0]), float(integral.area_error[0])
-            box = float(bounding_box(designs, panels, integral.boundary, EFFORT.samples)[0])
-            found = list(patches(designs, panels, question.rays or RAYS, EFFORT.samples))
-            outlines.append(_outline(study, question, name, designs, found, float(panels.reach[0])))
+            box = float(bounding_box(designs, part, integral.boundary, EFFORT.samples)[0])
+            areas = [area]
+            if found.number[0] > 1:
+                areas = [float(_integral(*piece, question).area[0]) for piece in found.all()]
+            if not over.all:
+                # Of all pieces together; where every value is to be reached single values show too much.
+                error = max(error, float(panels.seen[0]) - sum(areas))
+            shown = patches_of_pieces(found, question.rays or RAYS, EFFORT.samples)
+            outlines.append(_outline(study, question, name, whole, shown, float(panels.reach[0])))
+            drawn = bool(found.drawn[0])
+            pieces.append(piece_columns(study, question, shown, areas, drawn))
+            several |= len(areas) > 1
+            if len(areas) > 1 and question.field.same_assembly:
+                warnings.append(left_out(study, question, areas, drawn))
         rows.append((question, area, error, box))
         progress.update(1)
     if not outlines:
-        raise AssemblyError(f"point {section.point} reaches nothing over the range of {name}")
+        held = "".join(f", {key} = {value:g}" for key, value in asked[0].held.items())
+        raise AssemblyError(
+            f"point {section.point} reaches nothing over the range of {name} from {over.from_:g} to {over.to:g}{held}"
+        )
     square = study.units.label("area")
     with np.errstate(invalid="ignore"):
         use = np.array([area / box if box else np.nan for _, area, _, box in rows])
@@ -74,15 +95,21 @@ def reachable(study: Study, progress: Progress) -> Result:
     ]
     empty = sum(row[1] == 0 for row in rows)
     late = [error / area for _, area, error, _ in rows if error > FINEST_AREA * area]
-    warnings: tuple[str, ...] = ()
+    if several:
+        tables.append(Table("pieces", stacked(pieces), "pieces of the region that do not hang together"))
     if late:
-        warnings = (
+        warnings.append(
             f"the area is known to {max(late):.1g} of itself only (area_error): over the range of {name} the boundary "
-            "is too rough for more",
+            "is too rough for more"
         )
     return Result(
-        "workspace", {table.name: table for table in tables}, warnings, {"regions": len(asked), "empty": empty}
+        "workspace", {table.name: table for table in tables}, tuple(warnings), {"regions": len(asked), "empty": empty}
     )
+
+
+def _integral(designs: Designs, panels: Panels, question: Question) -> Integral:
+    """The area, and the boundary that was met."""
+    return integrate(designs, panels, AREA, EFFORT.samples, question.scan, (), np.zeros((0, 1), dtype=bool))
 
 
 def _questions(study: Study, name: str, over: Over) -> Iterator[Question]:
@@ -115,7 +142,7 @@ def _outline(
     field = question.field
     assert isinstance(field, Endings)
     curves = [
-        (patch.theta, radius, side, margin)
+        (patch.theta, radius, side, margin, patch.piece)
         for side, names in (("inner", ("inner", "enters")), ("outer", ("outer", "leaves")))
         for patch in found
         for radius, margin in [(getattr(patch, names[0]), getattr(patch, names[1]))]
@@ -127,7 +154,7 @@ def _outline(
     value = designs.deciding(theta, radius, reach, EFFORT.samples)
     single = causes(field.sliced)
     told = [*single, *single, *single, *((a, f"{at} and {by}") for a, at in single for _, by in single)]
-    which = [margin for *_, margin in curves]
+    which = [curve[3] for curve in curves]
     kinds = ["limit" if field.labels[k][0] == "limit" else "singularity" for k in which]
     length, coordinate = study.units.label("length"), study.mechanism.coordinate(name)
     shown = np.asarray(in_study_units(study, coordinate, value))
@@ -138,6 +165,9 @@ def _outline(
         Column("kind", np.repeat(kinds, lengths), "", "what ends the region: limit or singularity"),
         Column(name, shown, study.units.label(coordinate.quantity), "value of the range that decides there"),
         Column("at", np.repeat([told[k][1] for k in which], lengths), "", "which limit or singularity"),
-        Column("side", np.repeat([side for _, _, side, _ in curves], lengths), "", "which end of the ray's interval"),
+        Column(
+            "side", np.repeat([side for _, _, side, _, _ in curves], lengths), "", "which end of the ray's interval"
+        ),
         Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth piece of the boundary"),
+        Column("piece", np.repeat([curve[4] for curve in curves], lengths), "", PIECE),
     ]

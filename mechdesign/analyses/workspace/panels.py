@@ -60,6 +60,8 @@ class Panels:
         Whether any ray met the region.
     intervals : ndarray of int, shape (panels,)
         Intervals of a ray inside each panel; 0 where none has been traced there.
+    seen : ndarray, shape (designs,)
+        Area that the raster is sure of: that of its cells inside, less what it is not known to.
     """
 
     design: Ints
@@ -68,6 +70,7 @@ class Panels:
     reach: Floats
     closes: NDArray[np.bool_]
     intervals: Ints
+    seen: Floats
 
 
 def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cuts: tuple[float, ...] = ()) -> Panels:
@@ -126,7 +129,8 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     # Not at half of the panel: by symmetry a single point may divide the ray there.
     usual = np.where(last > first, counts[np.minimum(first + (last - first) // 4, len(angle) - 1)], 0)
     closes = np.bincount(design, counts, count) > 0
-    return Panels(owner[full], low[full], high[full], reach, closes, usual[full])
+    area, doubt = raster.area
+    return Panels(owner[full], low[full], high[full], reach, closes, usual[full], area - doubt)
 
 
 def _scanned(count: int, angles: Floats) -> tuple[Ints, Floats]:

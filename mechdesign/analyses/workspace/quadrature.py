@@ -179,7 +179,7 @@ def _evaluate(
     ray, inner, outer = intervals.ray, intervals.inner, intervals.outer
     area = np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta))
     value = error = np.zeros((len(integrands), len(theta)))
-    looked = np.bincount(design, minlength=designs.count) * float(samples)
+    looked: Floats = samples * np.bincount(design, minlength=designs.count).astype(float)
     if integrands:
         parts = pieces(intervals, reach[design], designs.field.singular)
         at = parts.ray

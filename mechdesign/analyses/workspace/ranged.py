@@ -88,6 +88,16 @@ class Endings(Field):
 class RangedDesigns(Designs):
     """Rays through a region over a range: `field` is of `Endings`, and so are the labels of what rays meet."""
 
+    def inside(self, z: Complex, design: Ints) -> NDArray[np.bool_]:
+        """As `Designs.inside`, by single values of the range."""
+        field = self.field
+        assert isinstance(field, Endings)
+        found = np.full(z.shape, field.every)
+        for value in np.linspace(field.low, field.high, VALUES):
+            at = Designs(field.sliced, {VALUE: np.full(self.count, value)}, self.count, self.about).inside(z, design)
+            found = found & at if field.every else found | at
+        return found
+
     def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
         """As `Designs.traced`."""
         # Nearer to where labels change, rounding chooses them.

@@ -118,20 +118,20 @@ class Raster:
             size = self.inside.shape[1]
             shape = (len(block), size, size)
             kind = np.where(passed, np.where(inside, 1, 2), 0).T.reshape(shape)
-            part = np.zeros(shape, dtype=np.intp)
-            for value in (1, 2):
-                label, _ = ndimage.label(kind == value, PLANE)
-                part[label > 0] = label[label > 0] + part.max()
+            part, other = np.zeros(shape, dtype=np.intp), np.zeros(shape, dtype=np.intp)
+            pieces = ndimage.label(kind == 1, PLANE, output=part)
+            ndimage.label(kind == 2, PLANE, output=other)
+            part[other > 0] = other[other > 0] + pieces
             flat = part.reshape(len(block), -1).T
-            cells, lane = np.nonzero(passed)
-            gap = at[cells, lane]
-            aside = np.minimum(theta[cells, lane] - angle[gap], angle[gap + 1] - theta[cells, lane])
-            order = np.lexsort((-aside, gap, flat[cells, lane]))
-            key = np.stack([flat[cells, lane], gap])[:, order]
+            cells, lanes = np.nonzero(passed)
+            gap = at[cells, lanes]
+            aside = np.minimum(theta[cells, lanes] - angle[gap], angle[gap + 1] - theta[cells, lanes])
+            order = np.lexsort((-aside, gap, flat[cells, lanes]))
+            key = np.stack([flat[cells, lanes], gap])[:, order]
             new = np.append(True, (key[:, 1:] != key[:, :-1]).any(axis=0))
             chosen = order[new]
-            owners.append(block[lane[chosen]])
-            angles.append(theta[cells[chosen], lane[chosen]])
+            owners.append(block[lanes[chosen]])
+            angles.append(theta[cells[chosen], lanes[chosen]])
         return np.concatenate(owners), np.concatenate(angles)
 
     def _centres(self, designs: Ints) -> Iterator[tuple[Ints, Complex]]:

@@ -61,7 +61,7 @@ class Designs:
         """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
         field, places = self.field, self.of(design)
         both = field.plan.iterative or not field.same_assembly
-        good: NDArray[np.bool_] = (field.margins(z, places, assembly=both) > 0).all(axis=0)
+        good = np.asarray((field.margins(z, places, assembly=both) > 0).all(axis=0))
         if not both:
             # Determinants cost as much as all other margins: only where they decide.
             place, lane = np.nonzero(good)
@@ -127,7 +127,7 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
     """
     parts = [
         designs.traced(design[k : k + BLOCK], theta[k : k + BLOCK], reach[k : k + BLOCK], samples, slack)
-        for k in range(0, len(theta), BLOCK)
+        for k in range(0, max(len(theta), 1), BLOCK)
     ]
     if len(parts) == 1:
         return parts[0]

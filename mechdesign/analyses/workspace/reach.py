@@ -37,9 +37,9 @@ def box(designs: Designs) -> tuple[Complex, Complex, NDArray[np.bool_]]:
     for edge, w, d in zip(graph.edges, vectors.w, vectors.d, strict=True):
         least, most = (np.full(count, np.inf * sign) for sign in (-1, 1))
         if edge.slide is not None:
-            for end, bound in zip((least, most), strokes.get(edge.slide, (None, None)), strict=True):
-                if bound is not None:
-                    end[:] = value(bound)
+            for end, term in zip((least, most), strokes.get(edge.slide, (None, None)), strict=True):
+                if term is not None:
+                    end[:] = value(term)
             if edge.slide in graph.telescopic:
                 least = np.maximum(least, 0.0)
         along = np.broadcast_to(np.asarray(w, dtype=complex), (count,))

@@ -26,7 +26,7 @@ from mechdesign.study.workspace_models import Over, WorkspaceSection
 
 # One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it, and
 # looked at more closely where limits of angles may leave thin parts.
-CLOSE, BRISK = Effort(128, 48, 256), Effort(16, 12, 24, 64)
+CLOSE, BRISK = Effort(128, 48, 192), Effort(16, 12, 24, 64)
 SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
 # Rays of the tables of local indices and of the boundary, unless the study says how many.
 RAYS = 181
@@ -187,7 +187,7 @@ def _scan(section: WorkspaceSection, unit: float) -> tuple[float, float]:
     if section.scan.from_ is None or section.scan.to is None:
         return 0.0, 2 * np.pi
     start, stop = section.scan.from_ * unit, section.scan.to * unit
-    return min(start, stop), max(start, stop)
+    return start, min(stop, start + 2 * np.pi)
 
 
 def _problem(study: Study, key: str, message: str) -> StudyError:
@@ -213,7 +213,8 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
             designs, panels = pieces.only(0)
     if not panels.closes.any():
         nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
-        return Answer(nothing, {name: np.zeros(count) for name in question.wanted}, panels, pieces)
+        errors = {name: np.maximum(panels.seen, 0.0) * (name == "area") for name in question.wanted}
+        return Answer(nothing, errors, panels, pieces)
     samples, gauss = effort.samples, question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
     integrands, peaks = _integrands(question), _peaks(question, designs, panels, samples)
@@ -236,8 +237,11 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
         means[some], doubts[some] = integral.mean, integral.mean_error
     else:
         means[some] = _simple(question, designs, panels, samples, finite)
+    # Where all pieces count, the raster tells if one is missing.
+    every = pieces is None or not question.field.same_assembly or pieces.number <= 1
+    missing = np.where(every, panels.seen - integral.area, 0.0)
     values: dict[str, Floats] = {"area": integral.area}
-    errors: dict[str, Floats] = {"area": integral.area_error}
+    errors = {"area": np.maximum(integral.area_error, missing)}
     if {"SUI", "box_area"} & set(question.wanted):
         box = bounding_box(designs, panels, integral.boundary, samples)
         values["box_area"], errors["box_area"] = box, np.zeros(count)

@@ -21,6 +21,23 @@ BESIDE = 1e-12
 PIECE = "piece of the region: 1 is the sketch's, or else the largest"
 
 
+def where(question: Question) -> str:
+    """At which held values, for messages; nothing where none is held."""
+    held = ", ".join(f"{name} = {value:g}" for name, value in question.held.items())
+    return f" at {held}" if held else ""
+
+
+def left_out(study: Study, question: Question, areas: Sequence[float], drawn: bool) -> str:
+    """That the indices are of one piece, and what is left out."""
+    one = "of the piece that holds the sketch" if drawn else "of the largest (the sketch lies in none)"
+    many, unit = len(areas) - 1, study.units.label("area")
+    left = f"{'another' if many == 1 else f'{many} others, together'} of area {sum(areas[1:]):.4g} {unit}".rstrip()
+    return (
+        f"the region{where(question)} has {len(areas)} pieces that do not hang together: indices are {one}; "
+        f"{left} {'is' if many == 1 else 'are'} left out ('assembly: any' counts all)"
+    )
+
+
 def held_columns(study: Study, question: Question, rows: int) -> list[Column]:
     """The held coordinates, the same in each row."""
     return [
