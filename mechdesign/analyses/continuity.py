@@ -23,7 +23,7 @@ Solve = Callable[[Sequence[Array], NDArray[np.intp]], Configuration]
 # An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
 ON_THE_CUT = 1e-9
 # Poses on the way that are solved at once.
-CHUNK = 65536
+AT_ONCE = 65536
 # What an angle may turn between neighbouring poses so that the way round is certain.
 SURE = np.pi / 2
 # What is given moves at most this far between poses before any angle is looked at: an angle, and a length as a part of
@@ -98,8 +98,8 @@ def _on_the_way(
         count = int(number[pending].min())
         at = pending[number[pending] == count]
         left = [pending[number[pending] > count]]
-        for first in range(0, len(at), max(1, CHUNK // (count + 1))):
-            pairs = at[first : first + max(1, CHUNK // (count + 1))]
+        for first in range(0, len(at), max(1, AT_ONCE // (count + 1))):
+            pairs = at[first : first + max(1, AT_ONCE // (count + 1))]
             way = np.linspace(0.0, 1.0, count + 1)
             between = [v[begins[pairs], None] * (1 - way) + v[ends[pairs], None] * way for v in given]
             configuration = solve(between, begins[pairs, None])

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.continuity import CHUNK, continuous
+from mechdesign.analyses.continuity import continuous
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
@@ -22,6 +22,9 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 Array = NDArray[np.float64]
+
+# Poses solved at once: their arrays stay within some megabytes, however long the sweep.
+CHUNK = 65536
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.continuity import CHUNK
 from mechdesign.analyses.kinematics.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, Margins, joints_of
 from mechdesign.analyses.kinematics.probing import Floats, Found, Indices, probe
+from mechdesign.analyses.poses import CHUNK
 from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING

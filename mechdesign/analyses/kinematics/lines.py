@@ -116,6 +116,8 @@ class Line:
         self.study, self.poses = study, poses
         group = poses.groups[0]
         self.plan = study.mechanism.plan(group.names)
+        # Limits that count the turns of angles are judged along the motion; here its ends tell of them.
+        self._limits = not study.mechanism.counting
         self.which = group.names.index(swept)
         self.given = [
             np.asarray(radians(study, c, v), dtype=float)
@@ -131,7 +133,7 @@ class Line:
         if self.plan.iterative:
             own = [values[known] for values in self.given]
             start = starts(study.mechanism, poses, known)
-            self._start = self.plan.solve(own, dimensions(poses, known), start=start)
+            self._start = self.plan.solve(own, dimensions(poses, known), start=start, limits=self._limits)
         some = known[valid[known]]
         self.row, self.position, self.place = some, some.astype(float), self.given[self.which][some]
         parts = [self.sample(some[k : k + CHUNK], self.place[k : k + CHUNK])[:2] for k in range(0, len(some), CHUNK)]
@@ -147,7 +149,7 @@ class Line:
         given = [values[row] for values in self.given]
         given[self.which] = place
         start = None if self._start is None else self._start.take(row - self._first)
-        return self._measured(self.plan.solve(given, dimensions(self.poses, row), start=start))
+        return self._measured(self.plan.solve(given, dimensions(self.poses, row), start=start, limits=self._limits))
 
     def align(self, leaf: int, known: Floats) -> None:
         """Bring an angle to the branch that it has over the poses of the sweep, shape (poses,)."""
