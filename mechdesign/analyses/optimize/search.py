@@ -17,9 +17,9 @@ from mechdesign.analyses.optimize.descent import LADDER, ROUGH, descend
 from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Objective, Spent
 from mechdesign.analyses.workspace.rays import Floats
 
-# Evaluations of a start, a row of weights and a variable and one more; where the study does not say how many, and where
-# each evaluation takes long.
-START, STARTS, SLOW_START, MOST_STARTS = 600, 3, 60, 12
+# Evaluations a row of weights and a variable and one more: of a start at least, of a search where the study says none,
+# and of one whose every evaluation takes long (there also for both ends of each goal).
+START, USUAL, SLOW_START, MOST_STARTS = 500, 1800, 60, 12
 # Points of a start's first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
 SAMPLE, MOST_VERTICES = 16, 4
 # The least part of a start's evaluations that its sample takes.
@@ -29,13 +29,13 @@ POPULATION, SMALLEST_POPULATION, PATIENCE, ROUGH_PATIENCE = 8, 24, 8, 3
 EVOLUTION = 0.5
 # An improvement below this fraction of the objective's range is left to the descents.
 ENOUGH = 1e-3
-# Descents at once; how far apart they begin, in parts of the ranges, and how much worse than the best, of all merits.
+# Descents at once, and how far apart they begin, in parts of the ranges.
 ABREAST, APART = 6, 0.05
 # Evaluations of a descent, in those of its slopes.
 DESCENT = 40
 ROUNDS, MOST_ROUNDS = 2, 1000
 # Steps that may not improve the optimum, in parts of the ranges; evaluations kept for that, in those of slopes.
-CHECKED, MOST_CHECKS, CHECKS = 1e-4, 12, 200
+CHECKED, MOST_CHECKS, CHECKS, SQUARES_CHECKS = 1e-4, 12, 40, 200
 # Improvements below these parts of the objective, and of all its values, are rounding; of values known to a tolerance.
 ROUNDING, OF_ALL, NOISE = 1e-9, 1e-10, 1e-5
 # A descent that gains more than this part of the objective has not come to its end.
@@ -65,7 +65,7 @@ def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
     """Evaluations of a search where the study says none."""
     if slow:
         return SLOW_START * (dimensions + 1) * (rows + 2 * goals)
-    return STARTS * START * (dimensions + 1) * rows
+    return USUAL * (dimensions + 1) * rows
 
 
 def search(
@@ -85,7 +85,9 @@ def search(
     rng = np.random.default_rng(seed)
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
     starts = int(np.clip(budget // (START * (explorer.dimensions + 1) * len(rows)), 1, MOST_STARTS))
-    last = min(budget // 4, CHECKS * slope * len(rows))
+    # The valleys of a root mean square are the narrowest.
+    checks = SQUARES_CHECKS if any(part.squares for part in explorer.parts) else CHECKS
+    last = min(budget // 4, checks * slope * len(rows))
     begins = []
     for k, own in enumerate(rng.spawn(starts)):
         begins.append(budget - explorer.left)
