@@ -84,14 +84,16 @@ def _one_unit(table: Table, column: str, counts: NDArray[np.bool_]) -> None:
     units = np.asarray(table["unit"])[counts]
     if len(set(units.tolist())) < 2:
         return
-    words = next(each for each in table.columns if each.values.dtype.kind not in "fiub")
-    rows = list(
-        dict.fromkeys(f"{name} ({unit or 'no unit'})" for name, unit in zip(words.values[counts], units, strict=True))
-    )
+    named = [each for each in table.columns if each.values.dtype.kind not in "fiub" and each.name != "unit"]
+    pairs = {each.name: dict.fromkeys(zip(each.values[counts].tolist(), units.tolist(), strict=True)) for each in named}
+    # The words that tell the rows of one unit from those of another.
+    telling = [name for name, found in pairs.items() if len({word for word, _ in found}) == len(found)]
+    words = telling[0] if telling else named[0].name
+    rows = [f"{word} ({unit or 'no unit'})" for word, unit in pairs[words]]
     told = ", ".join(rows[:MOST_ROWS]) + ", ..." * (len(rows) > MOST_ROWS)
     raise UnknownColumnError(
         f"the rows of {table.name} whose {column} is judged have several units: {told}; say which of them count by "
-        f"'where', e.g. where: {{{words.name}: {words.values[counts][0]}}}"
+        f"'where', e.g. where: {{{words}: {next(iter(pairs[words]))[0]}}}"
     )
 
 

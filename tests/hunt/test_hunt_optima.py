@@ -96,6 +96,7 @@ optimize:
   minimize: kinematics.S.x
 """)
         near, far = np.abs(points).min(), np.abs(points).max()
+
         # A linear programme: far <= r1 + r2, |r1 - r2| <= near.
         def room(r, near=near, far=far):
             return [r.sum() - far, near - r[0] + r[1], near - r[1] + r[0]]

@@ -9,7 +9,7 @@ over steps, evaluated in one batch.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ Integers = NDArray[np.intp]
 LADDER = ((1e-4, 0.3), (1e-5, 0.03))
 # Where values are known to a tolerance, differences over less than this are noise.
 ROUGH = ((1e-2, 0.3), (1e-3, 0.05))
-SQUARES_STEP, MOST_SQUARES, MOST_STEPS = 1e-5, 60, 60
+SQUARES_STEP, MOST_SQUARES, MOST_FINAL_SQUARES, MOST_STEPS = 1e-5, 60, 150, 60
 # Gains of a step, in parts of what a range changes, below which a descent ends.
 ENOUGH, ROUGH_ENOUGH = 1e-14, 1e-5
 # How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
@@ -37,8 +37,9 @@ TINY = float(np.finfo(float).tiny)
 
 
 def descend(
-    explorer: Explorer, descents: Sequence[tuple[Objective, int]], ladder: Sequence[tuple[float, float]] = LADDER
-) -> list[int]:
+    explorer: Explorer, descents: Sequence[tuple[Objective, int]], ladder: Sequence[tuple[float, float]] = LADDER,
+    *, final: bool = False,
+) -> list[int]:  # fmt: skip
     """Descend from known points, all at once: a batch of designs costs little more than one.
 
     Parameters
@@ -47,6 +48,8 @@ def descend(
         What is made small, and the row of `explorer.known` from which.
     ladder : sequence of (float, float)
         Steps of differences and half the widths of boxes.
+    final : bool
+        Whether they begin near their ends.
 
     Returns
     -------
@@ -58,7 +61,7 @@ def descend(
     Spent
         If the evaluations are used up.
     """
-    running = [_Descent(explorer, objective, row, ladder) for objective, row in descents]
+    running = [_Descent(explorer, objective, row, ladder, final) for objective, row in descents]
     side_by_side(explorer, [each.run for each in running])
     return [each.best for each in running]
 
@@ -67,9 +70,9 @@ class _Descent:
     """One descent: the best row so far, and the smooth parts of which its objective consists."""
 
     def __init__(
-        self, explorer: Explorer, objective: Objective, row: int, ladder: Sequence[tuple[float, float]]
+        self, explorer: Explorer, objective: Objective, row: int, ladder: Sequence[tuple[float, float]], final: bool
     ) -> None:
-        self.explorer, self.objective, self.best, self.ladder = explorer, objective, row, ladder
+        self.explorer, self.objective, self.best, self.ladder, self.final = explorer, objective, row, ladder, final
         self.plain, known = objective.factors.copy(), explorer.known
         goals = len(self.plain)
         self.edged, self.held, self.squares = [], [], []
@@ -87,12 +90,16 @@ class _Descent:
             elif objective.factors[part.column] * part.sign > 0 and np.isfinite(known.rows[row, part.place]).all():
                 self.edged.append((part, abs(objective.factors[part.column])))
                 self.plain[part.column] = 0.0
+        # A root mean square alone is as low where its square is, which is the smoother.
+        self.bend = 0.0
+        self.squared = len(self.squares) == np.count_nonzero(objective.factors) == 1
 
     def run(self, ask: Ask) -> None:
         if not self.explorer.known.valid[self.best]:
             return
-        if len(self.squares) == np.count_nonzero(self.objective.factors) == 1:
-            self._least_squares(ask)
+        if self.squared:
+            # Far from the optimum the one, along a narrow valley onto bounds the other is the quicker.
+            self._least_squares(ask, "dogbox" if self.final else "trf")
         for step, width in self.ladder:
             self._programming(ask, step, width)
 
@@ -113,9 +120,10 @@ class _Descent:
         pieces = [part.pieces(lines) * factor for part, factor in self.edged]
         limits = [-known.margins[rows][:, self.conditions], *(part.pieces(lines) for part in self.held)]
         plain = known.values[rows] @ self.plain if self.plain.any() else np.zeros(len(rows))
+        plain = plain**2 if self.squared else plain
         return plain[:, None], np.concatenate([none, *pieces], axis=1), np.concatenate(limits, axis=1)
 
-    def _least_squares(self, ask: Ask) -> None:
+    def _least_squares(self, ask: Ask, method: Literal["trf", "dogbox"]) -> None:
         from scipy.optimize import least_squares
 
         (part,) = self.squares
@@ -130,16 +138,11 @@ class _Descent:
 
         begin = self.explorer.known.u[self.best]
         if np.isfinite(residuals(begin)).all():
+            most = MOST_FINAL_SQUARES if self.final else MOST_SQUARES
             least_squares(
-                residuals,
-                begin,
-                jac=slopes,
-                bounds=(0.0, 1.0),
-                max_nfev=MOST_SQUARES,
-                xtol=1e-12,
-                ftol=1e-12,
-                gtol=None,
-            )
+                residuals, begin, jac=slopes, bounds=(0.0, 1.0), method=method, max_nfev=most,
+                xtol=1e-14, ftol=1e-14, gtol=None,
+            )  # fmt: skip
 
     def _stencil(self, ask: Ask, u: Floats, step: float) -> tuple[Floats, Integers]:
         """A point, and those a step from it along each variable, inside the cube."""
@@ -188,6 +191,12 @@ class _Descent:
         """The terms at a point, and their slopes, each of shape (columns, n)."""
         points, rows = self._stencil(ask, u, step)
         found = self.terms(rows)
+        if self.squared:
+            # Near the bottom of a valley slopes are no measure, but how it bends is.
+            n, plain = len(u), found[0][:, 0]
+            inside = np.abs(points[n + 1 :] - points[1 : n + 1]).max(axis=1) > 1.5 * step
+            bends = np.abs(plain[1 : n + 1] + plain[n + 1 :] - 2 * plain[0])[inside] / step**2
+            self.bend = max(self.bend, float(np.nan_to_num(bends).max(initial=0.0)))
         return [part[0] for part in found], [np.nan_to_num(_differences(points, u, part)) for part in found]
 
 
@@ -201,7 +210,7 @@ class _Program:
     def __init__(self, descent: _Descent, ask: Ask, begin: Floats, step: float) -> None:
         self._descent, self._ask, self._step = descent, ask, step
         values, slopes = descent.linear(ask, begin, step)
-        scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), TINY)
+        scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), descent.bend, TINY)
         steepest = np.abs(slopes[2]).max(axis=1, initial=0.0)
         self.lengths = np.maximum(steepest, np.maximum(FLAT * np.abs(np.nan_to_num(values[2])), TINY))
         self._scales = [np.array([scale]), np.full(len(values[1]), scale), self.lengths]

@@ -17,9 +17,9 @@ from mechdesign.analyses.optimize.descent import LADDER, ROUGH, descend
 from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Objective, Spent
 from mechdesign.analyses.workspace.rays import Floats
 
-# Evaluations of a start, a row of weights and a variable and one more; where the study does not say how many, and where
-# each evaluation takes long.
-START, STARTS, SLOW_START, MOST_STARTS = 500, 3, 60, 12
+# Evaluations a row of weights and a variable and one more: of a start at least, of a search where the study says none,
+# and of one whose every evaluation takes long (there also for both ends of each goal).
+START, USUAL, SLOW_START, MOST_STARTS = 500, 1800, 60, 12
 # Points of a start's first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
 SAMPLE, MOST_VERTICES = 16, 4
 # The least part of a start's evaluations that its sample takes.
@@ -29,15 +29,17 @@ POPULATION, SMALLEST_POPULATION, PATIENCE, ROUGH_PATIENCE = 8, 24, 8, 3
 EVOLUTION = 0.5
 # An improvement below this fraction of the objective's range is left to the descents.
 ENOUGH = 1e-3
-# Descents at once; how far apart they begin, in parts of the ranges, and how much worse than the best, of all merits.
+# Descents at once, and how far apart they begin, in parts of the ranges.
 ABREAST, APART = 6, 0.05
 # Evaluations of a descent, in those of its slopes.
-DESCENT = 20
+DESCENT = 40
 ROUNDS, MOST_ROUNDS = 2, 1000
 # Steps that may not improve the optimum, in parts of the ranges; evaluations kept for that, in those of slopes.
-CHECKED, MOST_CHECKS, CHECKS = 1e-4, 12, 30
+CHECKED, MOST_CHECKS, CHECKS, SQUARES_CHECKS = 1e-4, 12, 40, 200
 # Improvements below these parts of the objective, and of all its values, are rounding; of values known to a tolerance.
 ROUNDING, OF_ALL, NOISE = 1e-9, 1e-10, 1e-5
+# A descent that gains more than this part of the objective has not come to its end.
+STILL = 1e-6
 # Starts that end within this part of the best agree.
 AGREE = 0.01
 
@@ -49,7 +51,7 @@ class Ending:
     Parameters
     ----------
     checked : bool
-        Whether the evaluations were enough for descents, and no small step improves any optimum.
+        Whether a descent from each optimum came to its end, and no small step improves it.
     ends : list of ndarray
         For each row of weights the objective's smallest value of every start, in the goal's own units where it weighs
         one; nan where a start found no feasible point.
@@ -63,7 +65,7 @@ def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
     """Evaluations of a search where the study says none."""
     if slow:
         return SLOW_START * (dimensions + 1) * (rows + 2 * goals)
-    return STARTS * START * (dimensions + 1) * rows
+    return USUAL * (dimensions + 1) * rows
 
 
 def search(
@@ -83,12 +85,14 @@ def search(
     rng = np.random.default_rng(seed)
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
     starts = int(np.clip(budget // (START * (explorer.dimensions + 1) * len(rows)), 1, MOST_STARTS))
-    last = min(budget // 4, CHECKS * slope * len(rows))
-    begins, whole = [], False
+    # The valleys of a root mean square are the narrowest.
+    checks = SQUARES_CHECKS if any(part.squares for part in explorer.parts) else CHECKS
+    last = min(budget // 4, checks * slope * len(rows))
+    begins = []
     for k, own in enumerate(rng.spawn(starts)):
         begins.append(budget - explorer.left)
         explorer.reserve = last + (budget - last) * (starts - 1 - k) // starts
-        whole |= _start(explorer, smallest, rows, own, begins[-1], patient)
+        _start(explorer, smallest, rows, own, begins[-1], patient)
         known, done = explorer.known, [*begins, budget - explorer.left]
         if not known.feasible.any():
             # Too few for anything but to look around.
@@ -102,7 +106,7 @@ def search(
     explorer.reserve = 0
     try:
         confirmed = [_confirmed(explorer, _weighted(explorer.known, smallest, row), rng) for row in rows]
-        checked = whole and all(confirmed)
+        checked = all(confirmed)
     except Spent:
         checked = False
     known = explorer.known
@@ -116,20 +120,15 @@ def _start(
     rng: np.random.Generator,
     begin: int,
     patient: bool,
-) -> bool:
+) -> None:
     """Search from points of its own until the evaluations of this start are used up, or after `ROUNDS` of descents.
 
     Parameters
     ----------
     begin : int
         First row of `explorer.known` that belongs to this start.
-
-    Returns
-    -------
-    bool
-        Whether the evaluations were enough for descents to come to their end.
     """
-    n, allowed, whole = explorer.dimensions, explorer.left - explorer.reserve, False
+    n, allowed = explorer.dimensions, explorer.left - explorer.reserve
     ladder = ROUGH if explorer.rough else LADDER
     tried: list[list[int]] = [[] for _ in rows]
     try:
@@ -148,14 +147,12 @@ def _start(
                 found += [(objective, k) for k in promising]
             if found:
                 ends = descend(explorer, found, ladder)
-                whole = True
                 for (_, k), end in zip(found, ends, strict=True):
                     next(done for done in tried if k in done).append(end)
             if len(found) < len(rows) * ABREAST:
                 explorer(rng.random((SAMPLE, n)))
     except Spent:
         pass
-    return whole
 
 
 def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Generator, allowed: int) -> None:
@@ -184,20 +181,23 @@ def _apart(known: Known, objective: Objective, tried: Sequence[int], begin: int,
 def _confirmed(explorer: Explorer, objective: Objective, rng: np.random.Generator) -> bool:
     """Whether no small step improves the best point any more; descends from where one does."""
     n = explorer.dimensions
-    ladder = (ROUGH if explorer.rough else LADDER)[-1:]
+    ladder: Sequence[tuple[float, float]] = ROUGH if explorer.rough else LADDER
+    start = int(np.argmin(explorer.known.merit(objective)))
     for _ in range(MOST_CHECKS):
+        if not explorer.known.feasible[start]:
+            return False
+        before = explorer.known.merit(objective)[start]
+        descend(explorer, [(objective, start)], ladder, final=True)
         merit = explorer.known.merit(objective)
         best = int(np.argmin(merit))
-        if not explorer.known.feasible[best]:
-            return False
-        steps = np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (2 * n, n))])
+        steps = np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (4 * n, n))])
         explorer(explorer.known.u[best] + CHECKED * steps)
         merit = explorer.known.merit(objective)
-        better = int(np.argmin(merit))
-        all_ = float(np.ptp(merit[explorer.known.feasible]))
-        if merit[best] - merit[better] <= (NOISE if explorer.rough else ROUNDING) * abs(merit[best]) + OF_ALL * all_:
+        start, all_ = int(np.argmin(merit)), float(np.ptp(merit[explorer.known.feasible]))
+        little = (NOISE if explorer.rough else ROUNDING) * abs(merit[best]) + OF_ALL * all_
+        if merit[best] - merit[start] <= little and before - merit[best] <= max(STILL * abs(merit[best]), little):
             return True
-        descend(explorer, [(objective, better)], ladder)
+        ladder = ladder[-1:]
     return False
 
 
