@@ -37,7 +37,7 @@ def extremes(text: str, *changes: str) -> dict[str, dict[str, float]]:
 
 
 def by_name(table: Table) -> dict[str, dict[str, float]]:
-    names = [name for name in table.names if name != "output"]
+    names = [name for name in table.names if name not in ("output", "unit")]
     return {str(output): {name: float(table[name][k]) for name in names} for k, output in enumerate(table["output"])}
 
 

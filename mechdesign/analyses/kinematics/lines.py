@@ -9,10 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.continuity import CHUNK
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.rates import drive_velocities
-from mechdesign.analyses.poses import dimensions, radians, starts
+from mechdesign.analyses.poses import CHUNK, dimensions, radians, starts
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet, wrap
 from mechdesign.mechanism.coordinates import Coordinate
