@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.curves import Curves
-from mechdesign.analyses.kinematics.lines import Indices, Line, windows
+from mechdesign.analyses.kinematics.lines import Indices, Line
 from mechdesign.analyses.kinematics.peaks import STILL, Curve, Peak, peaks, searched
 from mechdesign.analyses.kinematics.targets import Error
 from mechdesign.analyses.poses import in_study_units
@@ -144,26 +144,23 @@ class _Between:
             Which move; those found to move are added.
         """
         study, poses, count = self.study, self.poses, len(self.outputs)
-        torn = np.zeros(poses.designs, dtype=bool)
         mine: Indices = np.flatnonzero(some[:count])
         wrong = bool(some[count:].any())
         watched = [study.mechanism.coordinate(name) for name in (targets.needed(study, poses) if wrong else ())]
         curves = Curves([*(self.outputs[k] for k in mine.tolist()), *watched], study.units.angle_factor)
         still = STILL * self._sizes(found)
-        for rows in windows(poses):
-            line = Line(study, poses, self.swept, self.valid, curves.leaves, self.ends, rows)
-            for k, name in enumerate(curves.names):
-                known = self.arrays.get(name, poses.groups[0].values.get(name))
-                if curves.leaves[k].turning and known is not None:
-                    line.align(k, known * study.units.angle_factor)
-            for end, peak in enumerate(peaks(line, curves.curves[: len(mine)], still[mine])):
-                self._take(peak, 1 - 2 * end, still, found[end], index[end], moving, mine)
-            for end, sign in enumerate((1, -1) if wrong else ()):
-                peak = self._of_errors(line, curves.curves[len(mine) :], watched, sign, still[count:])
-                every = np.arange(count, len(some))
-                self._take(peak, sign, still, found[end], index[end], moving, every, rough=True)
-            torn |= line.torn
-        return torn
+        line = Line(study, poses, self.swept, self.valid, curves.leaves, self.ends)
+        for k, name in enumerate(curves.names):
+            known = self.arrays.get(name, poses.groups[0].values.get(name))
+            if curves.leaves[k].turning and known is not None:
+                line.align(k, known * study.units.angle_factor)
+        for end, peak in enumerate(peaks(line, curves.curves[: len(mine)], still[mine])):
+            self._take(peak, 1 - 2 * end, still, found[end], index[end], moving, mine)
+        for end, sign in enumerate((1, -1) if wrong else ()):
+            peak = self._of_errors(line, curves.curves[len(mine) :], watched, sign, still[count:])
+            every = np.arange(count, len(some))
+            self._take(peak, sign, still, found[end], index[end], moving, every, rough=True)
+        return line.torn
 
     def _sizes(self, found: Array) -> Array:
         """Sizes that rounding is judged by, shape (names, designs)."""

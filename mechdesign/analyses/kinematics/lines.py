@@ -36,6 +36,9 @@ ROUNDS = 14
 GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
 # A limit this near to a pose of the sweep, in rows, is that pose.
 AT_ROW = 1e-9
+# Poses of a design's sweep that a line begins with, about: of a finer sweep some are left out. Where links turn too far
+# between those taken, poses come between them again.
+ENOUGH = 4096
 
 
 @dataclass(frozen=True)
@@ -75,26 +78,17 @@ def _frames(mechanism: Mechanism) -> list[Leaf]:
     return [frame(k) for k in range(1, mechanism.graph.classes)]
 
 
-def windows(poses: Poses) -> list[slice]:
-    """Parts of a long sweep that are looked at one after another, each from the last pose of the one before."""
-    if poses.designs > 1:
-        return [slice(None)]
-    return [slice(first, first + CHUNK + 1) for first in range(0, max(poses.count - 1, 1), CHUNK)]
-
-
 class Line:
     """Poses along the sweep of one coordinate, of one design or several, and the segments between them.
 
-    Poses are those of the sweep, the limits of motion, and as many between them as the turning of the links and the
-    smoothness of the leaves need.
+    Poses are those of the sweep (of a very fine one, some), the limits of motion, and as many between them as the
+    turning of the links and the smoothness of the leaves need.
 
     Parameters
     ----------
     valid : bool array, shape (poses,)
     ends : sequence of Boundary
         Limits of motion, of a single design.
-    rows : slice
-        Poses of the sweep that are looked at.
 
     Attributes
     ----------
@@ -110,7 +104,7 @@ class Line:
 
     def __init__(
         self, study: Study, poses: Poses, swept: str, valid: NDArray[np.bool_], leaves: Sequence[Leaf],
-        ends: Sequence[Boundary] = (), rows: slice | None = None,
+        ends: Sequence[Boundary] = (),
     ) -> None:  # fmt: skip
         self.study, self.poses = study, poses
         group = poses.groups[0]
@@ -127,19 +121,20 @@ class Line:
         self._own = len(leaves)
         self._leaves = [*leaves, *_frames(study.mechanism)]
         self.turning = np.array([leaf.turning for leaf in self._leaves])
-        known = np.arange(poses.count)[rows if rows is not None else slice(None)]
-        self._first, self._start = int(known[0]) if len(known) else 0, None
-        if self.plan.iterative:
-            own = [values[known] for values in self.given]
-            start = starts(study.mechanism, poses, known)
-            self._start = self.plan.solve(own, dimensions(poses, known), start=start, limits=self._limits)
-        some = known[valid[known]]
+        inside = [end for end in ends if 0 < end.position < poses.count - 1]
+        inside = [end for end in inside if abs(end.position - round(end.position)) > AT_ROW]
+        some = self._taken(valid, [int(end.position) for end in inside])
+        self._start: Configuration | None = None
+        if self.plan.iterative and len(some):
+            own = [values[some] for values in self.given]
+            start = starts(study.mechanism, poses, some)
+            self._start = self.plan.solve(own, dimensions(poses, some), start=start, limits=self._limits)
+        self._rows = some
         self.row, self.position, self.place = some, some.astype(float), self.given[self.which][some]
         parts = [self.sample(some[k : k + CHUNK], self.place[k : k + CHUNK])[:2] for k in range(0, len(some), CHUNK)]
         none = np.zeros((len(self._leaves), 0))
         self.values, self.slopes = (np.concatenate([none, *(part[k] for part in parts)], axis=1) for k in (0, 1))
-        self._rows = len(some)
-        self.begin, self.end = self._segments(known, valid, ends)
+        self.begin, self.end = self._segments(valid, inside)
         self._refine()
         self._unwrap()
 
@@ -147,15 +142,18 @@ class Line:
         """Values and slopes of all leaves with the swept coordinate at `place`, everything else as in poses `row`."""
         given = [values[row] for values in self.given]
         given[self.which] = place
-        start = None if self._start is None else self._start.take(row - self._first)
+        start = None
+        if self._start is not None:
+            start = self._start.take(np.minimum(np.searchsorted(self._rows, row), len(self._rows) - 1))
         return self._measured(self.plan.solve(given, dimensions(self.poses, row), start=start, limits=self._limits))
 
     def align(self, leaf: int, known: Floats) -> None:
         """Bring an angle to the branch that it has over the poses of the sweep, shape (poses,)."""
-        own = self.values[leaf][: self._rows]
-        beside = np.clip(np.searchsorted(self.row[: self._rows], self.row), 0, max(self._rows - 1, 0))
-        if self._rows:
-            shift = np.round((known[self.row[: self._rows]] - own) / (2 * np.pi))
+        count = len(self._rows)
+        own = self.values[leaf][:count]
+        beside = np.clip(np.searchsorted(self._rows, self.row), 0, max(count - 1, 0))
+        if count:
+            shift = np.round((known[self._rows] - own) / (2 * np.pi))
             self.values[leaf] = self.values[leaf] + 2 * np.pi * np.nan_to_num(shift)[beside]
 
     def near(self, values: Floats, node: Indices) -> Floats:
@@ -188,23 +186,33 @@ class Line:
         self.slopes = np.concatenate([self.slopes, slopes], axis=1)
         return index
 
-    def _segments(
-        self, known: Indices, valid: NDArray[np.bool_], ends: Sequence[Boundary]
-    ) -> tuple[Indices, Indices]:  # fmt: skip
+    def _taken(self, valid: NDArray[np.bool_], steps: Sequence[int]) -> Indices:
+        """Valid poses of the sweep that the line begins with: its ends, those beside its limits, and some between."""
+        at = np.arange(len(valid)) % self.each
+        taken = at % -(-self.each // ENOUGH) == 0
+        taken[self.each - 1 :: self.each] = True
+        # Beside a pose that fails the motion ends.
+        taken[1:] |= ~valid[:-1]
+        taken[:-1] |= ~valid[1:]
+        for step in steps:
+            taken[step : step + 2] = True
+        return np.flatnonzero(taken & valid)
+
+    def _segments(self, valid: NDArray[np.bool_], inside: Sequence[Boundary]) -> tuple[Indices, Indices]:
         """Pairs of poses between which the motion goes on: of the sweep, and its limits."""
         node = np.full(self.poses.count, -1)
-        node[self.row] = np.arange(len(self.row))
-        first = known[:-1]
-        both = valid[first] & valid[first + 1] & ((first + 1) % self.each != 0)
-        if self.poses.designs > 1 and len(first):
+        node[self._rows] = np.arange(len(self._rows))
+        one, other = self._rows[:-1], self._rows[1:]
+        # Poses that fail before each row: as many before both ends of a pair where all between them are valid.
+        failed = np.cumsum(~valid)
+        plain = (failed[one] == failed[other]) & (one // self.each == other // self.each)
+        if self.poses.designs > 1:
             # Whether one pose fails where its neighbour does not: the limit between them is not known.
-            edge = (valid[first] != valid[first + 1]) & ((first + 1) % self.each != 0)
-            self.torn[np.unique(first[edge] // self.each)] = True
-        inside = [end for end in ends if end.position > known[0] and end.position < known[-1]] if len(known) else []
-        inside = [end for end in inside if abs(end.position - round(end.position)) > AT_ROW]
+            edge = np.flatnonzero(valid[:-1] != valid[1:])
+            self.torn[np.unique(edge[(edge + 1) % self.each != 0] // self.each)] = True
         steps = sorted({int(end.position) for end in inside})
-        plain = first[both & ~np.isin(first, steps)]
-        pairs = [np.stack([node[plain], node[plain + 1]])]
+        plain &= ~np.isin(one, steps)
+        pairs = [np.stack([node[one[plain]], node[other[plain]]])]
         for step in steps:
             pairs += self._divided(step, node, [end for end in inside if int(end.position) == step])
         begin, end = np.concatenate(pairs, axis=1)

@@ -70,7 +70,7 @@ class Margins:
         ]
         self.at: Floats = columns[self.which]
         self.held = [float(column[0]) for column in columns]
-        self.near = {name: values for name, values in near.items() if name not in poses.names}
+        self.near = {name: self._known(values) for name, values in near.items() if name not in poses.names}
         self.counted = counted
         graph, structure = self.mechanism.graph, self.plan.structure
         known = {slide for slide, _ in structure.known_slides}
@@ -100,7 +100,7 @@ class Margins:
         given: list[Value] = list(self.held)
         given[self.which] = place
         found = self.plan.solve(given, start=start, limits=False)
-        near = {name: self._between(values, place) for name, values in self.near.items()}
+        near = {name: np.asarray(np.interp(place, *known)) for name, known in self.near.items()}
         if self.counted:
             found = replace(found, near={**found.near, **near}, counted=found.counted | near.keys())
         else:
@@ -109,12 +109,11 @@ class Margins:
             self.plan.judge(found)
         return found
 
-    def _between(self, values: Floats, place: Floats) -> Floats:
+    def _known(self, values: Floats) -> tuple[Floats, Floats]:
+        """Swept coordinate, rising, and the values of poses that have one; nan where none has."""
         known = np.flatnonzero(np.isfinite(values))
         known = known[np.argsort(self.at[known], kind="stable")]
-        if not len(known):
-            return np.full(place.shape, np.nan)
-        return np.asarray(np.interp(place, self.at[known], values[known]))
+        return (self.at[known], values[known]) if len(known) else (np.zeros(1), np.full(1, np.nan))
 
     def start(self, place: Floats) -> Configuration | None:
         """Poses that groups without a closed form may be continued from; None where every group has one."""

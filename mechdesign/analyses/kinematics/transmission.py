@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.lines import Floats, Leaf, Line, windows
+from mechdesign.analyses.kinematics.lines import Floats, Leaf, Line
 from mechdesign.analyses.kinematics.peaks import Curve, peaks
 from mechdesign.analyses.poses import solve_poses
 from mechdesign.mechanism import Configuration
@@ -93,22 +93,16 @@ def transmission_extremes(
     leaves = [leaf for loop in loops for leaf in _leaves_of(loop)]
     squares = [_leaf(2 * k) for k in range(len(loops))]
     angles = [_leaf(2 * k + 1) for k in range(len(loops))]
-    found, torn = [], np.zeros(poses.designs, dtype=bool)
-    for rows in windows(poses):
-        line = Line(study, poses, swept, valid, leaves, ends, rows)
-        shape = (len(loops), poses.designs)
-        found.append(peaks(line, squares, np.full(shape, BEYOND), angles))
-        torn |= line.torn
+    line = Line(study, poses, swept, valid, leaves, ends)
     both = []
-    for k, sign in enumerate((1, -1)):
-        values = np.stack([part[k].value for part in found])
-        places = np.stack([part[k].place for part in found])
-        best = np.where(np.isnan(values), np.inf, values).argmin(axis=0)[None]
-        value, place = (sign_ * np.take_along_axis(x, best, axis=0)[0] for sign_, x in ((sign, values), (1, places)))
+    for peak, sign in zip(
+        peaks(line, squares, np.full((len(loops), poses.designs), BEYOND), angles), (1, -1), strict=True
+    ):
+        value, place = sign * peak.value, peak.place
         for whole in (0.0, np.pi / 2):
             value = np.where(np.abs(value - whole) <= SQUARE, whole, value)
         both.append((value, place))
-    return both, torn
+    return both, line.torn
 
 
 def _leaves_of(loop: FourBar) -> list[Leaf]:
