@@ -26,7 +26,8 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
             study = load_study(path, options)
             label = study_label(study)
             if not options.quiet:
-                terminal.emit("\n".join([f"{label}: {study.name}", describe(study.mechanism), *in_words(study), ""]))
+                clearances = in_words(study.reliability, study.mechanism.graph)
+                terminal.emit("\n".join([f"{label}: {study.name}", describe(study.mechanism), *clearances, ""]))
             for warning in study.warnings:
                 terminal.say(f"warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS)

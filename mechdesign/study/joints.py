@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from mechdesign.mechanism.model import Fixed, Line, Prismatic, Slot
 from mechdesign.mechanism.model import Joint as JointModel
 from mechdesign.mechanism.model import Link as LinkModel
 from mechdesign.study import models
+from mechdesign.study.builder import Builder
 from mechdesign.study.document import Path
 from mechdesign.study.names import GROUND
 from mechdesign.study.numbers import suggestion
-
-if TYPE_CHECKING:
-    from mechdesign.study.build import Builder
 
 
 def build(builder: Builder) -> dict[str, JointModel]:

@@ -20,7 +20,8 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
 from mechdesign.study import checks, overrides, pose_checks, poses
-from mechdesign.study.build import Builder
+from mechdesign.study.build import build
+from mechdesign.study.builder import Builder
 from mechdesign.study.document import Document, plain, read
 from mechdesign.study.models import MechanismSection, UnitsSection
 from mechdesign.study.numbers import LOST, Context, check_parameter_name, read_number, shown
@@ -196,7 +197,7 @@ def load_document(
         reporter.done()
     assert section is not None
     builder = Builder(section, context.units, context.parameters, reporter)
-    description = builder.build()
+    description = build(builder)
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)

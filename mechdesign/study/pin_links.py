@@ -7,15 +7,12 @@ name its link, ``coupler.P.x``, and then the pin moves in another one.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+from mechdesign.mechanism.graph import Graph
+from mechdesign.study.checker import Checker
 from mechdesign.study.document import Path
 from mechdesign.study.names import Names
 from mechdesign.study.reliability_models import SUFFIXES, ReliabilitySection
-
-if TYPE_CHECKING:
-    from mechdesign.study.checks import Checker
-    from mechdesign.study.loading import Study
 
 
 def split_link(names: Names, name: str) -> tuple[str, str]:
@@ -75,20 +72,19 @@ def carrier(links: list[str], meant: str | None) -> str:
     return ([link for link in links if link != meant] or links)[-1]
 
 
-def others(study: Study) -> Mapping[str, tuple[str, list[str]]]:
+def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tuple[str, list[str]]]:
     """Of each point with a clearance the link that its pin moves in, and those whose point its coordinates are."""
-    section = study.reliability
     found: dict[str, tuple[str, list[str]]] = {}
     for point, clearance in (section.clearances if section is not None else {}).items():
-        links = [body.removesuffix(":rod") for body, name in study.mechanism.graph.points if name == point]
+        links = [body.removesuffix(":rod") for body, name in graph.points if name == point]
         found[point] = clearance.link or "", [link for link in dict.fromkeys(links) if link != clearance.link]
     return found
 
 
-def in_words(study: Study) -> list[str]:
+def in_words(section: ReliabilitySection | None, graph: Graph) -> list[str]:
     """One line for each clearance."""
     return [
         f"clearance: the pin {point} moves in {link}; {point}.x and {point}.y are those of "
         f"{' and '.join(rest) or 'the joint'}"
-        for point, (link, rest) in others(study).items()
+        for point, (link, rest) in others(section, graph).items()
     ]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import pathlib
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study import poses, targets
+from mechdesign.study.checker import Checker
 from mechdesign.study.document import Path
 from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reliability_models import ReliabilitySection
@@ -17,9 +18,6 @@ from mechdesign.study.reporter import Reporter
 from mechdesign.study.sections import COMMANDS, KinematicsSection
 from mechdesign.study.targets import Target
 from mechdesign.study.workspace_models import WorkspaceSection
-
-if TYPE_CHECKING:
-    from mechdesign.study.checks import Checker
 
 _RATE_KINDS: dict[Quantity, str] = {"length": "velocity", "angle": "angular_velocity"}
 _ACCELERATION_KINDS: dict[Quantity, str] = {"length": "acceleration", "angle": "angular_acceleration"}

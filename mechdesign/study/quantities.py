@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.model import Drive, Limit, Measure, Quantity, Term
 from mechdesign.study import models
+from mechdesign.study.builder import Builder
 from mechdesign.study.document import Path
 from mechdesign.study.names import GROUND
 from mechdesign.study.numbers import Value
 from mechdesign.study.units import KINDS, describe
-
-if TYPE_CHECKING:
-    from mechdesign.study.build import Builder
 
 
 def drives(builder: Builder) -> dict[str, Drive]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study import pin_links
+from mechdesign.study.checker import Checker
 from mechdesign.study.document import Path
 from mechdesign.study.reliability_models import (
     LOADS,
@@ -15,9 +14,6 @@ from mechdesign.study.reliability_models import (
     ReliabilitySection,
     split_order,
 )
-
-if TYPE_CHECKING:
-    from mechdesign.study.checks import Checker
 
 # Digits of a clearance beyond which its lowest value is zero.
 _ROUNDING = 1e-9

@@ -5,20 +5,17 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
+from mechdesign.study.checker import Checker
 from mechdesign.study.document import Path
 from mechdesign.study.poses import Poses, read_table
 from mechdesign.study.reporter import Reporter
 from mechdesign.study.target_models import Wanted
-
-if TYPE_CHECKING:
-    from mechdesign.study.checks import Checker
 
 ROOT: Path = ("mechanism", "targets")
 

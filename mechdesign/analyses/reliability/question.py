@@ -113,7 +113,7 @@ def unsaid(study: Study, question: Question) -> list[str]:
     section: dict[str, Any] = study.resolved["reliability"]
     names = [*as_list(section.get("outputs")), *(section.get("limits") or {})]
     sentences = []
-    for point, (link, rest) in others(study).items():
+    for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         node = study.mechanism.graph.node(point)
         about = [output.name for output in question.outputs if node in _nodes(output)]
         told = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
@@ -133,7 +133,11 @@ def _named(name: str, point: str) -> bool:
 def links_meant(study: Study, coordinate: Coordinate) -> str:
     """The links whose points a coordinate is about, as far as their pins have clearances."""
     nodes = _nodes(coordinate)
-    found = [" ".join(rest) for point, (_, rest) in others(study).items() if study.mechanism.graph.node(point) in nodes]
+    found = [
+        " ".join(rest)
+        for point, (_, rest) in others(study.reliability, study.mechanism.graph).items()
+        if study.mechanism.graph.node(point) in nodes
+    ]
     return " ".join(dict.fromkeys(found))
 
 
