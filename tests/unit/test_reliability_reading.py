@@ -41,7 +41,9 @@ def test_an_output_at_a_pin_with_clearance_is_of_a_link_that_is_said() -> None:
     assert unsaid == 0.0
     assert on == {"crank"}
     assert any(text.startswith("A.x, A.y: A has a clearance and is that of crank, not of rod") for text in told)
-    assert in_words(study_of(SLIDER_CRANK)) == ["clearance: the pin A moves in rod; A.x and A.y are those of crank"]
+    study = study_of(SLIDER_CRANK)
+    words = in_words(study.reliability, study.mechanism.graph)
+    assert words == ["clearance: the pin A moves in rod; A.x and A.y are those of crank"]
 
 
 @pytest.mark.parametrize(("change", "link"), [
