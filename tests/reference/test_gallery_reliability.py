@@ -165,12 +165,11 @@ def test_precision_of_a_five_bar_over_its_workspace() -> None:
     c = table["C.x"] + 1j * table["C.y"]
     assert len(c) > 1500
     # On the boundary a leg is stretched and the unit vectors are no more than its limit.
-    legs = [(np.full(len(c), sign * 100.0 + 0j), side) for sign, side in ((1, 1), (-1, -1))]
-    inside = np.ones(len(c), dtype=bool)
+    inside = (np.abs(c - 100) < 330) & (np.abs(c + 100) < 330)
+    c = c[inside]
     jacobian, sources = [], []
-    for base, side in legs:
+    for base, side in ((100.0, 1), (-100.0, -1)):
         elbow = meet(base, 120.0, c, 220.0, -side)
-        inside &= np.abs(c - base) < 330
         along = (c - elbow) / 220.0
         lower = (elbow - base) / 120.0
         jacobian.append(along)
@@ -188,16 +187,16 @@ def test_precision_of_a_five_bar_over_its_workspace() -> None:
     xx = col1.real**2 * v1 + col2.real**2 * v2
     yy = col1.imag**2 * v1 + col2.imag**2 * v2
     xy = col1.real * col1.imag * v1 + col2.real * col2.imag * v2
-    assert sigma_x[inside] == pytest.approx(np.sqrt(xx[inside]), rel=2e-3)
-    assert sigma_y[inside] == pytest.approx(np.sqrt(yy[inside]), rel=2e-3)
+    assert sigma_x[inside] == pytest.approx(np.sqrt(xx), rel=2e-3)
+    assert sigma_y[inside] == pytest.approx(np.sqrt(yy), rel=2e-3)
     turn = np.linspace(0, math.pi, 721)[:-1, None]
     inverse = (yy * np.cos(turn) ** 2 - 2 * xy * np.cos(turn) * np.sin(turn) + xx * np.sin(turn) ** 2) / (
         xx * yy - xy**2
     )
     outside = np.mean(np.exp(-0.5 * 0.1**2 * inverse) / inverse, axis=0) / np.sqrt(xx * yy - xy**2)
-    often = inside & (outside > 1e-9)
+    often = outside > 1e-9
     assert np.count_nonzero(often) > 200
-    assert table["failure"][often] == pytest.approx(outside[often], rel=0.05)
+    assert table["failure"][inside][often] == pytest.approx(outside[often], rel=0.05)
 
 
 def test_feeder_with_the_cheapest_tolerances() -> None:

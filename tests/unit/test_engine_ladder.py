@@ -85,11 +85,12 @@ def test_half_a_width_of_failures_that_the_pilot_does_not_see() -> None:
 
 
 @pytest.mark.parametrize("precision", [relative(0.05), Precision(None, 1e-9)])
-def test_no_failure_at_all_is_an_upper_bound(precision: Precision) -> None:
+def test_where_no_failure_is_seen_there_is_a_value_of_0_and_a_bound(precision: Precision) -> None:
     found, used, rungs = climbed(Case(3, lambda u: np.ones((1, u.shape[1])), 0.0), precision, FEW)
     assert used == "monte_carlo"
     assert found.failures == 0
-    assert found.failure == found.high == pytest.approx(1 - 0.0015 ** (1 / FEW), rel=1e-9)
+    assert found.failure == found.low == 0.0
+    assert found.high == pytest.approx(1 - 0.0015 ** (1 / FEW), rel=1e-9)
     assert rungs["form"].failure == 0.0
 
 

@@ -284,6 +284,18 @@ def test_patches_of_a_workspace_are_kept_apart() -> None:
     assert list(Plane(("x", "y"), z.real, z.imag, True, False).patches()) == [slice(0, 9)]
 
 
+def test_a_ray_that_is_a_point_is_the_tip_of_its_patch() -> None:
+    def tip(degrees: float):
+        return np.full((1, 4), 1.5 * np.exp(1j * np.radians(degrees)))
+
+    def rays(*degrees: float):
+        return np.exp(1j * np.radians(degrees))[:, None] * np.linspace(1, 2, 4)
+
+    z = np.concatenate([tip(0), rays(10, 20), tip(30), tip(15), rays(18, 28), 2 * rays(25, 30), 2 * tip(40)])
+    plane = Plane(("x", "y"), z.real, z.imag, True, True)
+    assert list(plane.patches()) == [slice(0, 4), slice(4, 7), slice(7, 10)]
+
+
 def test_path_in_the_plane_is_drawn_over_its_poses() -> None:
     path = "reliability.path={P: [[60, 100], [70, 110], [80, 100], [70, 90], [60, 100]]}"
     found, _ = drawn(ARM, path, "reliability.methods=[analytic]")

@@ -23,6 +23,8 @@ Extend = Literal["neither", "min", "max", "both"]
 
 # Rays that differ in direction by less than this (radians) are the end of one patch and the begin of another.
 _SAME = 1e-6
+# Rays shorter than this share of the longest one are points.
+_POINT = 1e-9
 _LEFT, _BELOW, _BAR, _TOP, _GAP = 0.75, 0.55, 1.1, 0.7, 0.5  # inches
 _TALLEST = 5.2
 
@@ -42,7 +44,10 @@ class Plane:
         cuts = np.zeros(0, dtype=int)
         if self.rays:
             ray = (self.x[:, -1] - self.x[:, 0]) + 1j * (self.y[:, -1] - self.y[:, 0])
-            cuts = np.flatnonzero(np.angle(ray[1:] / ray[:-1]) < _SAME) + 1
+            # Where a patch ends in a tip its ray is a point, without a direction.
+            long = np.flatnonzero(np.abs(ray) > _POINT * np.abs(ray).max())
+            here, there = long[:-1], long[1:]
+            cuts = ((here + there + 2) // 2)[np.angle(ray[there] / ray[here]) < _SAME]
         for begin, end in zip([0, *cuts], [*cuts, len(self.x)], strict=True):
             if end - begin > 1:
                 yield slice(int(begin), int(end))
