@@ -19,8 +19,9 @@ from mechdesign.analyses.poses import pose_columns, pose_in_words
 from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, Model, UnreachableError, cheapest
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.methods import METHODS, Partial, Task
+from mechdesign.analyses.reliability.methods import METHODS
 from mechdesign.analyses.reliability.sources import Sources, find_sources
+from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.analyses.reliability.tolerances import retold, tolerances
 from mechdesign.results import Column, Table
 from mechdesign.study import Study

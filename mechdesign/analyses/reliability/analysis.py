@@ -12,16 +12,18 @@ from mechdesign.analyses.kinematics.rates import drive_rates
 from mechdesign.analyses.poses import SolvedPoses, in_study_units, judge_failures, solve_poses
 from mechdesign.analyses.reliability import sobol, tables
 from mechdesign.analyses.reliability.allocation import Allocated, allocate
+from mechdesign.analyses.reliability.answer import Answer
 from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.comparison import disagreements
 from mechdesign.analyses.reliability.cycle import notes, with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
 from mechdesign.analyses.reliability.first_order import FirstOrder, Rates, linear_errors, nominal_values
-from mechdesign.analyses.reliability.methods import METHODS, MOST, Found, Partial, Task, analytic
+from mechdesign.analyses.reliability.methods import METHODS, analytic
 from mechdesign.analyses.reliability.question import Question, ask, unsaid
 from mechdesign.analyses.reliability.shortfalls import pointless, unassembled, unreached
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources, find_sources
+from mechdesign.analyses.reliability.task import MOST, Found, Partial, Task
 from mechdesign.analyses.reliability.unseen import unseen
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Configuration, Reason
@@ -104,7 +106,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
             raise
         interrupted = "interrupted: "
     centres = _in_study_units(study, question, nominal)
-    answer = tables.Answer(study, poses, question, nominal.reason, centres, linear, found, first, indices)
+    answer = Answer(study, poses, question, nominal.reason, centres, linear, found, first, indices)
     counts = {"poses": poses.count}
     done = [sums for each in found for sums in each.sums.values()]
     if done:
@@ -154,7 +156,7 @@ def first_order_tables(
     settings = _settings(study, nominal, question, linear, elastic, listed=False)
     task = Task(settings, sources, linear, len(question.channels), poses.count, 0, 0, 0, None, 1, NULL)
     centres, first = _in_study_units(study, question, nominal), analytic(task)
-    answer = tables.Answer(study, poses, question, nominal.reason, centres, linear, [first], first)
+    answer = Answer(study, poses, question, nominal.reason, centres, linear, [first], first)
     made = {"moments": tables.moments, "contributions": tables.contributions}
     if question.limited:
         made["reliability"] = tables.success

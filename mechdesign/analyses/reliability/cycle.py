@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.methods import Found, Partial, Task, wanted_precision
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
-from mechdesign.analyses.reliability.simulation import Setting, errors_of, keeps
+from mechdesign.analyses.reliability.simulation import Setting, errors_of, keeps, limited_part
 from mechdesign.analyses.reliability.sources import Sources
+from mechdesign.analyses.reliability.task import Found, Partial, Task, wanted_precision
 from mechdesign.parallel import map_chunks
 
 # Streams of their own: no other name has four numbers.
@@ -149,22 +149,6 @@ def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk:
         if not valid.all():
             drawn, within = drawn.take(valid), within[valid]
     return Count(count, count - int(np.count_nonzero(within)), count - len(within), evaluations)
-
-
-def limited_part(setting: Setting) -> Setting:
-    """The same pose with the limited channels only: nothing else needs to be computed."""
-    wanted = sorted({b.output for b in setting.bands} | {k for d in setting.discs for k in (d.x, d.y)})
-    place = {channel: k for k, channel in enumerate(wanted)}
-    return replace(
-        setting,
-        channels=[setting.channels[k] for k in wanted],
-        centres=[setting.centres[k] for k in wanted],
-        bands=[replace(band, output=place[band.output]) for band in setting.bands],
-        discs=[replace(disc, x=place[disc.x], y=place[disc.y]) for disc in setting.discs],
-        pair=None,
-        scale=None,
-        elastic=None if setting.elastic is None else setting.elastic.only(wanted),
-    )
 
 
 def _estimate(count: Count) -> Estimate:

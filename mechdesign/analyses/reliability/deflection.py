@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.reliability.error_limits import Channel
+from mechdesign.analyses.stiffness.analysis import Asked
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
@@ -22,10 +23,6 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
 from mechdesign.study import Study
 from mechdesign.study.reliability_models import LOADS
-
-if TYPE_CHECKING:
-    from mechdesign.analyses.reliability.first_order import Channel
-    from mechdesign.analyses.stiffness.analysis import Asked
 
 Floats = NDArray[np.float64]
 

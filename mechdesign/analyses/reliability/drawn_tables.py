@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.reliability.answer import Answer
 from mechdesign.analyses.reliability.error_limits import correlation
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.results import Column, Table
-
-if TYPE_CHECKING:
-    from mechdesign.analyses.reliability.tables import Answer
 
 Floats = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Limits of errors, and the correlation of two errors."""
+"""Quantities whose errors are asked, limits of errors, and the correlation of two errors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.study.reliability_models import SUFFIXES
+
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One quantity whose error is asked: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
+
+    coordinate: Coordinate
+    order: int
+
+    @property
+    def name(self) -> str:
+        """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
+        return self.coordinate.name + SUFFIXES[self.order]
 
 
 @dataclass(frozen=True)

@@ -12,28 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.deflection import Elastic
+from mechdesign.analyses.reliability.error_limits import Channel
 from mechdesign.analyses.reliability.sources import Source, Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
-from mechdesign.study.reliability_models import LOADS, SUFFIXES
+from mechdesign.study.reliability_models import LOADS
 
 Floats = NDArray[np.float64]
 ORDERS = ("position", "velocity", "acceleration")
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One quantity whose error is asked: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
-
-    coordinate: Coordinate
-    order: int
-
-    @property
-    def name(self) -> str:
-        """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
-        return self.coordinate.name + SUFFIXES[self.order]
 
 
 @dataclass(frozen=True)

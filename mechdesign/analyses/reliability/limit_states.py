@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.reliability.cycle import limited_part
 from mechdesign.analyses.reliability.engine.problem import Problem
 from mechdesign.analyses.reliability.first_order import derivatives
-from mechdesign.analyses.reliability.simulation import Setting, errors_of, solve
+from mechdesign.analyses.reliability.simulation import Setting, errors_of, limited_part, solve
 from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.errors import MechanismError
 

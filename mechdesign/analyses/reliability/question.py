@@ -10,8 +10,8 @@ import numpy as np
 from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.kinematics.rates import of_given
 from mechdesign.analyses.poses import expand_outputs, radians
-from mechdesign.analyses.reliability.error_limits import Band, Disc
-from mechdesign.analyses.reliability.first_order import Channel, Rates
+from mechdesign.analyses.reliability.error_limits import Band, Channel, Disc
+from mechdesign.analyses.reliability.first_order import Rates
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.cumulants import Cumulants, cumulants
-from mechdesign.analyses.reliability.methods import Task
 from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Drawn, Sources
+from mechdesign.analyses.reliability.task import Task
 from mechdesign.parallel import map_chunks
 
 Floats = NDArray[np.float64]

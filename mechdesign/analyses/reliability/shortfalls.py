@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.engine.precision import WIDTH
-from mechdesign.analyses.reliability.methods import Found, Task, wanted_precision
+from mechdesign.analyses.reliability.task import Found, Task, wanted_precision
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 

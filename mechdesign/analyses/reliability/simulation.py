@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
-from mechdesign.analyses.reliability.first_order import Channel, Rates, nominal_values
+from mechdesign.analyses.reliability.error_limits import Band, Channel, Disc, correlation
+from mechdesign.analyses.reliability.first_order import Rates, nominal_values
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
 from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.mechanism import Configuration, Mechanism
@@ -221,6 +221,22 @@ def _trend(errors: Sequence[Floats], valid: NDArray[np.bool_], within: NDArray[n
     for error in errors:
         steps.append(np.cumsum(np.add.reduceat(np.where(valid, error, 0.0), begins)))
     return np.stack(steps, axis=1)
+
+
+def limited_part(setting: Setting) -> Setting:
+    """The same pose with the limited channels only: nothing else needs to be computed."""
+    wanted = sorted({b.output for b in setting.bands} | {k for d in setting.discs for k in (d.x, d.y)})
+    place = {channel: k for k, channel in enumerate(wanted)}
+    return replace(
+        setting,
+        channels=[setting.channels[k] for k in wanted],
+        centres=[setting.centres[k] for k in wanted],
+        bands=[replace(band, output=place[band.output]) for band in setting.bands],
+        discs=[replace(disc, x=place[disc.x], y=place[disc.y]) for disc in setting.discs],
+        pair=None,
+        scale=None,
+        elastic=None if setting.elastic is None else setting.elastic.only(wanted),
+    )
 
 
 def solve(setting: Setting, made: Made) -> Configuration:

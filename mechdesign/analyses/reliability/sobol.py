@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.engine.precision import CONFIDENCE
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.methods import Task
 from mechdesign.analyses.reliability.pins import PIN_LAWS
 from mechdesign.analyses.reliability.sampling import CHUNK, generator
 from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Drawn, Sources
+from mechdesign.analyses.reliability.task import Task
 from mechdesign.parallel import map_chunks
 from mechdesign.results import Column
 from mechdesign.study import Study

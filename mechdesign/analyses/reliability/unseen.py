@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.methods import Found
+from mechdesign.analyses.reliability.task import Found
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 

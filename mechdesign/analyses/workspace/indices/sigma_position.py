@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechdesign.analyses.reliability.deflection import Elasticity, elasticity
-from mechdesign.analyses.reliability.first_order import Channel, Rates, linear_errors
+from mechdesign.analyses.reliability.error_limits import Channel
+from mechdesign.analyses.reliability.first_order import Rates, linear_errors
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index
