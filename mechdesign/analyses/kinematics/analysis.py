@@ -12,8 +12,9 @@ from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.extremes import extremes
 from mechdesign.analyses.kinematics.loops import loop_tables
-from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry, move
+from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry
 from mechdesign.analyses.kinematics.motion_limits import motion_limits
+from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.poses import judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
-from mechdesign.analyses.kinematics.smoothing import through_change_points
-from mechdesign.analyses.kinematics.targets import Error, errors, needed
-from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, solve_poses
+from mechdesign.analyses.kinematics.targets import Error, needed
+from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
@@ -20,7 +19,6 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.mechanism.turns import angles_of
-from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column
 from mechdesign.study import Poses, Study
 from mechdesign.study.sections import KinematicsSection
@@ -264,21 +262,3 @@ _RATES: Mapping[tuple[Quantity, str], str] = {
 def entry(output: Coordinate, drive: Coordinate) -> str:
     """Name of an entry of the Jacobian: ``C.x_by_theta``."""
     return f"{output.name}_by_{drive.name}"
-
-
-def move(question: Asked, progress: Progress = NULL) -> Motion:
-    """Solve every pose; one that fails is nan, with its reason.
-
-    Raises
-    ------
-    MechanismError
-        If a pose's coordinates do not determine the mechanism.
-    """
-    study, poses = question.study, question.poses
-    motion = Motion(question, reason=np.zeros(poses.count, dtype=np.int8))
-    for solved in solve_poses(study, poses, question.watched):
-        motion.fill(solved)
-        progress.update(len(solved.rows))
-    through_change_points(motion)
-    motion.errors = list(errors(study, poses, motion.arrays, np.arange(poses.count)))
-    return motion

@@ -9,16 +9,13 @@ digits; but the motion that is followed is smooth there. With S_k = f(k h) + f(-
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.poses import in_study_units, radians, solve_poses
 from mechdesign.mechanism.turns import angles_of
 from mechdesign.study.poses import PoseGroup, Poses
-
-if TYPE_CHECKING:
-    from mechdesign.analyses.kinematics.motion import Motion
 
 # Poses with a conditioning below this have lost digits.
 NEAR = 1e-3

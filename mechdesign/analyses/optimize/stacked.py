@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.analyses.kinematics import analysis as kinematics
-from mechdesign.analyses.kinematics.motion import Motion, asked, move
+from mechdesign.analyses.kinematics.motion import Motion, asked
+from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.kinematics.transmission import transmission_table
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
