@@ -12,6 +12,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mechdesign.commands import COMMANDS
+
 if TYPE_CHECKING:
     from mechdesign.analyses.kinematics.analysis import kinematics
     from mechdesign.analyses.optimize.analysis import optimize
@@ -40,12 +42,8 @@ _HOMES = {
     "AssemblyError": "mechdesign.errors",
     "MechdesignError": "mechdesign.errors",
     "StudyError": "mechdesign.errors",
-    "kinematics": "mechdesign.analyses.kinematics.analysis",
     "load": "mechdesign.study",
-    "optimize": "mechdesign.analyses.optimize.analysis",
-    "reliability": "mechdesign.analyses.reliability.analysis",
-    "stiffness": "mechdesign.analyses.stiffness.analysis",
-    "workspace": "mechdesign.analyses.workspace.analysis",
+    **{name: command.module for name, command in COMMANDS.items()},
 }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from importlib import import_module
 
+from mechdesign.commands import COMMANDS
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.reliability_models import Precision
@@ -18,7 +19,7 @@ LONG = ("optimize", "reliability")
 
 def ask(study: Study, command: str) -> Result:
     """A command's answer."""
-    result: Result = getattr(import_module(f"mechdesign.analyses.{command}.analysis"), command)(study)
+    result: Result = getattr(import_module(COMMANDS[command].module), command)(study)
     return result
 
 

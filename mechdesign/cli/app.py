@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
 
 from mechdesign.cli import options as given
-from mechdesign.cli.execution import BUILT_IN, COMMANDS
+from mechdesign.cli.execution import BUILT_IN
 from mechdesign.cli.failure import guard
 from mechdesign.cli.options import Options
+from mechdesign.commands import COMMANDS
 
 app = typer.Typer(
     name="mechdesign",
@@ -43,8 +45,14 @@ def _start(
     """Options before the command."""
 
 
-def _add_question(name: str, question_asked: str, content: str) -> None:
-    @app.command(name, short_help=question_asked, help=f"{question_asked} {content}")
+def _command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """A question's command, with its help."""
+    asked = COMMANDS[name]
+    return app.command(name, short_help=asked.question, help=f"{asked.question} {asked.answer}")
+
+
+def _add_question(name: str) -> None:
+    @_command(name)
     def question(
         study: given.StudyArgument = None,
         out: given.Out = None,
@@ -62,7 +70,7 @@ def _add_question(name: str, question_asked: str, content: str) -> None:
             raise typer.Exit(ask(study, name, options))
 
 
-@app.command("kinematics", short_help=COMMANDS["kinematics"][0], help=" ".join(COMMANDS["kinematics"]))
+@_command("kinematics")
 def kinematics(
     study: given.StudyArgument = None,
     out: given.Out = None,
@@ -85,7 +93,7 @@ def kinematics(
         raise typer.Exit(ask(study, "kinematics", options))
 
 
-@app.command("optimize", short_help=COMMANDS["optimize"][0], help=" ".join(COMMANDS["optimize"]))
+@_command("optimize")
 def optimize(
     study: given.StudyArgument = None,
     out: given.Out = None,
@@ -105,9 +113,9 @@ def optimize(
         raise typer.Exit(ask(study, "optimize", options))
 
 
-for _name, _words in COMMANDS.items():
+for _name in COMMANDS:
     if _name not in ("kinematics", "optimize"):
-        _add_question(_name, *_words)
+        _add_question(_name)
 
 
 @app.command("run", short_help="Answer every question that each study asks.")

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import COMMANDS, Answer, Owners, answer, load_study, study_label, tell
+from mechdesign.cli.execution import Answer, Owners, answer, load_study, study_label, tell
 from mechdesign.cli.failure import INTERRUPTED
 from mechdesign.cli.options import Options
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError, explain
 from mechdesign.threads import one_thread
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import COMMANDS, Owners, load_study, study_label
+from mechdesign.cli.execution import Owners, load_study, study_label
 from mechdesign.cli.options import Options
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import explain
 from mechdesign.threads import one_thread
 

@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from mechdesign.results import Result, Table
     from mechdesign.study import Study
 
-# Each command's question and what its answer consists of.
-COMMANDS = {
-    "kinematics": ("How does it move?", "Positions, velocities, accelerations, Jacobians and limits of motion."),
-    "workspace": ("Where can it work?", "The reachable region, its performance indices and its boundary."),
-    "optimize": ("Which dimensions are best?", "The optimum for each set of weights, and every design."),
-    "reliability": ("How precise is it when it is made?", "Error moments, reliability and what contributes to them."),
-    "stiffness": ("How stiff is it?", "Stiffness and compliance matrices, equivalent springs and deflections."),
-}
 BUILT_IN = "two_link_arm"
 
 

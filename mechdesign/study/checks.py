@@ -6,6 +6,7 @@ import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from mechdesign.commands import COMMANDS
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study import pose_checks, reliability_checks, targets
 from mechdesign.study.checker import Checker
@@ -18,7 +19,7 @@ from mechdesign.study.pin_links import split_link
 from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter
-from mechdesign.study.sections import COMMANDS, KinematicsSection
+from mechdesign.study.sections import KinematicsSection
 from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.workspace_models import INDEX_NAMES, NEEDED, Over, WorkspaceSection
 

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, Problem, StudyError
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
@@ -30,7 +31,7 @@ from mechdesign.study.parameters import Parameters
 from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter, unknown_key
-from mechdesign.study.sections import COMMANDS, KinematicsSection, Requirement, StudyFile
+from mechdesign.study.sections import KinematicsSection, Requirement, StudyFile
 from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.targets import Target
 from mechdesign.study.units import Units, units_from

@@ -6,6 +6,7 @@ import pathlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Quantity
@@ -15,7 +16,7 @@ from mechdesign.study.document import Path
 from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter
-from mechdesign.study.sections import COMMANDS, KinematicsSection
+from mechdesign.study.sections import KinematicsSection
 from mechdesign.study.targets import Target
 from mechdesign.study.workspace_models import WorkspaceSection
 

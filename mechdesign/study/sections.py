@@ -29,8 +29,6 @@ from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.stiffness_models import StiffnessSection
 from mechdesign.study.workspace_models import WorkspaceSection
 
-COMMANDS = ("kinematics", "workspace", "optimize", "reliability", "stiffness")
-
 
 class Load(Model):
     """A force at a point, or a moment on a link."""

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.model import Fixed
@@ -27,7 +28,7 @@ from mechdesign.study.parameters import Parameters
 Floats = NDArray[np.float64]
 
 # Sections whose numbers are read once, when the study is loaded.
-SECTIONS = ("kinematics", "workspace", "reliability", "stiffness", "requirements")
+SECTIONS = (*(name for name in COMMANDS if name != "optimize"), "requirements")
 
 
 def variant(study: Study, changed: Mapping[str, float]) -> Study:

@@ -7,7 +7,7 @@ import pytest
 import typer.main
 
 from mechdesign.cli.app import app
-from mechdesign.cli.execution import COMMANDS
+from mechdesign.commands import COMMANDS
 
 GROUP = typer.main.get_command(app)
 EVERY = ("--out", "--set", "--seed", "--jobs", "--json", "--quiet", "--no-plots")

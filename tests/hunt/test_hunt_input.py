@@ -19,7 +19,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mechdesign.cli.app import app
-from mechdesign.cli.execution import COMMANDS
+from mechdesign.commands import COMMANDS
 from mechdesign.study import template, templates
 from mechdesign.study.document import read
 

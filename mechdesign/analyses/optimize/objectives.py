@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.region import COLUMNS, batched, split
+from mechdesign.commands import COMMANDS
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
 from mechdesign.study.optimize_models import Condition, OptimizeSection
-from mechdesign.study.sections import COMMANDS
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,45 @@
+"""The questions that a study may ask, declared once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Command:
+    """One question of the command line, of the Python door and of the study file, where its section has this name.
+
+    Parameters
+    ----------
+    question, answer : str
+        What it asks, and what the answer consists of: the command's help.
+    """
+
+    name: str
+    question: str
+    answer: str
+
+    @property
+    def module(self) -> str:
+        """Where the function of its name is; imported when it is asked, for `--help` loads no numerics."""
+        return f"mechdesign.analyses.{self.name}.analysis"
+
+
+COMMANDS = {
+    command.name: command
+    for command in (
+        Command(
+            "kinematics", "How does it move?", "Positions, velocities, accelerations, Jacobians and limits of motion."
+        ),
+        Command("workspace", "Where can it work?", "The reachable region, its performance indices and its boundary."),
+        Command("optimize", "Which dimensions are best?", "The optimum for each set of weights, and every design."),
+        Command(
+            "reliability",
+            "How precise is it when it is made?",
+            "Error moments, reliability and what contributes to them.",
+        ),
+        Command(
+            "stiffness", "How stiff is it?", "Stiffness and compliance matrices, equivalent springs and deflections."
+        ),
+    )
+}
