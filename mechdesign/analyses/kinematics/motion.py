@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -266,8 +266,13 @@ def entry(output: Coordinate, drive: Coordinate) -> str:
     return f"{output.name}_by_{drive.name}"
 
 
-def move(question: Asked, progress: Progress = NULL) -> Motion:
+def move(question: Asked, progress: Progress = NULL, *, also: Callable[[SolvedPoses], object] | None = None) -> Motion:
     """Solve every pose; one that fails is nan, with its reason.
+
+    Parameters
+    ----------
+    also : callable, optional
+        Called with the solved poses, so that who needs more of them does not solve them again.
 
     Raises
     ------
@@ -278,6 +283,8 @@ def move(question: Asked, progress: Progress = NULL) -> Motion:
     motion = Motion(question, reason=np.zeros(poses.count, dtype=np.int8))
     for solved in solve_poses(study, poses, question.watched):
         motion.fill(solved)
+        if also is not None:
+            also(solved)
         progress.update(len(solved.rows))
     through_change_points(motion)
     motion.errors = list(errors(study, poses, motion.arrays, np.arange(poses.count)))
