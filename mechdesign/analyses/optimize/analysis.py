@@ -159,7 +159,7 @@ def _ask(study: Study, judge: Judge, compute: Compute, budget: int, seed: int) -
         return Outcome(found[:, : len(goals)], stacked, found[:, 2 * width + 2 :], found[:, 2 * width + 1])
 
     judge.progress.start(budget, "designs")
-    explorer = Explorer(evaluate, dimensions, budget, judge.parts(), rough=judge.rough)
+    explorer = Explorer(evaluate, dimensions, budget, judge.parts(), rough=judge.rough, slow=judge.slow)
     if section.method == "search":
         rows = _weights(study, len(goals)).tolist()
         patient = section.evaluations is not None

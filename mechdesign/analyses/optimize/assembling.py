@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from mechdesign.analyses.poses import SolvedPoses, solve_poses
@@ -12,13 +14,18 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 
-def clearances(study: Study, poses: Poses) -> Floats:
+def clearances(study: Study, poses: Poses, solved: Iterable[SolvedPoses] | None = None) -> Floats:
     """Margins of every pose in parts of the mechanism's size, shape (designs, margins): negative where one is missed.
 
     Squares of lengths and angles in radians, smooth in the dimensions; nan where what comes before does not assemble.
+
+    Parameters
+    ----------
+    solved : iterable of SolvedPoses, optional
+        The poses as solved before; they are solved here where left out.
     """
-    found = [_of(study.mechanism, solved).reshape(poses.designs, -1) for solved in solve_poses(study, poses)]
-    return np.concatenate(found, axis=1)
+    given = solve_poses(study, poses) if solved is None else solved
+    return np.concatenate([_of(study.mechanism, each).reshape(poses.designs, -1) for each in given], axis=1)
 
 
 def shortfall(margins: Floats) -> Floats:

@@ -9,6 +9,7 @@ over steps, evaluated in one batch.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +26,8 @@ LADDER = ((1e-4, 0.3), (1e-5, 0.03))
 # Where values are known to a tolerance, differences over less than this are noise.
 ROUGH = ((1e-2, 0.3), (1e-3, 0.05))
 SQUARES_STEP, MOST_SQUARES, MOST_FINAL_SQUARES, MOST_STEPS = 1e-5, 60, 150, 60
+# Points asked for one after the other, none of which is better than what was known: a stage ends.
+MOST_IN_VAIN = 30
 # Gains of a step, in parts of what a range changes, below which a descent ends.
 ENOUGH, ROUGH_ENOUGH = 1e-14, 1e-5
 # How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
@@ -34,6 +37,10 @@ IMPOSSIBLE = 1e3
 # Slopes of conditions below this part of their values are none.
 FLAT = 1e-6
 TINY = float(np.finfo(float).tiny)
+
+
+class _InVain(Exception):
+    """A stage comes no further: an optimiser may halve its steps for a long time where poses end."""
 
 
 def descend(
@@ -92,6 +99,10 @@ class _Descent:
                 self.plain[part.column] = 0.0
         # A root mean square alone is as low where its square is, which is the smoother.
         self.bend = 0.0
+        self._last: tuple[Floats, Integers] = np.empty((0, 0)), np.empty(0, dtype=np.intp)
+        self._in_vain = 0
+        # Whether slopes were asked for at the last point.
+        self._taken = True
         self.squared = len(self.squares) == np.count_nonzero(objective.factors) == 1
 
     def run(self, ask: Ask) -> None:
@@ -101,15 +112,20 @@ class _Descent:
             # Far from the optimum the one, along a narrow valley onto bounds the other is the quicker.
             self._least_squares(ask, "dogbox" if self.final else "trf")
         for step, width in self.ladder:
-            self._programming(ask, step, width)
+            self._in_vain = 0
+            with suppress(_InVain):
+                self._programming(ask, step, width)
 
     def ask(self, ask: Ask, points: Floats) -> Integers:
         """Rows of points; the best of them, or of those before, is where the next stage begins."""
+        if self._in_vain > MOST_IN_VAIN:
+            raise _InVain
         rows = ask(points)
         known = self.explorer.known
         among = np.concatenate([[self.best], rows])
         merit = known.merit(self.objective)[among]
         self.best = int(among[np.argmin(merit)])
+        self._in_vain = 0 if merit.min() < merit[0] else self._in_vain + 1
         return rows
 
     def terms(self, rows: Integers) -> tuple[Floats, Floats, Floats]:
@@ -129,7 +145,7 @@ class _Descent:
         (part,) = self.squares
 
         def residuals(u: Floats) -> Floats:
-            row = self.ask(ask, u[None])[0]
+            row = self.at(ask, u, SQUARES_STEP)[0]
             return np.asarray(self.explorer.known.rows[row, part.place])
 
         def slopes(u: Floats) -> Floats:
@@ -144,11 +160,26 @@ class _Descent:
                 xtol=1e-14, ftol=1e-14, gtol=None,
             )  # fmt: skip
 
+    def at(self, ask: Ask, u: Floats, step: float) -> Integers:
+        """Rows of a point, and of those for its slopes where they cost little more and are likely to be asked for next.
+
+        They are not where the point before was not taken.
+        """
+        if self.explorer.slow or not self._taken:
+            return self.ask(ask, u[None])
+        rows = self._stencil(ask, u, step)[1]
+        self._taken = False
+        return rows
+
     def _stencil(self, ask: Ask, u: Floats, step: float) -> tuple[Floats, Integers]:
         """A point, and those a step from it along each variable, inside the cube."""
         sides = [np.clip(u + sign * step * np.eye(len(u)), 0.0, 1.0) for sign in (-1, 1)]
         points = np.concatenate([u[None], *sides])
-        return points, self.ask(ask, points)
+        if not np.array_equal(points, self._last[0]):
+            # Asked for again, they would wait for the other descents.
+            self._last = points, self.ask(ask, points)
+        self._taken = True
+        return self._last
 
     def _programming(self, ask: Ask, step: float, width: float) -> None:
         """Sequential quadratic programming in a box about the best point."""
@@ -223,7 +254,7 @@ class _Program:
         """The smooth sum, the rows that bound each worst, and what may not be positive."""
         key = u.tobytes()
         if key not in self._known:
-            rows = self._descent.ask(self._ask, u[None])
+            rows = self._descent.at(self._ask, u, self._step)[:1]
             found = [part[0] / scale for part, scale in zip(self._descent.terms(rows), self._scales, strict=True)]
             straight = [a + b @ (u - self._at) for a, b in zip(self._values, self._slopes, strict=True)]
             impossible = np.isnan(found[0]).any() or np.isnan(found[1]).any()

@@ -151,6 +151,8 @@ class Explorer:
         Which rows there are.
     rough : bool
         Whether values are known to a tolerance only, so that differences over small steps are noise.
+    slow : bool
+        Whether each point costs as much alone as among others.
 
     Attributes
     ----------
@@ -160,14 +162,14 @@ class Explorer:
 
     def __init__(
         self, evaluate: Callable[[Floats], Outcome], dimensions: int, budget: int, parts: Sequence[Part] = (),
-        *, rough: bool = False,
+        *, rough: bool = False, slow: bool = False,
     ) -> None:  # fmt: skip
         self._evaluate = evaluate
         self.dimensions = dimensions
         self.left = budget
         self.reserve = 0
         self.parts = tuple(parts)
-        self.rough = rough
+        self.rough, self.slow = rough, slow
         self._rows: dict[bytes, int] = {}
         # Columns of points, values, margins, rows and shortfall; more lines than are filled.
         self._table = np.empty((0, 0))

@@ -170,12 +170,8 @@ class Evaluator:
 
     def _count(self, each: Goal, result: Result) -> None:
         """Note how many rows a goal is the worst of, or the root mean square, by the study's own design."""
-        chosen = choose(result, each.column, dict(each.where))
-        # How poses come out, valid or not, may differ from design to design.
-        named = {name: value for name, value in each.where if chosen.table[name].dtype.kind != "b"}
-        if named and not choose(result, each.column, named).counts.any():
-            words = " and ".join(f"{name} {value}" for name, value in named.items())
-            raise UnknownColumnError(f"where: no row of {chosen.table.name} has {words}")
+        if missing := choose(result, each.column, dict(each.where)).missing:
+            raise UnknownColumnError(missing)
         rows, residuals = each.judged(result)[1], each.residuals(result)
         if residuals is not None:
             self.rows[each] = residuals.size
@@ -245,22 +241,21 @@ class Evaluator:
         places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
         wanted = {*tables, "motion"} if self.squares.intersection(*tables.values()) else set(tables)
         stack = stacked.tables(self.study, command, wanted, len(rows), places, parameters, self._outputs,
-                               self._formulas[command])  # fmt: skip
+                               self._formulas[command], graded=self._graded)  # fmt: skip
         failed = FAILED_ARRAY[_first(stack.reason)]
         wrong = stack.reason != 0
         # The errors of the poses that are left would be the smaller the more of them are lost.
         whole = stack.listed or "targets" in tables
         batch.note(rows, wrong.any(axis=1) if whole else wrong.all(axis=1), failed)
         some = np.ones(len(rows), dtype=bool) if command in self._clear else batch.reasons[rows] != ""
-        if self._graded and some.any():
+        if stack.clearances is not None:
+            self._grade(batch, command, rows, stack.clearances)
+        elif self._graded and some.any():
             poses = stacked.poses_of(
                 self.study, command, int(some.sum()), batch.take(batch.places, rows[some]),
                 batch.take(batch.parameters, rows[some]), self._formulas[command],
             )  # fmt: skip
-            margins = clearances(self.study, poses)
-            batch.shortfall[rows[some]] = shortfall(margins)
-            if command in self._clear:
-                batch.clearances[rows, self._clear[command]] = margins
+            self._grade(batch, command, rows[some], clearances(self.study, poses))
         for table, goals in tables.items():
             left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
             for each in goals:
@@ -269,6 +264,12 @@ class Evaluator:
                 batch.note(rows, lost, np.where(failed == "", f"{each.name} has no value", failed))
             for k in rows[left].tolist():
                 batch.left.setdefault(k, {}).setdefault(command, []).extend(goals)
+
+    def _grade(self, batch: _Batch, command: str, rows: NDArray[np.intp], margins: Floats) -> None:
+        """Note how far some designs are from assembling."""
+        batch.shortfall[rows] = shortfall(margins)
+        if command in self._clear:
+            batch.clearances[rows, self._clear[command]] = margins
 
     def _needed(self, study: Study) -> Study:
         """The study without what no goal asks and costs much more than the goals: tolerances, Sobol' indices."""

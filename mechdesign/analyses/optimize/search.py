@@ -133,7 +133,7 @@ def _start(
     tried: list[list[int]] = [[] for _ in rows]
     try:
         explorer(sample(n, rng, max(SAMPLE * (n + 1), allowed // LOOKED), allowed // 3))
-        if begin == 0 and allowed > 4 * len(smallest) * DESCENT * (2 * n + 1):
+        if begin == 0 and len(smallest) > 1 and allowed > 4 * len(smallest) * DESCENT * (2 * n + 1):
             _extremes(explorer, smallest, rng, allowed)
         for row in rows:
             most = int(EVOLUTION * allowed) // len(rows)
@@ -158,7 +158,7 @@ def _start(
 def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Generator, allowed: int) -> None:
     """Both ends of every goal, to normalise by; they need not be known to the last digit."""
     goals = len(smallest)
-    for goal, down in enumerate(smallest) if goals > 1 else ():
+    for goal, down in enumerate(smallest):
         evolve(explorer, _single(goal, 1.0 if down else -1.0, goals), rng, 0, int(EVOLUTION * allowed) // (4 * goals))
     ends = [_single(goal, sign, goals) for goal in range(goals) for sign in (1.0, -1.0)]
     descend(explorer, [(end, k) for end in ends for k in _apart(explorer.known, end, [], 0, 1)], ROUGH[1:])

@@ -14,8 +14,11 @@ from mechdesign.analyses.kinematics import analysis as kinematics
 from mechdesign.analyses.kinematics.motion import Motion, asked
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.kinematics.transmission import transmission_table
+from mechdesign.analyses.optimize.assembling import clearances
+from mechdesign.analyses.poses import SolvedPoses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
+from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.expressions import Expression
 from mechdesign.linearity import is_linear
 from mechdesign.results import Result, Table
@@ -59,12 +62,15 @@ class Stack:
         Whether a person listed the poses, so that each of them must be valid.
     open : mapping of str to bool array, shape (designs,)
         By table, the designs that it does not answer for.
+    clearances : ndarray, shape (designs, margins), or None
+        As `assembling.clearances` gives them; None where they were not asked for, or would have to be solved for.
     """
 
     result: Result
     reason: NDArray[np.int8]
     listed: bool
     open: Mapping[str, NDArray[np.bool_]]
+    clearances: Floats | None = None
 
 
 def possible(study: Study, command: str, names: Collection[str]) -> bool:
@@ -175,7 +181,7 @@ def size(study: Study, command: str) -> int:
 def tables(
     study: Study, command: str, wanted: Collection[str], designs: int,
     places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike], outputs: Collection[str] | None = None,
-    formulas: Formulas | None = None,
+    formulas: Formulas | None = None, *, graded: bool = False,
 ) -> Stack:  # fmt: skip
     """Answers of a command for designs whose places and parameters have the given values, of shape (designs,).
 
@@ -187,12 +193,15 @@ def tables(
         As `formulas_of` gives them.
     outputs : collection of str, optional
         Of the extremes; all where left out.
+    graded : bool
+        Whether the clearances are wanted, too.
     """
     one = study.poses(command)
     poses = poses_of(study, command, designs, places, parameters, formulas or {})
     torn = np.zeros(designs, dtype=bool)
+    solved: list[SolvedPoses] = []
     if command == "kinematics":
-        found, reason, torn = _motion(study, wanted, poses, outputs)
+        found, reason, torn = _motion(study, wanted, poses, outputs, solved.append if graded else None)
     elif command == "reliability":
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
@@ -201,15 +210,18 @@ def tables(
         found, reason = stiffness.tables(study, question, poses, held), held.reason
         found = {name: table for name, table in found.items() if name in TABLES[command]}
     reason = reason.reshape(designs, one.count)
-    return Stack(Result(command, found), reason, one.listed, {"loops": torn | reason.any(axis=1), "extremes": torn})
+    opened = {"loops": torn | reason.any(axis=1), "extremes": torn}
+    margins = clearances(study, poses, solved) if solved else None
+    return Stack(Result(command, found), reason, one.listed, opened, margins)
 
 
 def _motion(
-    study: Study, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None
-) -> tuple[dict[str, Table], NDArray[np.int8], NDArray[np.bool_]]:
+    study: Study, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None,
+    also: Callable[[SolvedPoses], object] | None,
+) -> tuple[dict[str, Table], NDArray[np.int8], NDArray[np.bool_]]:  # fmt: skip
     """Tables, reasons, and the designs whose motion ends where no limit is known."""
     question = dataclasses.replace(asked(study), poses=poses)
-    motion = move(question)
+    motion = move(question, also=also)
     made = {name: make for name, make in _OF_MOTION.items() if name in wanted}
     if not motion.errors:
         made.pop("targets", None)
