@@ -202,7 +202,12 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     node = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)) for grid in grids])
     ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
     patch = np.repeat(np.arange(len(grids)), [grid.size for grid in grids])
-    length, determinant = study.units.label("length"), power_of_length(study, determinant_power(question.field))
+    length, per_area = study.units.label("length"), power_of_length(study, determinant_power(question.field))
+    determinant = np.broadcast_to(local.determinant, z.shape)
+    if question.field.same_assembly:
+        # It has one sign all over a patch; at a tip where no node is off the boundary rounding would choose another.
+        middle = question.field.local(np.array([patch.middle(question.about) for patch in found]), {}).determinant
+        determinant = np.copysign(determinant, np.broadcast_to(middle, len(found))[patch])
     columns = [
         Column(index.name, np.broadcast_to(index.values(local), z.shape), index.index.unit(study, question.field),
                index.index.meaning)
@@ -213,9 +218,7 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
         Column("x", z.real, length, "place of the point"),
         Column("y", z.imag, length, "place of the point"),
         *columns[:2],
-        Column(
-            "det_J", np.broadcast_to(local.determinant, z.shape), determinant, "determinant of the Jacobian, per radian"
-        ),
+        Column("det_J", determinant, per_area, "determinant of the Jacobian, per radian"),
         *columns[2:],
         Column("patch", patch, "", "part of the region between two boundary curves"),
         Column("ray", ray, "", "ray of the patch's grid"),

@@ -249,7 +249,8 @@ def _loop(grids: _Grids, which: Ints, dip: Floats, cell: Ints) -> Floats:
     """A closed curve about a dip within a cell, on rays to the cell's sides."""
     turn = 2 * np.pi * np.arange(RAYS) / RAYS
     way = np.stack([np.cos(turn), np.sin(turn)])
-    with np.errstate(divide="ignore"):
+    # A dip may lie on a side of its cell: along that side there is none to meet.
+    with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.where(way > 0, (cell[:, None] + 1 - dip[:, None]) / way, (cell[:, None] - dip[:, None]) / way)
     way = way * np.min(np.where(way == 0, np.inf, ends), axis=0)
 

@@ -61,7 +61,7 @@ def reachable(study: Study, progress: Progress) -> Result:
             box = float(bounding_box(designs, part, integral.boundary, EFFORT.samples)[0])
             areas = [area]
             if found.number[0] > 1:
-                areas = [float(_integral(*piece, question).area[0]) for piece in found.all()]
+                areas = [float(_integral(*piece, question, area).area[0]) for piece in found.all()]
             if not over.all:
                 # Of all pieces together; where every value is to be reached single values show too much.
                 error = max(error, float(panels.seen[0]) - sum(areas))
@@ -107,9 +107,10 @@ def reachable(study: Study, progress: Progress) -> Result:
     )
 
 
-def _integral(designs: Designs, panels: Panels, question: Question) -> Integral:
-    """The area, and the boundary that was met."""
-    return integrate(designs, panels, AREA, EFFORT.samples, question.scan, (), np.zeros((0, 1), dtype=bool))
+def _integral(designs: Designs, panels: Panels, question: Question, whole: float = 0.0) -> Integral:
+    """The area, and the boundary that was met; of a piece of a region of area `whole`."""
+    none = np.zeros((0, 1), dtype=bool)
+    return integrate(designs, panels, AREA, EFFORT.samples, question.scan, (), none, whole)
 
 
 def _questions(study: Study, name: str, over: Over) -> Iterator[Question]:

@@ -34,6 +34,8 @@ MOST_HALVINGS = 12
 ALONG, AREA = 0.6, 0.1
 # The area is integrated at least to this relative tolerance.
 FINEST_AREA = 1e-6
+# A piece smaller than this part of the whole region is measured by the whole: its boundary may be rough all over.
+SLIVER = 1e-3
 # Places at which the integrals of one design may look; what is in doubt then stays so, and its error tells.
 BUDGET = 2_000_000
 # Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
@@ -93,6 +95,7 @@ def integrate(
     counted: tuple[float, float],
     integrands: Sequence[Integrand],
     endless: NDArray[np.bool_],
+    whole: float = 0.0,
 ) -> Integral:
     """Area and means of local indices of every design, to a relative tolerance.
 
@@ -104,6 +107,8 @@ def integrate(
         None for the area alone.
     endless : ndarray of bool, shape (integrands, designs)
         Integrals that are infinite, for which nothing is refined.
+    whole : float
+        Where the region is a piece of a larger one, the area of that: of a sliver it is wanted to `SLIVER` of it only.
     """
     count = designs.count
     middle = 0.5 * (panels.low + panels.high)
@@ -129,7 +134,8 @@ def integrate(
         values, errors = np.concatenate([values, value], axis=1), np.concatenate([errors, error], axis=1)
         total, doubt = (np.stack([np.bincount(done.design, row, count) for row in rows]) for rows in (values, errors))
         with np.errstate(invalid="ignore"):
-            wanted = np.stack([of_area * total[0], of_area * total[1], *np.fmax(each * total[2:], 0.0)])
+            least = of_area * SLIVER * whole
+            wanted = np.stack([*np.maximum(of_area * total[:2], least), *np.fmax(each * total[2:], 0.0)])
             wanted[2:][endless] = np.inf
         late = (doubt > wanted).any(axis=0) & (spent < BUDGET)
         if not late.any():
