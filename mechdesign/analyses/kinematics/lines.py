@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.rates import drive_velocities
+from mechdesign.analyses.kinematics.smoothing import NEAR
 from mechdesign.analyses.poses import CHUNK, dimensions, radians, starts
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet, wrap
@@ -100,6 +101,10 @@ class Line:
         Poses that each segment lies between.
     torn : bool array, shape (designs,)
         Designs whose motion ends between poses where no limit is known.
+    limits : list of int
+        Poses that are limits of motion.
+    followed : bool
+        Whether the motion is followed through change points: beside them poses have no slopes, and few digits.
     """
 
     def __init__(
@@ -111,6 +116,9 @@ class Line:
         self.plan = study.mechanism.plan(group.names)
         # Limits that count the turns of angles are judged along the motion; here its ends tell of them.
         self._limits = not study.mechanism.counting
+        # Where a motion is followed through a change point, what lies beside it has lost digits.
+        self.followed = self.plan.change_points is not None
+        self._steady = NEAR if self.followed else STALLED
         self.which = group.names.index(swept)
         self.given = [
             np.asarray(radians(study, c, v), dtype=float)
@@ -129,7 +137,7 @@ class Line:
             own = [values[some] for values in self.given]
             start = starts(study.mechanism, poses, some)
             self._start = self.plan.solve(own, dimensions(poses, some), start=start, limits=self._limits)
-        self._rows = some
+        self._rows, self.limits = some, list[int]()
         self.row, self.position, self.place = some, some.astype(float), self.given[self.which][some]
         parts = [self.sample(some[k : k + CHUNK], self.place[k : k + CHUNK])[:2] for k in range(0, len(some), CHUNK)]
         none = np.zeros((len(self._leaves), 0))
@@ -170,7 +178,7 @@ class Line:
         unit = [float(k == self.which) for k in range(len(given))]
         velocity = linear.velocity(drive_velocities(mechanism, linear, given, unit))
         shape = configuration.shape
-        steady = np.broadcast_to(regularity(linear) >= STALLED, shape)
+        steady = np.broadcast_to(regularity(linear) >= self._steady, shape)
         values = [np.broadcast_to(leaf.value(configuration), shape) for leaf in self._leaves]
         slopes = [np.broadcast_to(leaf.slope(configuration, velocity), shape) for leaf in self._leaves]
         table = np.stack(values), np.where(steady, np.stack(slopes), np.nan)
@@ -235,6 +243,7 @@ class Line:
                 np.full((len(self._leaves), 1), np.nan),
             )  # fmt: skip
             at.append(int(index[0]))
+            self.limits.append(int(index[0]))
         at.append(int(node[step + 1]))
         for one, other in pairwise(at):
             if one < 0 or other < 0:

@@ -143,6 +143,10 @@ def _best_poses(line: Line, values: Floats, still: Floats, rows: bool) -> tuple[
         best = values <= (line.least(values) + still)[:, design]
     if not rows:
         best &= line.position != np.round(line.position)
+    if line.followed:
+        sharp = ~np.isnan(line.slopes).all(axis=0)
+        sharp[line.limits] = True
+        best &= sharp
     function, node = np.nonzero(best)
     return function, node
 
