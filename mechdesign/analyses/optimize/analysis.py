@@ -183,9 +183,10 @@ def _doubts(ending: searching.Ending, budget: int) -> Iterator[str]:
     more = f"allow more, e.g. optimize.evaluations: {4 * budget}"
     if not ending.checked:
         yield f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
-    for row, ends in enumerate(ending.ends):
+    for row, (ends, rounding) in enumerate(zip(ending.ends, ending.rounding, strict=True)):
         found = ends[np.isfinite(ends)]
-        agree = np.abs(found - found.min(initial=np.inf)) <= searching.AGREE * np.abs(found).min(initial=np.inf)
+        far = max(searching.AGREE * np.abs(found).min(initial=np.inf), rounding)
+        agree = np.abs(found - found.min(initial=np.inf)) <= far
         if len(ends) > 1 and agree.sum() < len(ends):
             of = f" for row {row + 1} of the weights" if len(ending.ends) > 1 else ""
             lost = f", {len(ends) - len(found)} found no feasible design" if len(found) < len(ends) else ""

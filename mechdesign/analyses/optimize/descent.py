@@ -27,7 +27,7 @@ LADDER = ((1e-4, 0.3), (1e-5, 0.03))
 ROUGH = ((1e-2, 0.3), (1e-3, 0.05))
 SQUARES_STEP, MOST_SQUARES, MOST_FINAL_SQUARES, MOST_STEPS = 1e-5, 60, 150, 60
 # Points asked for one after the other, none of which is better than what was known: a stage ends.
-MOST_IN_VAIN = 30
+MOST_IN_VAIN, ROUGH_MOST_IN_VAIN = 30, 12
 # Gains of a step, in parts of what a range changes, below which a descent ends.
 ENOUGH, ROUGH_ENOUGH = 1e-14, 1e-5
 # How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
@@ -118,7 +118,7 @@ class _Descent:
 
     def ask(self, ask: Ask, points: Floats) -> Integers:
         """Rows of points; the best of them, or of those before, is where the next stage begins."""
-        if self._in_vain > MOST_IN_VAIN:
+        if self._in_vain > (ROUGH_MOST_IN_VAIN if self.explorer.rough else MOST_IN_VAIN):
             raise _InVain
         rows = ask(points)
         known = self.explorer.known

@@ -19,7 +19,7 @@ from mechdesign.analyses.workspace.rays import Floats
 
 # Evaluations a row of weights and a variable and one more: of a start at least, of a search where the study says none,
 # and of one whose every evaluation takes long (there also for both ends of each goal).
-START, USUAL, SLOW_START, MOST_STARTS = 500, 1800, 60, 12
+START, USUAL, SLOW_START, MOST_STARTS = 500, 1800, 30, 12
 # Points of a start's first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
 SAMPLE, MOST_VERTICES = 16, 4
 # The least part of a start's evaluations that its sample takes.
@@ -55,10 +55,13 @@ class Ending:
     ends : list of ndarray
         For each row of weights the objective's smallest value of every start, in the goal's own units where it weighs
         one; nan where a start found no feasible point.
+    rounding : list of float
+        For each row of weights the difference below which two of these values are the same.
     """
 
     checked: bool
     ends: list[Floats]
+    rounding: list[float]
 
 
 def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
@@ -97,20 +100,21 @@ def search(
         if not known.feasible.any():
             # Too few for anything but to look around.
             explorer(own.random((explorer.left - explorer.reserve, explorer.dimensions)))
-        elif not patient and k and all(
-            np.ptp(np.sort(ends)[:2]) <= ROUNDING * abs(ends.min()) + OF_ALL * np.ptp(known.values[known.feasible])
-            for ends in (_ends(known, _weighted(known, smallest, row), done) for row in rows)
-        ):  # fmt: skip
-            break
+        elif not patient:
+            objectives = [_weighted(known, smallest, row) for row in rows]
+            if all(_agree(known, objective, _ends(known, objective, done)) for objective in objectives):
+                break
     begins.append(budget - explorer.left)
     explorer.reserve = 0
     try:
-        confirmed = [_confirmed(explorer, _weighted(explorer.known, smallest, row), rng) for row in rows]
-        checked = all(confirmed)
+        checked = _confirmed(explorer, [_weighted(explorer.known, smallest, row) for row in rows], rng)
     except Spent:
         checked = False
     known = explorer.known
-    return Ending(checked, [_ends(known, _weighted(known, smallest, row), begins) for row in rows])
+    objectives = [_weighted(known, smallest, row) for row in rows]
+    merits = [known.merit(each) for each in objectives]
+    rounding = [_rounding(known, merit, merit.min()) if known.feasible.any() else 0.0 for merit in merits]
+    return Ending(checked, [_ends(known, each, begins) for each in objectives], rounding)
 
 
 def _start(
@@ -121,7 +125,9 @@ def _start(
     begin: int,
     patient: bool,
 ) -> None:
-    """Search from points of its own until the evaluations of this start are used up, or after `ROUNDS` of descents.
+    """Search from points of its own until the evaluations of this start are used up.
+
+    Where not all need be used it ends after `ROUNDS` of descents, or one in which two came to the same.
 
     Parameters
     ----------
@@ -140,15 +146,20 @@ def _start(
             evolve(explorer, _weighted(explorer.known, smallest, row), rng, begin, most)
         for _ in range(MOST_ROUNDS if patient else ROUNDS):
             room = (explorer.left - explorer.reserve) // (DESCENT * (2 * n + 1) * len(rows))
-            found: list[tuple[Objective, int]] = []
-            for row, done in zip(rows, tried, strict=True):
-                objective = _weighted(explorer.known, smallest, row)
-                done += (promising := _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, ABREAST))))
-                found += [(objective, k) for k in promising]
-            if found:
-                ends = descend(explorer, found, ladder)
-                for (_, k), end in zip(found, ends, strict=True):
-                    next(done for done in tried if k in done).append(end)
+            objectives = [_weighted(explorer.known, smallest, row) for row in rows]
+            promising = [
+                _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, ABREAST)))
+                for objective, done in zip(objectives, tried, strict=True)
+            ]
+            found = [(each, k) for each, points in zip(objectives, promising, strict=True) for k in points]
+            ends = descend(explorer, found, ladder)
+            agreed = True
+            for objective, points, done in zip(objectives, promising, tried, strict=True):
+                own, ends = ends[: len(points)], ends[len(points) :]
+                done += [*points, *own]
+                agreed &= _agree(explorer.known, objective, explorer.known.merit(objective)[own])
+            if agreed and not patient:
+                break
             if len(found) < len(rows) * ABREAST:
                 explorer(rng.random((SAMPLE, n)))
     except Spent:
@@ -178,27 +189,41 @@ def _apart(known: Known, objective: Objective, tried: Sequence[int], begin: int,
     return found
 
 
-def _confirmed(explorer: Explorer, objective: Objective, rng: np.random.Generator) -> bool:
-    """Whether no small step improves the best point any more; descends from where one does."""
-    n = explorer.dimensions
+def _confirmed(explorer: Explorer, objectives: Sequence[Objective], rng: np.random.Generator) -> bool:
+    """Whether no small step improves the best point of any objective; descends from where one does."""
+    n, open_ = explorer.dimensions, list(objectives)
     ladder: Sequence[tuple[float, float]] = ROUGH if explorer.rough else LADDER
-    start = int(np.argmin(explorer.known.merit(objective)))
     for _ in range(MOST_CHECKS):
-        if not explorer.known.feasible[start]:
+        known = explorer.known
+        starts = [_best(known, each) for each in open_]
+        if not known.feasible[starts].all():
             return False
-        before = explorer.known.merit(objective)[start]
-        descend(explorer, [(objective, start)], ladder, final=True)
-        merit = explorer.known.merit(objective)
-        best = int(np.argmin(merit))
-        steps = np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (4 * n, n))])
-        explorer(explorer.known.u[best] + CHECKED * steps)
-        merit = explorer.known.merit(objective)
-        start, all_ = int(np.argmin(merit)), float(np.ptp(merit[explorer.known.feasible]))
-        little = (NOISE if explorer.rough else ROUNDING) * abs(merit[best]) + OF_ALL * all_
-        if merit[best] - merit[start] <= little and before - merit[best] <= max(STILL * abs(merit[best]), little):
+        before = [known.merit(each)[start] for each, start in zip(open_, starts, strict=True)]
+        descend(explorer, list(zip(open_, starts, strict=True)), ladder, final=True)
+        bests = [_best(explorer.known, each) for each in open_]
+        steps = [np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (4 * n, n))]) for _ in open_]
+        points = [explorer.known.u[best] + CHECKED * around for best, around in zip(bests, steps, strict=True)]
+        explorer(np.concatenate(points))
+        moving = []
+        for each, best, begun in zip(open_, bests, before, strict=True):
+            merit = explorer.known.merit(each)
+            little = _rounding(explorer.known, merit, merit[best], NOISE if explorer.rough else ROUNDING)
+            still = begun - merit[best] > max(STILL * abs(merit[best]), little)
+            if still or merit[best] - merit.min() > little:
+                moving.append(each)
+        if not moving:
             return True
-        ladder = ladder[-1:]
+        open_, ladder = moving, ladder[-1:]
     return False
+
+
+def _best(known: Known, objective: Objective) -> int:
+    return int(np.argmin(known.merit(objective)))
+
+
+def _rounding(known: Known, merit: Floats, value: float, part: float = ROUNDING) -> float:
+    """How far values of an objective may differ and still count as the same."""
+    return part * abs(value) + OF_ALL * float(np.ptp(merit[known.feasible]))
 
 
 def _ends(known: Known, objective: Objective, begins: Sequence[int]) -> Floats:
@@ -206,6 +231,12 @@ def _ends(known: Known, objective: Objective, begins: Sequence[int]) -> Floats:
     merit = np.where(known.feasible, known.merit(objective), np.nan)
     parts = [merit[a:b] for a, b in pairwise(begins)]
     return np.array([np.nan if np.isnan(part).all() else np.nanmin(part) for part in parts])
+
+
+def _agree(known: Known, objective: Objective, found: Floats) -> bool:
+    """Whether the two smallest of some values of an objective are the same."""
+    two = np.sort(found)[:2]
+    return len(two) == 2 and bool(np.ptp(two) <= _rounding(known, known.merit(objective), two[0]))
 
 
 def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> Floats:
