@@ -110,10 +110,13 @@ def test_what_is_larger_than_any_mechanism_is_refused(change: str) -> None:
         mechdesign.reliability(study_of(SLIDER_CRANK, f"reliability.{change}"))
 
 
-@pytest.mark.parametrize(("change", "message"), [
-    ("dimensions={crank.length: 1e308}", r"the number 1e\+308 is too large"),
-    ("clearances={A: {radial: 1e200}}", r"the number 1e\+200 is too large a length"),
-])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("dimensions={crank.length: 1e308}", r"the number 1e\+308 is too large"),
+        ("clearances={A: {radial: 1e200}}", r"the number 1e\+200 is too large a length"),
+    ],
+)
 def test_what_is_larger_than_any_length_is_refused_when_read(change: str, message: str) -> None:
     with pytest.raises(StudyError, match=message):
         study_of(SLIDER_CRANK, f"reliability.{change}")
