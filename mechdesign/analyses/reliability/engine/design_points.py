@@ -25,7 +25,7 @@ HALVINGS = 10
 WALKS, AROUND, NEAR = 3, 60, 0.5
 # Two points in directions nearer than this (cosine), at like distances, are one.
 ALIKE = 0.95
-MOST = 32
+MOST = 24
 # Starts of each limit near the mean where directions count: each has its own.
 TURNED = 6
 
