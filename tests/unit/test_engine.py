@@ -198,3 +198,11 @@ def test_the_same_seed_gives_the_same_bits() -> None:
     case = CASES["parabola"]
     assert sampled(case.problem, 5) == sampled(case.problem, 5)
     assert sampled(case.problem, 5).failure != sampled(case.problem, 6).failure
+
+
+def test_design_points_leave_no_wide_gap_on_a_circle() -> None:
+    """Where all of a circle is as near, what lies in a gap between its points is not sampled, and not missed."""
+    for seed in range(40):
+        points = find(limit_states.ring(4.8, 6).problem, np.random.default_rng(seed)).u
+        turns = np.sort(np.arctan2(points[:, 1], points[:, 0]))
+        assert np.diff([*turns, turns[0] + 2 * np.pi]).max() < np.radians(85)

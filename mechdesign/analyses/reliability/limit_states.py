@@ -20,12 +20,8 @@ _STEP = 1e-5
 def problem_of(setting: Setting, sources: Sources) -> Problem:
     """Where the mechanism breaks a limit: margins are nan where it cannot be assembled.
 
-    Raises
-    ------
-    MechanismError
-        Never: what has no closed derivative is differenced.
+    What has no closed derivative is differenced.
     """
-
     setting = limited_part(setting)
 
     def margins(u: Floats) -> Floats:

@@ -24,6 +24,12 @@ GAIN = 0.95
 APART = 0.5
 
 
+def sizes(problem: Problem) -> Floats:
+    """Margins at the mean as sizes by which others are large or small, shape (limits,); 1 where they are none."""
+    scale = np.abs(problem.margins(np.zeros((problem.dimension, 1))))[:, 0]
+    return np.asarray(np.where((scale > 0) & np.isfinite(scale), scale, 1.0))
+
+
 def descend(
     problem: Problem, limit: Ints, u: Floats, scale: Floats, *, together: bool = True
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -34,7 +40,7 @@ def descend(
     limit : ndarray of int, shape (starts,)
     u : ndarray, shape (dimension, starts)
     scale : ndarray, shape (limits,)
-        Margins that are large.
+        Those of `sizes`.
     together : bool
         Whether starts that have come together go on as one.
 

@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.reliability.engine.descent import alike
+from mechdesign.analyses.reliability.engine.descent import alike, sizes
 from mechdesign.analyses.reliability.engine.directions import worst
 from mechdesign.analyses.reliability.engine.problem import Floats, Problem, failed
 
 Ints = NDArray[np.intp]
 
-# Standard deviations of the samples that starts are taken from, how many of each, and starts of one limit.
+# Standard deviations of the samples that starts are taken from, and how many of each.
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
-SAMPLES, STARTS = 160, 8
+SAMPLES = 160
+# Starts of one limit: as many as leave no wide gap on a circle, all of which is as near. Fewer where directions count,
+# for these have starts of their own (`TURNED`), and where margins end: tangents are rough there, and their sum grows.
+STARTS, FEW_STARTS = 24, 8
 EXPLORED = len(SPREADS) * SAMPLES
 HALVINGS = 10
 # Rounds in which ends of the margins come nearer, by so many points at least about each, of this spread.
@@ -66,10 +69,8 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     ends = starts[:, limit < 0]
     limits = np.arange(len(margins))
     starts = np.concatenate([np.tile(near, len(limits)), starts[:, limit >= 0]], axis=1)
-    scale = np.abs(problem.margins(np.zeros((d, 1))))[:, 0]
-    scale = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
     limit = np.concatenate([np.repeat(limits, near.shape[1]), limit[limit >= 0]])
-    found = worst(problem, limit, starts, scale)
+    found = worst(problem, limit, starts, sizes(problem))
     ends = _nearer(problem, ends, rng)
     straight = np.where(problem.straight[:, None], ends, 0.0)
     length = np.linalg.norm(straight, axis=0)
@@ -90,7 +91,8 @@ def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]
     """
     nowhere = np.isnan(margins).any(axis=0)
     broken = [(margin < 0) & ~nowhere for margin in margins]
-    chosen = [_apart(problem, u[:, beyond]) for beyond in (*broken, nowhere)]
+    most = FEW_STARTS if len(problem.circles) else STARTS
+    chosen = [*(_apart(problem, u[:, beyond], most) for beyond in broken), _apart(problem, u[:, nowhere], FEW_STARTS)]
     limit = np.repeat([*range(len(margins)), -1], [part.shape[1] for part in chosen])
     return limit, _edges(problem, limit, np.concatenate(chosen, axis=1))
 
@@ -131,8 +133,8 @@ def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
     return ends
 
 
-def _apart(problem: Problem, u: Floats) -> Floats:
-    """The nearest point, and one after the other the one whose direction is farthest from those chosen."""
+def _apart(problem: Problem, u: Floats, most: int) -> Floats:
+    """The nearest point, and one after the other, `most` in all, that whose direction is farthest from those chosen."""
     if not u.shape[1]:
         return u
     size = np.linalg.norm(u[problem.normals], axis=0)
@@ -140,7 +142,7 @@ def _apart(problem: Problem, u: Floats) -> Floats:
     directions /= np.linalg.norm(directions, axis=0)
     chosen = [int(np.argmin(size))]
     cosine = directions[:, chosen[0]] @ directions
-    while len(chosen) < STARTS and cosine.min() < ALIKE:
+    while len(chosen) < most and cosine.min() < ALIKE:
         chosen.append(int(np.argmin(cosine)))
         cosine = np.maximum(cosine, directions[:, chosen[-1]] @ directions)
     return u[:, chosen]

@@ -16,9 +16,20 @@ TURNS, STILL = 6, 0.02
 
 
 def worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats, Floats]:
-    """Descend, and turn directions to the worst, in turns: points, limits, normals and pulls.
+    """Descend with directions held, and turn these to the worst, one after the other until they stay.
 
-    Where directions alone break a limit, the point is at the mean of all else.
+    Parameters
+    ----------
+    limit : ndarray of int, shape (starts,)
+    u : ndarray, shape (dimension, starts)
+    scale : ndarray, shape (limits,)
+        Those of `descent.sizes`.
+
+    Returns
+    -------
+    u, limit, normal, pull
+        Of the points that were found, as in `DesignPoints`, but `u` and `normal` of shape (dimension, points). Where
+        directions alone break a limit, the point is at the mean of all else.
     """
     found, at, normal = _points(problem, limit, _turned(problem, limit, u)[0], scale)
     if not len(problem.circles):
@@ -29,6 +40,7 @@ def worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floa
         found, at, normal = _points(problem, at, turned, scale)
         if moved < STILL:
             break
+    # What directions do alone, all normal variables at their means.
     alone = np.where(problem.straight[:, None], 0.0, u)
     for _ in range(TURNS):
         alone, margin, _ = _turned(problem, limit, alone)
@@ -37,7 +49,8 @@ def worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floa
     normal = np.concatenate([normal, np.zeros_like(alone)], axis=1)
     _, margin, slope = _turned(problem, at, found)
     steep = np.linalg.norm(slope[problem.normals], axis=0)
-    # How fast the logarithm of the probability falls with the distance.
+    # A direction counts by how much the logarithm of the probability changes as it turns: the slope by the direction
+    # over that by the distance, times how fast the logarithm falls with the distance.
     away = (found * normal).sum(axis=0)
     width = np.where(away > 0, steep / _hazard(away), steep * (1.0 - away) + np.maximum(-margin, 0.0))
     pull = np.moveaxis(-slope[problem.circles], 2, 0) / np.where(width > 0, width, 1.0)[:, None, None]
@@ -45,6 +58,7 @@ def worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floa
 
 
 def _points(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats]:
+    """Starts that came to their limits: points, limits and normals."""
     u, normal, good = descend(problem, limit, u, scale)
     return u[:, good], limit[good], normal[:, good]
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from mechdesign.analyses.reliability.engine.descent import descend
+from mechdesign.analyses.reliability.engine.descent import descend, sizes
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints
 from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.problem import Estimate, Floats, Problem
@@ -74,13 +74,11 @@ def _chances(problem: Problem, points: DesignPoints, u: Floats, rng: np.random.G
     limit = points.limit[:BEGUN]
     starts = np.where(problem.straight[:, None, None], begun.T[:, :, None], u[:, None])
     at_mean = problem.margins(np.where(problem.straight[:, None], 0.0, u))
-    scale = np.abs(problem.margins(np.zeros((problem.dimension, 1))))[:, 0]
-    scale = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
     normal = np.repeat(points.normal[:BEGUN].T[:, :, None], count, axis=2)
     distance = np.repeat(points.distance[:BEGUN, None], count, axis=1)
     sloped = limit >= 0
     found, normals, good = descend(
-        problem, np.repeat(limit[sloped], count), starts[:, sloped].reshape(len(u), -1), scale, together=False
+        problem, np.repeat(limit[sloped], count), starts[:, sloped].reshape(len(u), -1), sizes(problem), together=False
     )
     shape = (len(u), int(sloped.sum()), count)
     normal[:, sloped] = normals.reshape(shape)

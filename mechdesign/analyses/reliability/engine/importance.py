@@ -15,7 +15,7 @@ from mechdesign.analyses.reliability.engine.design_points import EXPLORED, MOST,
 from mechdesign.analyses.reliability.engine.intervals import weighted
 from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.precision import Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate, Floats, Problem, failed
+from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Floats, Problem, failed
 
 # Points farther than the nearest one by this many standard deviations bring nothing.
 FAR = 4.0
@@ -32,7 +32,6 @@ FIXED, SMALLEST = 0.1, 0.02
 BEYOND, NEAREST = 0.2, 0.9
 # First samples of the value, by which the rest is planned; so much more than what they ask for.
 FIRST, MARGIN = 3000, 1.1
-BLOCK = 20_000
 # Beyond any density that counts, and the logarithm of such a one.
 TINY, MUCH = 1e-200, 600.0
 
@@ -85,7 +84,7 @@ def importance_sampling(
 
 
 def _about(problem: Problem, points: DesignPoints) -> Mixture:
-    """Parts about the design points, weighted by the tangents' probabilities, and what is beyond all of them."""
+    """Parts about the design points, weighted by the tangents' probabilities, and what is beyond the nearest one."""
     from scipy.special import i0e, log_ndtr
 
     near = points.distance <= points.distance.min() + FAR
@@ -102,6 +101,7 @@ def _about(problem: Problem, points: DesignPoints) -> Mixture:
 
 
 def _least(normal: Floats) -> float:
+    """Least distance from the mean of points of shape (normal variables, n)."""
     return float(np.sqrt((normal * normal).sum(axis=0).min(initial=np.inf)))
 
 

@@ -22,14 +22,17 @@ class Mixture:
 
     Parameters
     ----------
+    problem : Problem
+        Tells which variables are normal and which directions.
     weight : ndarray, shape (parts,)
-        What they lack to 1 is beyond.
+        What they lack to 1 is the weight of what is beyond.
     centre : ndarray, shape (parts, normal variables)
     root : ndarray, shape (parts, normal variables, normal variables)
         Cholesky factors of the covariances.
     heading : ndarray, shape (parts, directions, 2)
         Mean directions, as long as they are concentrated.
     beyond : float
+        Distance in standard deviations.
     """
 
     problem: Problem

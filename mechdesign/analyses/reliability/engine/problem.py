@@ -86,7 +86,7 @@ class Problem:
         return np.isin(np.arange(self.dimension), self.normals)
 
     def on_circles(self, u: Floats) -> Floats:
-        """Points, shape (dimension, n), with their directions as cosine and sine again."""
+        """Points, shape (dimension, n), changed in place: their directions are cosine and sine again."""
         for pair in self.circles:
             length = np.linalg.norm(u[pair], axis=0)
             u[pair[0]] = np.where(length > 0, u[pair[0]], 1.0)
