@@ -191,6 +191,19 @@ def test_zero_curves_of_known_functions() -> None:
         assert (z**2).imag == pytest.approx(np.full(len(z), 0.01), abs=1e-12)
 
 
+def test_many_short_curves_are_joined() -> None:
+    """A circle in 500 stretches, in any order and direction, and beside it a single point."""
+    random = np.random.default_rng(3)
+    turn = np.exp(2j * np.pi * np.arange(5001) / 5000)
+    turn[-1] = turn[0]
+    parts = [turn[10 * k : 10 * k + 11][:: random.choice([-1, 1])] for k in random.permutation(500)]
+    loop, point = joined([np.array([2.0 + 0j]), *parts], 1e-9)
+    assert len(point) == 1
+    assert len(loop) == 5001
+    assert loop[0] == loop[-1]
+    assert np.abs(np.diff(loop)) == pytest.approx(np.full(5000, 2 * np.sin(np.pi / 5000)), rel=1e-9)
+
+
 @pytest.mark.parametrize("radius", [0.02, 1e-3, 1e-5])
 @pytest.mark.parametrize("centre", [0.3234 + 0.1j, LINES[20] + 1j * LINES[7]])
 def test_a_loop_smaller_than_a_cell(radius: float, centre: complex) -> None:

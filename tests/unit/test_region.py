@@ -198,6 +198,27 @@ def test_a_platform_over_a_range_of_orientations(every: bool) -> None:
     assert (np.abs(edge["platform.angle"]) <= 10).all()
 
 
+@pytest.mark.parametrize("low", [0, -60])
+def test_a_limit_on_half_an_angle(low: float) -> None:
+    """The angle lies within half a turn of the sketch's 127 deg: at -53 deg its half jumps from -27 to 153.
+
+    From 0 to 60 the limit ends the region where it is zero; from -60 also where it jumps, and no circle is found there.
+    """
+    limit = f"mechanism.limits=[{{measure: half, min: {low}, max: 60}}]"
+    result = mechdesign.workspace(study_of(FIVE_BAR, "mechanism.measures={half: left.angle/2}", limit))
+    z, a, b, drawn = uniform(0.7), 0.25, 0.4, np.arctan2(0.2, -0.15)
+    one, other = np.abs(z + 0.15), np.abs(z - 0.15)
+    bend = np.arccos(np.clip((a**2 + one**2 - b**2) / (2 * a * one), -1, 1))
+    angle = np.angle(z + 0.15) + bend
+    angle += 2 * np.pi * np.round((drawn - angle) / (2 * np.pi))
+    half = np.degrees(angle) / 2
+    legs = (one <= a + b) & (one >= b - a) & (other <= a + b) & (other >= b - a)
+    guess, doubt = by_chance(legs & (low <= half) & (half <= 60), 1.4**2)
+    assert abs(result.main["area"][0] - guess) < doubt
+    found = np.isfinite(result.main["circle_radius"][0])
+    assert found or any("jumps" in warning for warning in result.warnings)
+
+
 @pytest.mark.parametrize("degrees", [-15, 0, 10, 40])
 def test_a_platform_at_constant_orientation(degrees: float) -> None:
     """The common part of three rings about the bases moved by the platform's points: area by arcs."""

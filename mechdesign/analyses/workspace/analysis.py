@@ -99,6 +99,11 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             others = [patch for patch in found if patch not in counted]
             shapes.append(inscribed(question.field, question.about, question.scan, counted, others))
             regions.append((study, question, found))
+            if not np.isfinite([shapes[-1][0].radius, shapes[-1][1].width]).all():
+                warnings.append(
+                    f"the largest circle or rectangle inside the region{where(question)} was not found: where a limit "
+                    "jumps (an angle's turn ends there) no slope leads along the boundary"
+                )
             areas, drawn = areas_of_pieces(question, given, CLOSE), bool(given.pieces.drawn[0])
             pieces.append(piece_columns(study, question, found, areas, drawn))
             several |= len(areas) > 1

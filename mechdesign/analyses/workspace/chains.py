@@ -63,32 +63,36 @@ def joined(curves: Sequence[Complex], exact: float) -> list[Complex]:
         Distance at which ends meet, whatever the spacing of the points.
     """
     rest, points = [curve for curve in curves if len(curve) > 1], [curve for curve in curves if len(curve) == 1]
-    while True:
-        best: tuple[float, int, int, int, int] | None = None
-        for a, one in enumerate(rest):
-            for b in range(a, len(rest)):
-                for at, to in (0, 0), (0, -1), (-1, 0), (-1, -1):
-                    if a == b and (at, to) != (0, -1):
-                        continue
-                    gap = abs(one[at] - rest[b][to])
-                    step = max(_last(one, at), _last(rest[b], to))
-                    ends = gap == 0 and a == b
-                    if (
-                        not ends
-                        and gap <= max(exact, NEAR * step if a != b else 0.0)
-                        and (best is None or gap < best[0])
-                    ):
-                        best = (gap, a, b, at, to)
-        if best is None:
-            return rest + points
-        gap, a, b, at, to = best
+    ends = np.array([[curve[0], curve[-1]] for curve in rest]).reshape(-1, 2)
+    steps = np.array([[_last(curve, 0), _last(curve, -1)] for curve in rest]).reshape(-1, 2)
+    left = np.ones(len(rest), dtype=bool)
+    # By the first curve and the second, the end of the first and of the second; infinite where they do not meet.
+    gaps = np.full((len(rest), len(rest), 2, 2), np.inf)
+
+    def measure(k: int) -> None:
+        gap = np.abs(ends[k][:, None] - ends[:, None, :])
+        gap[gap > np.maximum(exact, NEAR * np.maximum(steps[k][:, None], steps[:, None, :]))] = np.inf
+        own = abs(ends[k, 0] - ends[k, 1])
+        gap[k], gap[~left] = np.inf, np.inf
+        gap[k, 0, 1] = own if 0 < own <= exact else np.inf
+        gaps[k, k:], gaps[:k, k] = gap[k:], gap[:k].transpose(0, 2, 1)
+
+    for k in range(len(rest)):
+        measure(k)
+    while gaps.size:
+        a, b, at, to = (int(i) for i in np.unravel_index(gaps.argmin(), gaps.shape))
+        gap = gaps[a, b, at, to]
+        if gap == np.inf:
+            break
         if a == b:
-            rest[a] = np.append(rest[a][:-1] if gap <= exact else rest[a], rest[a][0])
-            continue
-        one = rest[a] if at else rest[a][::-1]
-        other = rest[b][::-1] if to else rest[b]
-        rest[a] = np.concatenate([one, other[1:] if gap <= exact else other])
-        del rest[b]
+            rest[a] = np.append(rest[a][:-1], rest[a][0])
+        else:
+            one, other = rest[a] if at else rest[a][::-1], rest[b][::-1] if to else rest[b]
+            rest[a] = np.concatenate([one, other[1:] if gap <= exact else other])
+            left[b], gaps[b], gaps[:, b] = False, np.inf, np.inf
+        ends[a], steps[a] = rest[a][[0, -1]], (_last(rest[a], 0), _last(rest[a], -1))
+        measure(a)
+    return [curve for curve, keep in zip(rest, left, strict=True) if keep] + points
 
 
 def _last(curve: Complex, end: int) -> float:

@@ -34,6 +34,8 @@ FIRM = 16
 POINT, ONE_PLACE = 1e-6, 1e-7
 # Step of differences as a part of the size; a trial that is not nearly as good as the best so far is left.
 STEP, HOPEFUL = 1e-6, 0.8
+# Rounds in which a shape may still reach as far out of the region as before.
+PATIENCE = 4
 # A margin whose slope is less than this part of it is far from zero.
 FLAT = 1e-6
 
@@ -265,9 +267,14 @@ class _Grow:
         # Places all round, each with the margin that is nearest to zero there.
         places = u[:: SAMPLES // FIRM]
         which = np.argmin(self._distances(self.size * shape.points(p, places)), axis=0)
-        firm, room = len(places), 0.0
+        firm, room, least, stuck = len(places), 0.0, -np.inf, 0
         for _ in range(ROUNDS):
             more_u, more_which, depth = self._lowest(shape, p, u)
+            # Where a margin jumps no slope leads out of it.
+            stuck = 0 if depth > least or room <= 0 else stuck + 1
+            least = max(least, depth) if room > 0 else least
+            if stuck > PATIENCE:
+                break
             if room > 0 and depth > -DEPTH:
                 return p * self.size
             later = self._fewer(np.concatenate([places[firm:], more_u]), np.concatenate([which[firm:], more_which]))
