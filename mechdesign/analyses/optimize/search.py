@@ -19,7 +19,7 @@ from mechdesign.analyses.workspace.rays import Floats
 
 # Evaluations a row of weights and a variable and one more: of a start at least, of a search where the study says none,
 # and of one whose every evaluation takes long (there also for both ends of each goal).
-START, USUAL, SLOW_START, MOST_STARTS = 500, 1800, 30, 12
+START, USUAL, SLOW_START, MOST_STARTS = 500, 1800, 20, 12
 # Points of a start's first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
 SAMPLE, MOST_VERTICES = 16, 4
 # The least part of a start's evaluations that its sample takes.
@@ -192,7 +192,7 @@ def _apart(known: Known, objective: Objective, tried: Sequence[int], begin: int,
 def _confirmed(explorer: Explorer, objectives: Sequence[Objective], rng: np.random.Generator) -> bool:
     """Whether no small step improves the best point of any objective; descends from where one does."""
     n, open_ = explorer.dimensions, list(objectives)
-    ladder: Sequence[tuple[float, float]] = ROUGH if explorer.rough else LADDER
+    ladder: Sequence[tuple[float, float]] = ROUGH[-1:] if explorer.rough else LADDER
     for _ in range(MOST_CHECKS):
         known = explorer.known
         starts = [_best(known, each) for each in open_]
