@@ -324,7 +324,7 @@ def test_designs_that_do_not_assemble_have_a_slope():
     assert [bool(reason) for reason in found.reasons] == open_.tolist()
     assert (np.diff(found.shortfall[open_]) < 0).all()
     assert (found.shortfall[~open_] == 0).all()
-    assert ((found.clearances < 0).any(axis=1) == open_).all()
+    assert ((found.assembly_margins < 0).any(axis=1) == open_).all()
 
 
 def test_residuals_are_what_a_root_mean_square_is_of():
