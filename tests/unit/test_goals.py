@@ -423,7 +423,7 @@ def test_goals_of_chosen_rows():
     ("wanted", "told"),
     [
         ("[kinematics.extremes.range]", r"minimize\.0: .* units: B\.x \(mm\), rocker\.angle \(deg\).*'where'"),
-        ("{result: kinematics.extremes.max, where: {output: B.y}}", r"minimize\.0: no row .* output B\.y; did you mean"),
+        ("{result: kinematics.extremes.max, where: {output: B.y}}", r"minimize\.0: no row .* output B\.y; did you"),
         ("{result: kinematics.extremes.max, where: {outptu: B.x}}", r"minimize\.0: where: no column 'outptu'; did"),
         ("[B.x, {result: kinematics.B.x, were: {}}]", r"minimize\.1\.were: unknown key; did you mean 'where'"),
     ],

@@ -324,7 +324,7 @@ def test_designs_that_do_not_assemble_have_a_slope():
     assert [bool(reason) for reason in found.reasons] == open_.tolist()
     assert (np.diff(found.shortfall[open_]) < 0).all()
     assert (found.shortfall[~open_] == 0).all()
-    assert ((found.clearances < 0).any(axis=1) == open_).all()
+    assert ((found.assembly_margins < 0).any(axis=1) == open_).all()
 
 
 def test_residuals_are_what_a_root_mean_square_is_of():
@@ -356,7 +356,7 @@ def test_searches_use_their_evaluations_and_tell_where_starts_disagree():
     assert 0.9 * 6000 < result.counts["designs"] <= 6000
     ends = search(explorer(rastrigin, 4, budget=5000), [True], [[1.0]], 0).ends[0]
     assert len(ends) == 2
-    told = list(_doubts(Ending(True, [np.array([2.0, 1.0, np.nan, 1.001])]), 5000))
+    told = list(_doubts(Ending(True, [np.array([2.0, 1.0, np.nan, 1.001])], [0.0]), 5000))
     assert told == ["the 4 starts of the search ended between 1 and 2, 2 of them within 1 % of the best, 1 found no "
                     "feasible design; allow more, e.g. optimize.evaluations: 20000"]  # fmt: skip
 

@@ -14,7 +14,7 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 
-def clearances(study: Study, poses: Poses, solved: Iterable[SolvedPoses] | None = None) -> Floats:
+def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses] | None = None) -> Floats:
     """Margins of every pose in parts of the mechanism's size, shape (designs, margins): negative where one is missed.
 
     Squares of lengths and angles in radians, smooth in the dimensions; nan where what comes before does not assemble.

@@ -1,9 +1,9 @@
 """From a design to the optimum near it, by SciPy's least squares and sequential quadratic programming.
 
 The worst of several rows has edges where another row becomes the worst. Its rows are smooth: the worst of them is made
-small by its epigraph, ``min t`` where no row exceeds ``t``. Rows of conditions, and the clearances of the poses, are
-conditions of their own. [Nocedal & Wright, Numerical Optimization, 2006, ch. 10 and 18.] Derivatives are differences
-over steps, evaluated in one batch.
+small by its epigraph, ``min t`` where no row exceeds ``t``. Rows of conditions, and the margins by which poses
+assemble, are conditions of their own. [Nocedal & Wright, Numerical Optimization, 2006, ch. 10 and 18.] Derivatives are
+differences over steps, evaluated in one batch.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ MOST_IN_VAIN, ROUGH_MOST_IN_VAIN = 30, 12
 ENOUGH, ROUGH_ENOUGH = 1e-14, 1e-5
 # How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
 SLACK = 1e-9
-# An impossible point's objective above the last possible one's, in parts of what a range changes.
+# Added to the objective where a point has no value and no condition tells why, in parts of what a range changes.
 IMPOSSIBLE = 1e3
 # Slopes of conditions below this part of their values are none.
 FLAT = 1e-6
@@ -97,8 +97,8 @@ class _Descent:
             elif objective.factors[part.column] * part.sign > 0 and np.isfinite(known.rows[row, part.place]).all():
                 self.edged.append((part, abs(objective.factors[part.column])))
                 self.plain[part.column] = 0.0
-        # A root mean square alone is as low where its square is, which is the smoother.
-        self.bend = 0.0
+        # A root mean square that is the only goal is made small by its square, which is smoother.
+        self.curvature = 0.0
         self._last: tuple[Floats, Integers] = np.empty((0, 0)), np.empty(0, dtype=np.intp)
         self._in_vain = 0
         # Whether slopes were asked for at the last point.
@@ -109,7 +109,7 @@ class _Descent:
         if not self.explorer.known.valid[self.best]:
             return
         if self.squared:
-            # Far from the optimum the one, along a narrow valley onto bounds the other is the quicker.
+            # `trf` is quicker far from the optimum, `dogbox` along a narrow valley that ends on bounds.
             self._least_squares(ask, "dogbox" if self.final else "trf")
         for step, width in self.ladder:
             self._in_vain = 0
@@ -223,11 +223,11 @@ class _Descent:
         points, rows = self._stencil(ask, u, step)
         found = self.terms(rows)
         if self.squared:
-            # Near the bottom of a valley slopes are no measure, but how it bends is.
+            # Slopes vanish at the bottom of a valley; there the curvature tells how much a range changes.
             n, plain = len(u), found[0][:, 0]
             inside = np.abs(points[n + 1 :] - points[1 : n + 1]).max(axis=1) > 1.5 * step
             bends = np.abs(plain[1 : n + 1] + plain[n + 1 :] - 2 * plain[0])[inside] / step**2
-            self.bend = max(self.bend, float(np.nan_to_num(bends).max(initial=0.0)))
+            self.curvature = max(self.curvature, float(np.nan_to_num(bends).max(initial=0.0)))
         return [part[0] for part in found], [np.nan_to_num(_differences(points, u, part)) for part in found]
 
 
@@ -241,7 +241,7 @@ class _Program:
     def __init__(self, descent: _Descent, ask: Ask, begin: Floats, step: float) -> None:
         self._descent, self._ask, self._step = descent, ask, step
         values, slopes = descent.linear(ask, begin, step)
-        scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), descent.bend, TINY)
+        scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), descent.curvature, TINY)
         steepest = np.abs(slopes[2]).max(axis=1, initial=0.0)
         self.lengths = np.maximum(steepest, np.maximum(FLAT * np.abs(np.nan_to_num(values[2])), TINY))
         self._scales = [np.array([scale]), np.full(len(values[1]), scale), self.lengths]

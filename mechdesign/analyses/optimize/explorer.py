@@ -14,7 +14,7 @@ from mechdesign.analyses.workspace.rays import Floats
 # Merits of points that miss a condition, of points without a value, and of those of which nothing is known: beyond any
 # goal, with room for their order.
 MISSES, OPEN, UNKNOWN = 1e60, 1e90, 1e120
-# Column of the parts that are not of a goal or a condition: clearances, negative where a pose does not assemble.
+# Column of the parts that are of no goal or condition: margins of assembly, negative where a pose does not assemble.
 ASSEMBLY = -1
 FIRST_ROWS = 256
 
@@ -73,7 +73,7 @@ class Part:
         if self.absolute and self.sign > 0:
             found = np.concatenate([found, -found], axis=1)
         elif self.absolute:
-            # Smooth but at zero, where nothing is that should be far from it.
+            # Its edge at zero does not matter: these values are made large.
             found = -np.abs(found)
         return np.asarray(found - self.sign * self.bound)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
-from mechdesign.analyses.optimize.assembling import clearances, shortfall
+from mechdesign.analyses.optimize.assembling import assembly_margins, shortfall
 from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal, goals_of
 from mechdesign.analyses.poses import solve_poses
 from mechdesign.analyses.workspace.rays import Floats
@@ -47,14 +47,14 @@ class Evaluated:
         What the goals in `Evaluator.rows` are the worst of, or in `Evaluator.squares` the root mean square.
     shortfall : ndarray, shape (designs,)
         How far each design's poses are from assembling, 0 where they do; nan where there is no such design.
-    clearances : ndarray, shape (designs, `Evaluator.clearances`)
+    assembly_margins : ndarray, shape (designs, `Evaluator.assembly_margins`)
         Margins that every pose must have, negative where it does not assemble.
     """
 
     values: dict[Goal, Floats]
     rows: dict[Goal, Floats]
     shortfall: Floats
-    clearances: Floats
+    assembly_margins: Floats
     errors: dict[str, Floats]
     reasons: list[str]
 
@@ -69,7 +69,7 @@ class Evaluator:
     ----------
     most_rows : int
         How many rows a design may have for them to be given, too, of goals that are the worst of several (or the root
-        mean square, in `squares`) and of clearances; `rows` and `clearances` have their numbers.
+        mean square, in `squares`) and of assembly margins; `rows` and `assembly_margins` have their numbers.
 
     Raises
     ------
@@ -83,7 +83,7 @@ class Evaluator:
         self.goals = list(dict.fromkeys(goals))
         self.rows: dict[Goal, int] = {}
         self.squares: set[Goal] = set()
-        self.clearances = 0
+        self.assembly_margins = 0
         self.question: Question | None = None
         self._graded = most_rows > 0
         self._columns = tuple(dict.fromkeys(("area", *(g.column for g in self.goals if g.regional))))
@@ -104,14 +104,14 @@ class Evaluator:
         if problems:
             raise StudyError(problems)
         self._formulas = {command: stacked.formulas_of(study, command) for command in self._together}
-        # By command of which every pose must be valid: the columns of its clearances.
+        # By command of which every pose must be valid: the columns of its assembly margins.
         self._clear: dict[str, slice] = {}
         for command, tables in self._together.items() if most_rows else ():
             poses = study.poses(command)
             if poses.listed or any(table not in SOME for table in tables):
-                begin = self.clearances
-                self.clearances += clearances(study, poses).shape[1]
-                self._clear[command] = slice(begin, self.clearances)
+                begin = self.assembly_margins
+                self.assembly_margins += assembly_margins(study, poses).shape[1]
+                self._clear[command] = slice(begin, self.assembly_margins)
         self.limit_rows(most_rows)
 
     @property
@@ -120,12 +120,12 @@ class Evaluator:
         return not self._alone and not any(each.regional for each in self.goals)
 
     def limit_rows(self, most: int) -> None:
-        """Leave out the rows of goals and clearances where a design has more than so many."""
-        if self.clearances + sum(self.rows.values()) > most:
+        """Leave out the rows of goals and the assembly margins where a design has more than so many."""
+        if self.assembly_margins + sum(self.rows.values()) > most:
             self.rows.clear()
             self.squares.clear()
             self._clear.clear()
-            self.clearances = 0
+            self.assembly_margins = 0
 
     def _commands(self) -> list[str]:
         return list(dict.fromkeys(each.command for each in self.goals if not each.regional))
@@ -208,7 +208,7 @@ class Evaluator:
             if alone or k in batch.left:
                 batch.reasons[k] = self._one(batch, k)
         reasons = [str(reason) for reason in batch.reasons]
-        return Evaluated(batch.values, batch.rows, batch.shortfall, batch.clearances, batch.errors, reasons)
+        return Evaluated(batch.values, batch.rows, batch.shortfall, batch.assembly_margins, batch.errors, reasons)
 
     def _workspaces(self, batch: _Batch, rows: NDArray[np.intp]) -> None:
         if not len(rows):
@@ -248,14 +248,14 @@ class Evaluator:
         whole = stack.listed or "targets" in tables
         batch.note(rows, wrong.any(axis=1) if whole else wrong.all(axis=1), failed)
         some = np.ones(len(rows), dtype=bool) if command in self._clear else batch.reasons[rows] != ""
-        if stack.clearances is not None:
-            self._grade(batch, command, rows, stack.clearances)
+        if stack.assembly_margins is not None:
+            self._grade(batch, command, rows, stack.assembly_margins)
         elif self._graded and some.any():
             poses = stacked.poses_of(
                 self.study, command, int(some.sum()), batch.take(batch.places, rows[some]),
                 batch.take(batch.parameters, rows[some]), self._formulas[command],
             )  # fmt: skip
-            self._grade(batch, command, rows[some], clearances(self.study, poses))
+            self._grade(batch, command, rows[some], assembly_margins(self.study, poses))
         for table, goals in tables.items():
             left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
             for each in goals:
@@ -269,7 +269,7 @@ class Evaluator:
         """Note how far some designs are from assembling."""
         batch.shortfall[rows] = shortfall(margins)
         if command in self._clear:
-            batch.clearances[rows, self._clear[command]] = margins
+            batch.assembly_margins[rows, self._clear[command]] = margins
 
     def _needed(self, study: Study) -> Study:
         """The study without what no goal asks and costs much more than the goals: tolerances, Sobol' indices."""
@@ -313,7 +313,7 @@ class Evaluator:
     def _reason(self, batch: _Batch, k: int, study: Study, command: str) -> str:
         """Why poses of one design fail, and by how much; empty where none does."""
         if self._graded and command != "workspace":
-            (batch.shortfall[k],) = shortfall(clearances(study, study.poses(command)))
+            (batch.shortfall[k],) = shortfall(assembly_margins(study, study.poses(command)))
         return _pose_reason(study, command)
 
 
@@ -328,7 +328,7 @@ class _Batch:
         self.values: dict[Goal, Floats] = {each: np.full(count, np.nan) for each in evaluator.goals}
         self.rows = {each: np.full((count, size), np.nan) for each, size in evaluator.rows.items()}
         self._squares = evaluator.squares
-        self.clearances = np.full((count, evaluator.clearances), np.nan)
+        self.assembly_margins = np.full((count, evaluator.assembly_margins), np.nan)
         self.errors: dict[str, Floats] = {}
         # What is still to be asked of single designs, by their row and by command.
         self.left: dict[int, dict[str, list[Goal]]] = {}

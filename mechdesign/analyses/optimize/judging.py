@@ -119,10 +119,10 @@ class Judge:
     @property
     def width(self) -> int:
         """Columns of what `evaluate` gives."""
-        return 2 * (len(self.wanted) + 1) + sum(self._evaluator.rows.values()) + self._evaluator.clearances
+        return 2 * (len(self.wanted) + 1) + sum(self._evaluator.rows.values()) + self._evaluator.assembly_margins
 
     def parts(self) -> list[Part]:
-        """Which of the rows, after the other columns, belong to which goal or condition; the clearances come last."""
+        """Which rows, after the other columns, belong to which goal or condition; those of assembly come last."""
         sizes, squares = self._evaluator.rows, self._evaluator.squares
         ends = pairwise(np.cumsum([0, *sizes.values()]).tolist())
         places = {each: slice(*pair) for each, pair in zip(sizes, ends, strict=True)}
@@ -132,9 +132,9 @@ class Judge:
             for column, (each, bound) in enumerate(judged)
             if each in places and (column < len(self.goals) or each not in squares)
         ]
-        if self._evaluator.clearances:
+        if self._evaluator.assembly_margins:
             begin = sum(sizes.values())
-            found.append(Part(ASSEMBLY, -1.0, False, slice(begin, begin + self._evaluator.clearances)))
+            found.append(Part(ASSEMBLY, -1.0, False, slice(begin, begin + self._evaluator.assembly_margins)))
         return found
 
     def open(self) -> AbstractContextManager[Callable[[Iterable[Batch]], Iterator[Evaluated]]]:
@@ -186,7 +186,7 @@ class Judge:
         codes = [self._words.setdefault(reason, len(self._words)) for reason in reasons]
         errors = [found.errors.get(each.name, none) for each in self.wanted]
         code, rows = np.array(codes, dtype=float), found.rows.values()
-        return np.column_stack([*values, code, *errors, found.shortfall, *rows, found.clearances])
+        return np.column_stack([*values, code, *errors, found.shortfall, *rows, found.assembly_margins])
 
     def _keep(self, chunk: Batch, key: bytes, rows: Floats) -> None:
         self._asked.append(np.column_stack([chunk[name] for name in self._names]))

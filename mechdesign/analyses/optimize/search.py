@@ -17,13 +17,16 @@ from mechdesign.analyses.optimize.descent import LADDER, ROUGH, descend
 from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Objective, Spent
 from mechdesign.analyses.workspace.rays import Floats
 
-# Evaluations a row of weights and a variable and one more: of a start at least, of a search where the study says none,
-# and of one whose every evaluation takes long (there also for both ends of each goal).
-START, USUAL, SLOW_START, MOST_STARTS = 500, 1800, 30, 12
-# Points of a start's first sample a variable and one more; vertices of the cube join it in as few dimensions as these.
+# Evaluations per row of weights and per (variables + 1): the fewest of a start, and the default of a search.
+START, USUAL = 500, 1800
+# That default where designs are evaluated one by one, per (variables + 1) and per row of weights and end of a goal.
+SLOW_USUAL = 20
+MOST_STARTS = 12
+# Points of a start's sample per (variables + 1); with no more variables than these the cube's vertices join it.
 SAMPLE, MOST_VERTICES = 16, 4
-# The least part of a start's evaluations that its sample takes.
-LOOKED = 6
+# A start's sample takes one in so many of its evaluations, at least.
+SAMPLED = 6
+# Differential evolution: population per variable, smallest population, generations without gain that end it.
 POPULATION, SMALLEST_POPULATION, PATIENCE, ROUGH_PATIENCE = 8, 24, 8, 3
 # The part of a start's evaluations that differential evolution may take.
 EVOLUTION = 0.5
@@ -31,8 +34,9 @@ EVOLUTION = 0.5
 ENOUGH = 1e-3
 # Descents at once, and how far apart they begin, in parts of the ranges.
 ABREAST, APART = 6, 0.05
-# Evaluations of a descent, in those of its slopes.
+# Evaluations that a descent takes as a rule, in those of its slopes (2 n + 1).
 DESCENT = 40
+# Rounds of descents in a start: where the search may end early, and where it uses all its evaluations.
 ROUNDS, MOST_ROUNDS = 2, 1000
 # Steps that may not improve the optimum, in parts of the ranges; evaluations kept for that, in those of slopes.
 CHECKED, MOST_CHECKS, CHECKS, SQUARES_CHECKS = 1e-4, 12, 40, 200
@@ -67,7 +71,7 @@ class Ending:
 def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
     """Evaluations of a search where the study says none."""
     if slow:
-        return SLOW_START * (dimensions + 1) * (rows + 2 * goals)
+        return SLOW_USUAL * (dimensions + 1) * (rows + 2 * goals)
     return USUAL * (dimensions + 1) * rows
 
 
@@ -112,8 +116,8 @@ def search(
         checked = False
     known = explorer.known
     objectives = [_weighted(known, smallest, row) for row in rows]
-    merits = [known.merit(each) for each in objectives]
-    rounding = [_rounding(known, merit, merit.min()) if known.feasible.any() else 0.0 for merit in merits]
+    merits = [known.merit(each) for each in objectives if known.feasible.any()]
+    rounding = [_rounding(known, merit, merit.min()) for merit in merits] or [0.0] * len(rows)
     return Ending(checked, [_ends(known, each, begins) for each in objectives], rounding)
 
 
@@ -138,7 +142,7 @@ def _start(
     ladder = ROUGH if explorer.rough else LADDER
     tried: list[list[int]] = [[] for _ in rows]
     try:
-        explorer(sample(n, rng, max(SAMPLE * (n + 1), allowed // LOOKED), allowed // 3))
+        explorer(sample(n, rng, max(SAMPLE * (n + 1), allowed // SAMPLED), allowed // 3))
         if begin == 0 and len(smallest) > 1 and allowed > 4 * len(smallest) * DESCENT * (2 * n + 1):
             _extremes(explorer, smallest, rng, allowed)
         for row in rows:
@@ -192,7 +196,7 @@ def _apart(known: Known, objective: Objective, tried: Sequence[int], begin: int,
 def _confirmed(explorer: Explorer, objectives: Sequence[Objective], rng: np.random.Generator) -> bool:
     """Whether no small step improves the best point of any objective; descends from where one does."""
     n, open_ = explorer.dimensions, list(objectives)
-    ladder: Sequence[tuple[float, float]] = ROUGH if explorer.rough else LADDER
+    ladder: Sequence[tuple[float, float]] = ROUGH[-1:] if explorer.rough else LADDER
     for _ in range(MOST_CHECKS):
         known = explorer.known
         starts = [_best(known, each) for each in open_]
@@ -223,7 +227,8 @@ def _best(known: Known, objective: Objective) -> int:
 
 def _rounding(known: Known, merit: Floats, value: float, part: float = ROUNDING) -> float:
     """How far values of an objective may differ and still count as the same."""
-    return part * abs(value) + OF_ALL * float(np.ptp(merit[known.feasible]))
+    inside = merit[known.feasible]
+    return part * abs(value) + OF_ALL * float(np.ptp(inside) if inside.size else 0.0)
 
 
 def _ends(known: Known, objective: Objective, begins: Sequence[int]) -> Floats:
@@ -234,8 +239,8 @@ def _ends(known: Known, objective: Objective, begins: Sequence[int]) -> Floats:
 
 
 def _agree(known: Known, objective: Objective, found: Floats) -> bool:
-    """Whether the two smallest of some values of an objective are the same."""
-    two = np.sort(found)[:2]
+    """Whether the two smallest of some values of an objective are feasible and the same."""
+    two = np.sort(found[found < MISSES])[:2]
     return len(two) == 2 and bool(np.ptp(two) <= _rounding(known, known.merit(objective), two[0]))
 
 

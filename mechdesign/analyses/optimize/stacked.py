@@ -14,7 +14,7 @@ from mechdesign.analyses.kinematics import analysis as kinematics
 from mechdesign.analyses.kinematics.motion import Motion, asked
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.kinematics.transmission import transmission_table
-from mechdesign.analyses.optimize.assembling import clearances
+from mechdesign.analyses.optimize.assembling import assembly_margins
 from mechdesign.analyses.poses import SolvedPoses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
@@ -62,15 +62,15 @@ class Stack:
         Whether a person listed the poses, so that each of them must be valid.
     open : mapping of str to bool array, shape (designs,)
         By table, the designs that it does not answer for.
-    clearances : ndarray, shape (designs, margins), or None
-        As `assembling.clearances` gives them; None where they were not asked for, or would have to be solved for.
+    assembly_margins : ndarray, shape (designs, margins), or None
+        As `assembling.assembly_margins` gives them; None where they were not asked for, or would have to be solved for.
     """
 
     result: Result
     reason: NDArray[np.int8]
     listed: bool
     open: Mapping[str, NDArray[np.bool_]]
-    clearances: Floats | None = None
+    assembly_margins: Floats | None = None
 
 
 def possible(study: Study, command: str, names: Collection[str]) -> bool:
@@ -194,7 +194,7 @@ def tables(
     outputs : collection of str, optional
         Of the extremes; all where left out.
     graded : bool
-        Whether the clearances are wanted, too.
+        Whether the assembly margins are wanted, too.
     """
     one = study.poses(command)
     poses = poses_of(study, command, designs, places, parameters, formulas or {})
@@ -211,7 +211,7 @@ def tables(
         found = {name: table for name, table in found.items() if name in TABLES[command]}
     reason = reason.reshape(designs, one.count)
     opened = {"loops": torn | reason.any(axis=1), "extremes": torn}
-    margins = clearances(study, poses, solved) if solved else None
+    margins = assembly_margins(study, poses, solved) if solved else None
     return Stack(Result(command, found), reason, one.listed, opened, margins)
 
 
