@@ -261,8 +261,9 @@ def covered(model: str, number: int, seed: int, runs: int) -> None:
             else:
                 # Of a circle the tangents are one or two where the whole rim counts.
                 assert 0.2 < float(least) / exact < (600 if model == "uniform" else 10), (seed, model, number)
-        # An interval that holds everything covers nothing.
-        assert (high_ < 2 * exact).all() or model == "uniform"
+        # An interval that holds everything covers nothing; what `form` says is none.
+        sampled = np.isin(table["method"], list(missed))
+        assert (high_[sampled] < 2 * exact).all() or model == "uniform"
     assert max(missed.values()) <= misses_allowed(runs), (seed, model, number, missed, exact)
 
 
