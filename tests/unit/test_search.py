@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies import study_of
-from helpers.syntheses import OPEN, held_height, timed_path, tray
+from helpers.syntheses import OPEN, PROBLEMS, held_height, timed_path, tray
 
 import mechdesign
 from mechdesign.analyses.optimize.analysis import _doubts
@@ -385,3 +385,11 @@ def test_what_runs_side_by_side_is_asked_for_at_once():
         side_by_side(known, [fails, task(np.linspace(0.8, 0.9, 20))])
     with pytest.raises(Spent):
         side_by_side(known, [task(np.linspace(0.91, 0.92, 200))])
+
+
+def test_least_squares_that_come_no_further_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every stage of a descent ends when it asks in vain, those of a root mean square too."""
+    monkeypatch.setattr("mechdesign.analyses.optimize.descent.MOST_IN_VAIN", 0)
+    study = study_of(PROBLEMS["height, rms"]().study, "optimize.evaluations=400")
+    result = mechdesign.optimize(study, seed=0)
+    assert np.isfinite(result.main["score"][0])

@@ -8,7 +8,7 @@ differences over steps, evaluated in one batch.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Literal
 
@@ -110,11 +110,15 @@ class _Descent:
             return
         if self.squared:
             # `trf` is quicker far from the optimum, `dogbox` along a narrow valley that ends on bounds.
-            self._least_squares(ask, "dogbox" if self.final else "trf")
+            self._stage(self._least_squares, ask, "dogbox" if self.final else "trf")
         for step, width in self.ladder:
-            self._in_vain = 0
-            with suppress(_InVain):
-                self._programming(ask, step, width)
+            self._stage(self._programming, ask, step, width)
+
+    def _stage(self, optimiser: Callable[..., None], *arguments: Any) -> None:
+        """Let an optimiser go on until it ends, or comes no further; its best point is kept."""
+        self._in_vain = 0
+        with suppress(_InVain):
+            optimiser(*arguments)
 
     def ask(self, ask: Ask, points: Floats) -> Integers:
         """Rows of points; the best of them, or of those before, is where the next stage begins."""
