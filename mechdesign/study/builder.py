@@ -60,12 +60,7 @@ class Builder:
 
     def check_name(self, name: str, known: Iterable[str], what: str, path: Iterable[str | int]) -> bool:
         """Whether a name is known; if not, note it with the nearest one."""
-        candidates = list(known)
-        if name in candidates:
-            return True
-        hint = suggestion(name, candidates) or (f"; there are {', '.join(candidates[:12])}" if candidates else "")
-        self.report(path, f"there is no {what} {name!r}{hint}")
-        return False
+        return self.reporter.known(name, known, what, (*ROOT, *path))
 
     def check_names(self, names: Iterable[str], known: Iterable[str], what: str, path: Path) -> bool:
         """Whether all names of a list are known; each that is not is noted."""

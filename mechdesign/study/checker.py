@@ -8,7 +8,6 @@ from typing import Any
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.document import Path
 from mechdesign.study.names import Names
-from mechdesign.study.numbers import suggestion
 from mechdesign.study.parameters import Parameters
 from mechdesign.study.reporter import Reporter
 from mechdesign.study.units import KINDS, QUANTITY, QuantityError, describe, measure
@@ -24,12 +23,8 @@ class Checker:
         self.reporter = reporter
 
     def known(self, name: str, known: Iterable[str], what: str, path: Path, *, at_key: bool = False) -> bool:
-        candidates = list(known)
-        if name in candidates:
-            return True
-        hint = suggestion(name, candidates) or (f"; there are {', '.join(candidates[:12])}" if candidates else "")
-        self.reporter.report(path, f"there is no {what} {name!r}{hint}", at_key=at_key)
-        return False
+        """Whether a name is known; if not, it is noted."""
+        return self.reporter.known(name, known, what, path, at_key=at_key)
 
     def kind(self, path: Path, kind: str) -> None:
         """Note a quantity whose unit does not fit what its key needs."""

@@ -31,6 +31,17 @@ class Reporter:
         self.problems: list[Problem] = list(document.problems)
         self.warnings: list[Problem] = []
 
+    def known(
+        self, name: str, known: Iterable[str], what: str, path: Iterable[str | int], *, at_key: bool = False
+    ) -> bool:
+        """Whether a name is one of those known; if not, note it with the nearest one."""
+        candidates = list(known)
+        if name in candidates:
+            return True
+        hint = suggestion(name, candidates) or (f"; there are {', '.join(candidates[:12])}" if candidates else "")
+        self.report(tuple(path), f"there is no {what} {name!r}{hint}", at_key=at_key)
+        return False
+
     def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Note a problem at a path of the data; paths through the long form of a short form are understood."""
         found = self.written(path)
