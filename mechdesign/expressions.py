@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Number = float | NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats
+
+Number = float | Floats
 
 MAX_LENGTH = 1000
 """Longest text accepted: nothing that a person writes comes near it."""
@@ -176,7 +178,7 @@ class Expression:
         function = _FUNCTIONS[name]
         inner, outer = self._angle_factors(function)
         if not all(type(argument) is float for argument in arguments):
-            result: NDArray[np.float64] = function.array(*(argument * inner for argument in arguments)) * outer
+            result: Floats = function.array(*(argument * inner for argument in arguments)) * outer
             return result
         try:
             return float(function.scalar(*(argument * inner for argument in arguments)) * outer)

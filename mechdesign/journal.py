@@ -17,16 +17,16 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.files import replace
+from mechdesign.numerics.arrays import Floats
 
 NAME = "unfinished.npz"
 # Seconds between two versions of the file, and how much longer than its writing they are apart at least.
 _INTERVAL, _SHARE = 30.0, 20.0
 
 
-def digest(columns: Sequence[NDArray[np.float64]]) -> bytes:
+def digest(columns: Sequence[Floats]) -> bytes:
     """What a batch is known by: its designs, bit by bit."""
     found = hashlib.blake2b(digest_size=16)
     for column in columns:
@@ -51,8 +51,8 @@ class Journal:
         self.path = path
         self._origin = json.dumps(origin, sort_keys=True)
         self._digests: list[bytes] = []
-        self._rows: list[NDArray[np.float64]] = []
-        self._found: list[tuple[bytes, NDArray[np.float64]]] = []
+        self._rows: list[Floats] = []
+        self._found: list[tuple[bytes, Floats]] = []
         self.words: list[str] = []
         self._written = time.monotonic()
         self._patience = _INTERVAL
@@ -72,7 +72,7 @@ class Journal:
         self._found.reverse()
         return bool(self._found)
 
-    def recall(self, key: bytes) -> NDArray[np.float64] | None:
+    def recall(self, key: bytes) -> Floats | None:
         """The outcome of the next batch if it was finished; if another batch was, it and what follows is void."""
         if not self._found:
             return None
@@ -82,7 +82,7 @@ class Journal:
             return None
         return rows
 
-    def add(self, key: bytes, rows: NDArray[np.float64], words: Sequence[str]) -> None:
+    def add(self, key: bytes, rows: Floats, words: Sequence[str]) -> None:
         """Note a finished batch: numbers, a row a design, and all words that they refer to so far."""
         self._digests.append(key)
         self._rows.append(rows)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 
 # Values of a column that a message names.
@@ -40,8 +41,8 @@ class Chosen:
 
     table: Table
     column: str
-    values: NDArray[np.float64]
-    counts: NDArray[np.bool_]
+    values: Floats
+    counts: Flags
     missing: str = ""
 
 
@@ -76,7 +77,7 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
     return Chosen(table, column, np.abs(numbers) if absolute else numbers, counts, missing)
 
 
-def _one_unit(table: Table, column: str, counts: NDArray[np.bool_]) -> None:
+def _one_unit(table: Table, column: str, counts: Flags) -> None:
     """Check that the rows that count can be compared: that they are not millimetres and degrees."""
     meaning = next(each.meaning for each in table.columns if each.name == column)
     if IN_UNIT not in meaning or "unit" not in table:
@@ -97,7 +98,7 @@ def _one_unit(table: Table, column: str, counts: NDArray[np.bool_]) -> None:
     )
 
 
-def worst(values: NDArray[np.float64], counts: NDArray[np.bool_], *, largest: bool) -> NDArray[np.float64]:
+def worst(values: Floats, counts: Flags, *, largest: bool) -> Floats:
     """The smallest or largest of the rows that count, along the last axis; nan where one is nan or none counts."""
     none = -np.inf if largest else np.inf
     inside = np.where(counts, values, none)
@@ -105,7 +106,7 @@ def worst(values: NDArray[np.float64], counts: NDArray[np.bool_], *, largest: bo
     return np.where(counts.any(axis=-1), found, np.nan)
 
 
-def _locate(result: Result, path: str) -> tuple[Table, str, NDArray[np.bool_]]:
+def _locate(result: Result, path: str) -> tuple[Table, str, Flags]:
     for table in result.tables.values():
         if path in table:
             return table, path, np.ones(len(table), dtype=bool)
@@ -130,7 +131,7 @@ def _unknown(where: str, name: str, known: Iterable[str]) -> str:
     return f"{where}: no column {name!r}; {hint}"
 
 
-def _missing(table: Table, rows: NDArray[np.bool_], where: Mapping[str, Any]) -> str:
+def _missing(table: Table, rows: Flags, where: Mapping[str, Any]) -> str:
     """Why none of some rows is one of `where`; nothing where that only hangs on how it came out (valid or not)."""
     named = {name: wanted for name, wanted in where.items() if table[name].dtype.kind != "b"}
     together = rows
@@ -157,7 +158,7 @@ def _present(values: NDArray[Any], wanted: object) -> str:
     return f"there {'is' if len(known) == 1 else 'are'} {', '.join(shown) or 'none'}{rest}"
 
 
-def _equal(values: NDArray[Any], wanted: object) -> NDArray[np.bool_]:
+def _equal(values: NDArray[Any], wanted: object) -> Flags:
     if values.dtype.kind in "fiub" and isinstance(wanted, (int, float)):
         return np.asarray(np.isclose(values.astype(float), float(wanted), rtol=1e-9, atol=1e-12))
     return np.array([str(value) == str(wanted) for value in values.tolist()], dtype=bool)

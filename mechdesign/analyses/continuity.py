@@ -7,18 +7,17 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.turns import TURN
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.poses import Poses
 
-Array = NDArray[np.float64]
 # Solves poses with given values near rows of a study's, both of one shape.
-Solve = Callable[[Sequence[Array], NDArray[np.intp]], Configuration]
+Solve = Callable[[Sequence[Floats], Ints], Configuration]
 
 # An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
 ON_THE_CUT = 1e-9
@@ -35,8 +34,8 @@ MOST = 4096
 
 
 def continuous(
-    poses: Poses, plan: Plan, given: Sequence[Array], angles: Sequence[Coordinate], values: Array, solve: Solve
-) -> Array:
+    poses: Poses, plan: Plan, given: Sequence[Floats], angles: Sequence[Coordinate], values: Floats, solve: Solve
+) -> Floats:
     """Angles without jumps along a sweep, a path or the last axis of a grid; its other axes after it.
 
     Between poses that are far apart the mechanism is solved on the way, twice as finely until no angle turns by a
@@ -74,7 +73,7 @@ def continuous(
     return np.stack([_across(row, poses.grid) for row in found])
 
 
-def _parts(plan: Plan, given: Sequence[Array], begins: NDArray[np.intp], ends: NDArray[np.intp]) -> NDArray[np.intp]:
+def _parts(plan: Plan, given: Sequence[Floats], begins: Ints, ends: Ints) -> Ints:
     """In how many parts (a power of two) each step is made, so that what is given moves little in each."""
     longest = np.ones(len(begins))
     for coordinate, values in zip(plan.structure.given, given, strict=True):
@@ -87,9 +86,9 @@ def _parts(plan: Plan, given: Sequence[Array], begins: NDArray[np.intp], ends: N
 
 
 def _on_the_way(
-    angles: Sequence[Coordinate], given: Sequence[Array], begins: NDArray[np.intp], ends: NDArray[np.intp],
-    parts: NDArray[np.intp], solve: Solve,
-) -> Array:  # fmt: skip
+    angles: Sequence[Coordinate], given: Sequence[Floats], begins: Ints, ends: Ints,
+    parts: Ints, solve: Solve,
+) -> Floats:  # fmt: skip
     """How far each angle turns between pairs of poses, shape (angles, pairs); nearest where the way does not close."""
     found = np.empty((len(angles), len(begins)))
     number = np.maximum(parts, 2)
@@ -116,7 +115,7 @@ def _on_the_way(
     return found
 
 
-def _across(values: Array, grid: Sequence[int]) -> Array:
+def _across(values: Floats, grid: Sequence[int]) -> Floats:
     """Whole turns between the lines of a grid taken out, its last axis being continuous already."""
     for axis in range(len(grid) - 2, -1, -1):
         # Each design of several has a grid of its own.

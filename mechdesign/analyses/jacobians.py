@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
+from mechdesign.numerics.arrays import Floats
 
-Array = NDArray[np.float64]
 
-
-def jacobian(linear: Linearization, rates: Rates, rows: Sequence[Coordinate]) -> Array:
+def jacobian(linear: Linearization, rates: Rates, rows: Sequence[Coordinate]) -> Floats:
     """Derivatives of coordinates by the drives, per radian; shape (..., rows, drives).
 
     Parameters
@@ -34,7 +32,7 @@ def mixes(rows: Sequence[Coordinate], columns: Sequence[Coordinate]) -> bool:
     return len({c.quantity for c in rows}) > 1 or len({c.quantity for c in columns}) > 1
 
 
-def homogeneous(jacobian: Array, rows: Sequence[Coordinate], columns: Sequence[Coordinate], length: float) -> Array:
+def homogeneous(jacobian: Floats, rows: Sequence[Coordinate], columns: Sequence[Coordinate], length: float) -> Floats:
     """The Jacobian with angles turned into lengths by a characteristic length.
 
     Parameters
@@ -48,7 +46,7 @@ def homogeneous(jacobian: Array, rows: Sequence[Coordinate], columns: Sequence[C
     return np.asarray(jacobian * up[:, None] / down)
 
 
-def determinant(jacobian: Array) -> Array:
+def determinant(jacobian: Floats) -> Floats:
     """Determinant; nan where an entry is."""
     if jacobian.shape[-1] == 2:
         return np.asarray(jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0])
@@ -63,7 +61,7 @@ def of_two(twice: Value) -> Value:
     return 2 / (twice + np.sqrt(np.maximum(twice - 2, 0) * (twice + 2)))
 
 
-def inverse_condition(jacobian: Array) -> Array:
+def inverse_condition(jacobian: Floats) -> Floats:
     """Smallest over largest singular value, 0 at a singularity; nan where an entry is.
 
     2 x 2 needs no decomposition, see `of_two`.

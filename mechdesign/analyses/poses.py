@@ -17,11 +17,10 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.turns import TURN, angles_of
 from mechdesign.mechanism.variant import drawn
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-
-Array = NDArray[np.float64]
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 CHUNK = 65536
@@ -41,7 +40,7 @@ class SolvedPoses:
         Value of each drive (radians and lengths): as given, or from the inverse problem.
     """
 
-    rows: NDArray[np.intp]
+    rows: Ints
     given: tuple[str, ...]
     configuration: Configuration
     drives: tuple[Value, ...]
@@ -79,7 +78,7 @@ def solve_poses(study: Study, poses: Poses, wanted: Sequence[Coordinate] = ()) -
         ]
         pieces = [slice(begin, begin + CHUNK) for begin in range(0, len(group.rows), CHUNK)]
         solved = None
-        near: dict[str, Array] = {}
+        near: dict[str, Floats] = {}
         angles = [] if poses.listed else _followed(mechanism, plan, wanted)
         if angles:
             values = np.empty((len(angles), len(group.rows)))
@@ -108,9 +107,7 @@ def solve_poses(study: Study, poses: Poses, wanted: Sequence[Coordinate] = ()) -
             yield SolvedPoses(rows, group.names, configuration, drives)
 
 
-def _solve(
-    mechanism: Mechanism, plan: Plan, poses: Poses, given: Sequence[Array], rows: NDArray[np.intp]
-) -> Configuration:
+def _solve(mechanism: Mechanism, plan: Plan, poses: Poses, given: Sequence[Floats], rows: Ints) -> Configuration:
     """Poses at or near some rows, not yet judged by the limits."""
     start = starts(mechanism, poses, rows) if plan.iterative else None
     return plan.solve(given, dimensions(poses, rows), start=start, limits=False)
@@ -124,7 +121,7 @@ def _followed(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) ->
     return [angle for name, angle in found.items() if name not in plan.counted | settled]
 
 
-def _begun(study: Study, poses: Poses, drive: str, values: Array) -> Array:
+def _begun(study: Study, poses: Poses, drive: str, values: Floats) -> Floats:
     """A drive's values in each design in the turn that leaves it within its limits, else near the sketch's value."""
     mechanism = study.mechanism
     drawn = float(mechanism.sketch_configuration.value(mechanism.coordinate(drive)))
@@ -144,12 +141,12 @@ def _begun(study: Study, poses: Poses, drive: str, values: Array) -> Array:
     return np.asarray(lines + TURN * turns[:, None]).ravel()
 
 
-def dimensions(poses: Poses, rows: NDArray[np.intp]) -> dict[str, Value]:
+def dimensions(poses: Poses, rows: Ints) -> dict[str, Value]:
     """Dimensions of the designs that some poses belong to, where they differ from the nominal ones; shape of `rows`."""
     return {name: values[rows] for name, values in poses.places.items()}
 
 
-def starts(mechanism: Mechanism, poses: Poses, rows: NDArray[np.intp]) -> Configuration | None:
+def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | None:
     """Where poses of other designs without a closed form start: their own assembled sketch, shape of `rows`."""
     if not poses.places:
         return None

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mechdesign.numerics.arrays import Floats
 
 # A scalar or an array that broadcasts against the batch; scalars stay scalars, which keeps constants cheap.
 Value = Any
@@ -61,7 +62,7 @@ def rotation(angle: Value) -> Value:
     return vector((1.0 - square) * scale, (t + t) * scale)
 
 
-def angle_of(z: Value) -> NDArray[np.float64]:
+def angle_of(z: Value) -> Floats:
     """Angle of a vector in (-pi, pi]."""
     angle = np.angle(z)
     return np.where(angle <= -np.pi, np.pi, angle)

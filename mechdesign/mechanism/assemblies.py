@@ -9,7 +9,6 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import wrap
@@ -19,6 +18,7 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import Guess
 from mechdesign.mechanism.structure import Group
+from mechdesign.numerics.arrays import Flags
 
 # Bound of the assemblies that are listed and followed.
 MOST = 256
@@ -129,7 +129,7 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
         if group.form == "newton"
     }
     state = plan.run(given, vectors, guess, modes, STEPS)
-    solved: NDArray[np.bool_] = np.ones(STARTS, dtype=bool)
+    solved: Flags = np.ones(STARTS, dtype=bool)
     for converged in state.converged:
         solved &= converged
     every = plan.configuration(state, (STARTS,), {}, vectors, solved, limits=False)

@@ -9,18 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.golden import lowest
 from mechdesign.mechanism.structure import Group
+from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.minima import lowest
 
 # A closure that falls below this part of its largest value touches zero: it is a difference of squared lengths.
 TOUCHING = 1e-10
 # Closures are looked at this often in a turn of the drive, or in the mechanism's size of a slide's travel.
 SAMPLES = 720
-
-Array = NDArray[np.float64]
 
 
 def closing_groups(groups: Sequence[Group]) -> list[int]:
@@ -52,12 +50,12 @@ class ChangePoints:
         modes: Sequence[int],
         sketch: float,
         period: float,
-        closures: Callable[[Array, Sequence[Value]], Sequence[Value]],
+        closures: Callable[[Floats, Sequence[Value]], Sequence[Value]],
     ) -> None:
         self._groups, self._modes, self._all_closures = groups, modes, closures
         self.sketch, self._period = sketch, period
         self._range = (sketch, sketch)
-        self._places: list[Array] = [np.empty(0) for _ in modes]
+        self._places: list[Floats] = [np.empty(0) for _ in modes]
 
     def modes(self, values: Value) -> list[Value]:
         """Mode of each group at values of the given coordinate (radians or lengths)."""
@@ -70,7 +68,7 @@ class ChangePoints:
         if finite.size:
             self._cover(float(finite.min()), float(finite.max()))
 
-    def _parity(self, values: Array, groups: int) -> list[Value]:
+    def _parity(self, values: Floats, groups: int) -> list[Value]:
         """Modes of the first groups; the others as drawn."""
         found: list[Value] = list(self._modes)
         for index in range(groups):
@@ -99,13 +97,13 @@ class ChangePoints:
                 self._places[index] = self._search(index, samples)
         self._range = (low, high)
 
-    def _closures(self, index: int, values: Array) -> Array:
+    def _closures(self, index: int, values: Floats) -> Floats:
         modes = self._parity(values, index)[: index + 1]
         closing = closing_groups(self._groups[: index + 1])
         own = [c for c, group in zip(self._all_closures(values, modes), closing, strict=True) if group == index]
         return np.stack([np.broadcast_to(c, values.shape) for c in own])
 
-    def _search(self, index: int, samples: Array) -> Array:
+    def _search(self, index: int, samples: Floats) -> Floats:
         table = self._closures(index, samples)
         with np.errstate(invalid="ignore"):
             low = (table[:, 1:-1] <= table[:, :-2]) & (table[:, 1:-1] < table[:, 2:])

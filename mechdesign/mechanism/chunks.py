@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.memory import keep_freed_memory
+from mechdesign.numerics.arrays import Ints
 from mechdesign.parallel import map_chunks, worker_count
 
 # Poses of a chunk: the fastest of 4,096 to 262,144, measured. Closed forms are some fifty short operations; threads
@@ -61,7 +62,7 @@ def solve(
 
     given = [flat(v) for v in values]
     places = {name: flat(v) for name, v in dims.items()}
-    rows_of_start: NDArray[np.intp] | None = None
+    rows_of_start: Ints | None = None
     if start is not None and start.shape:
         rows_of_start = flat(np.arange(int(np.prod(start.shape))).reshape(start.shape))
 

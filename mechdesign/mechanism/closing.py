@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, cross, quiet
@@ -17,10 +16,11 @@ from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.redundancy import owners_of
-from mechdesign.mechanism.rigidity import CLOSED, Vector
+from mechdesign.mechanism.rigidity import CLOSED
 from mechdesign.mechanism.sketch import KEY
 from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Group
+from mechdesign.numerics.arrays import Complexes, Floats
 
 # Poses of a sweep for the range in which a mechanism closes, and halvings of its ends.
 SWEEP, HALVINGS = 721, 40
@@ -51,7 +51,7 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
         drawn = Plan(core, plan.structure, plan.modes, follows=False)
         for k, (coordinate, _) in enumerate(given):
 
-            def valid(sweep: NDArray[np.float64], k: int = k) -> Value:
+            def valid(sweep: Floats, k: int = k) -> Value:
                 return drawn.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
 
             found = closing_range(valid, coordinate, core.size, unit)
@@ -80,7 +80,7 @@ def check_regular(core: Core, plan: Plan, configuration: Configuration) -> None:
         raise over_constrained(core.description, equations, middle, count, real, count)
 
 
-def _closed_otherwise(core: Core, plan: Plan, x: Vector, start: str) -> MechanismError | None:
+def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> MechanismError | None:
     """A group that closes, but not where Newton's method gets to from the sketch, or not in one place only."""
     equations, graph, drives = core.equations, core.graph, plan.structure.given
     real, middle = equations.mobility(x)
@@ -101,7 +101,7 @@ def _closed_otherwise(core: Core, plan: Plan, x: Vector, start: str) -> Mechanis
     return MechanismError(f"{start} from where it is drawn; it closes at {{{', '.join(moving)}}}", KEY)
 
 
-def open_group(state: State, gaps: NDArray[np.complex128]) -> tuple[str, str]:
+def open_group(state: State, gaps: Complexes) -> tuple[str, str]:
     """What the first group that does not close lacks, in a designer's words, and what would mend it.
 
     Parameters
@@ -208,7 +208,7 @@ def _turning_slide(state: State, group: Group, walk: _Walk) -> str:
     return f"slide '{state.graph.slides[slide]}' cannot close: {apart}, {held}"
 
 
-def _newton(state: State, group: Group, gaps: NDArray[np.complex128]) -> str:
+def _newton(state: State, group: Group, gaps: Complexes) -> str:
     graph, edges = state.graph, state.structure.edges
     used = sorted({k for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)})
     nodes = {node for k in used for node in (edges[k].tail, edges[k].head)}
@@ -219,9 +219,7 @@ def _newton(state: State, group: Group, gaps: NDArray[np.complex128]) -> str:
     return f"links {', '.join(owners_of(graph, used))} do not meet (joints {joints}), {best}"
 
 
-def closing_range(
-    valid: Callable[[NDArray[np.float64]], Value], coordinate: Coordinate, size: float, unit: float
-) -> str:
+def closing_range(valid: Callable[[Floats], Value], coordinate: Coordinate, size: float, unit: float) -> str:
     """For which values of one drive, the others held, a mechanism closes; empty where for none.
 
     Parameters

@@ -14,6 +14,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.turns import angles_of, nearest
+from mechdesign.numerics.arrays import Complexes, Flags, Ints
 
 
 class Reason(IntEnum):
@@ -66,15 +67,15 @@ class Configuration:
     counted: frozenset[str] = frozenset()
 
     @property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Flags:
         """Whether each pose is assembled and within the limits."""
         return np.equal(self.reason, int(Reason.OK))
 
-    def point(self, name: str) -> NDArray[np.complex128]:
+    def point(self, name: str) -> Complexes:
         """World position x + i y of a point, shape of the batch."""
         return np.broadcast_to(np.asarray(self.nodes[self.graph.node(name)], dtype=complex), self.shape)
 
-    def rotation(self, body: str) -> NDArray[np.complex128]:
+    def rotation(self, body: str) -> Complexes:
         """Unit vector of a link's x axis in the world, shape of the batch."""
         return np.broadcast_to(np.asarray(self.body_rotation(body), dtype=complex), self.shape)
 
@@ -121,7 +122,7 @@ class Configuration:
         near = {k: other.value(angle) for k, angle in angles_of(coordinates).items() if k not in self.counted}
         return replace(self, near={**self.near, **near})
 
-    def take(self, index: NDArray[np.intp] | int | tuple[int, ...] | tuple[NDArray[np.intp], ...]) -> Configuration:
+    def take(self, index: Ints | int | tuple[int, ...] | tuple[Ints, ...]) -> Configuration:
         """Poses of a flat batch by index (shape (n,) or scalar)."""
 
         def pick(value: Value) -> Value:
@@ -141,7 +142,7 @@ class Configuration:
         )  # fmt: skip
 
 
-def hide(value: Value, lost: NDArray[np.bool_]) -> Value:
+def hide(value: Value, lost: Flags) -> Value:
     """nan for poses that cannot be assembled; what is the same for every pose (the ground) is left alone."""
     value = np.asarray(value)
     if value.ndim == 0 and not lost.all():

@@ -11,12 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, angle_of, wrap
 from mechdesign.mechanism.newton import STEPS
 from mechdesign.mechanism.state import Guess, State
 from mechdesign.mechanism.structure import Structure
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Largest change of an unknown in one step: radians, or parts of the mechanism's size.
 MAX_CHANGE = 0.35
@@ -26,8 +26,6 @@ SMALLEST_STEP = 2e-4
 MAX_ROUNDS = 400
 # Part of the path over which the first direction is taken.
 BEGINNING = 1e-6
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ class _Path:
             [np.broadcast_to(v, (count,)) for index in self.indices for part in start.unknowns[index] for v in part]
         )
 
-    def guess(self, table: Array) -> Guess:
+    def guess(self, table: Floats) -> Guess:
         """Rows of a table as angles and slides by group."""
         found, row = {}, 0
         for index in self.indices:
@@ -101,7 +99,7 @@ class _Path:
             row += angles + lengths
         return found
 
-    def solve(self, lanes: NDArray[np.intp], at: Value, guess: Array, steps: int = STEPS) -> tuple[Array, State]:
+    def solve(self, lanes: Ints, at: Value, guess: Floats, steps: int = STEPS) -> tuple[Floats, State]:
         """Unknowns and state of some poses at parts `at` of their paths."""
 
         def between(ends: tuple[Value, Value]) -> Value:
@@ -118,17 +116,17 @@ class _Path:
         rows = [np.broadcast_to(v, shape) for index in self.indices for part in state.unknowns[index] for v in part]
         return np.stack(rows), state
 
-    def scale(self, table: Array) -> Array:
+    def scale(self, table: Floats) -> Floats:
         """What changes are measured by: radians, and the mechanism's size or a length beyond it."""
         return np.where(self.is_angle[:, None], 1.0, np.maximum(self.size, np.abs(table)))
 
-    def change(self, new: Array, old: Array) -> Array:
+    def change(self, new: Floats, old: Floats) -> Floats:
         """How far the unknowns moved, angles the short way round."""
         difference = new - old
         return np.where(self.is_angle[:, None], wrap(difference), difference)
 
 
-def _pick(value: Value, lanes: NDArray[np.intp]) -> Value:
+def _pick(value: Value, lanes: Ints) -> Value:
     value = np.asarray(value, dtype=float)
     return value if value.ndim == 0 else value[lanes]
 
@@ -136,7 +134,7 @@ def _pick(value: Value, lanes: NDArray[np.intp]) -> Value:
 def follow(
     structure: Structure, solver: Solver, start: Start, given: Sequence[Value], places: Mapping[str, Value],
     nominal: Mapping[str, float], size: float, count: int,
-) -> tuple[Guess, NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[Guess, Flags]:  # fmt: skip
     """Continue `count` poses from `start`; returns their unknowns and which poses were reached.
 
     Parameters
@@ -181,7 +179,7 @@ def follow(
     return path.guess(table), done >= 1
 
 
-def _planned(path: _Path, slope: Array, table: Array) -> Array:
+def _planned(path: _Path, slope: Floats, table: Floats) -> Floats:
     """Step over which the unknowns change as much as is planned."""
     speed = (np.abs(slope) / path.scale(table)).max(axis=0)
     with np.errstate(divide="ignore"):

@@ -12,9 +12,10 @@ from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.naming import joints_in_words
 from mechdesign.mechanism.redundancy import doubled, owners_of, repeating
-from mechdesign.mechanism.rigidity import Equations, Vector, null_space, separated
+from mechdesign.mechanism.rigidity import Equations, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
 from mechdesign.mechanism.structure import Undetermined, compile_structure
+from mechdesign.numerics.arrays import Floats
 
 DRIVES = "mechanism.drives"
 # A message names so many joints and links, and so many motions; nobody reads more.
@@ -78,7 +79,7 @@ def _still(description: Description, graph: Graph, given: Sequence[Coordinate]) 
     return None
 
 
-def _too_free(equations: Equations, jacobian: Vector, drives: Sequence[str], missing: int) -> str:
+def _too_free(equations: Equations, jacobian: Floats, drives: Sequence[str], missing: int) -> str:
     """Too few drives: what moves while they are held."""
     graph = equations.graph
     free = [_motion(graph, motion) for motion in _motions(equations, jacobian)]
@@ -124,7 +125,7 @@ def _alike(a: str, b: str) -> bool:
 
 
 def over_constrained(
-    description: Description, equations: Equations, x: Vector, count: int, real: int, given: int
+    description: Description, equations: Equations, x: Floats, count: int, real: int, given: int
 ) -> MechanismError:
     """A chain that moves although the count says it cannot: what repeats the work of the rest."""
     start = (
@@ -231,19 +232,19 @@ def _rigid(equations: Equations, count: int, drives: int) -> str:
     return "Free a joint or a link"
 
 
-def _motions(equations: Equations, jacobian: Vector) -> list[Vector]:
+def _motions(equations: Equations, jacobian: Floats) -> list[Floats]:
     """Independent motions that the rows of a Jacobian leave, the first link's first."""
     found = separated(null_space(jacobian), equations.inner)
     return sorted(found, key=lambda motion: np.flatnonzero(motion).tolist())
 
 
-def motions_in_words(equations: Equations, jacobian: Vector) -> str:
+def motions_in_words(equations: Equations, jacobian: Floats) -> str:
     """What can still move under the rows of a Jacobian; empty where nothing can."""
     told = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
     return "; ".join(told[:FEW]) + (f"; and {len(told) - FEW} more motions" if len(told) > FEW else "")
 
 
-def _motion(graph: Graph, motion: Vector) -> tuple[str, str | None, str | None]:
+def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:
     """A motion in words; the link, where it is one link's turn; and a drive that would hold it."""
     angles, inner = graph.classes - 1, graph.classes - 1 + len(graph.slides)
     turning = [

@@ -11,8 +11,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from mechdesign.mechanism.rigidity import TRIES, Equations, Vector, null_space
+from mechdesign.mechanism.rigidity import TRIES, Equations, null_space
 from mechdesign.mechanism.structure import Group, Structure, Undetermined
+from mechdesign.numerics.arrays import Floats
 
 
 def check_independent(equations: Equations, structure: Structure) -> None:
@@ -44,7 +45,7 @@ def check_independent(equations: Equations, structure: Structure) -> None:
             raise Undetermined("the given coordinates fix one part of the mechanism twice and leave another free")
 
 
-def _block(equations: Equations, structure: Structure, group: Group) -> tuple[list[int], Vector]:
+def _block(equations: Equations, structure: Structure, group: Group) -> tuple[list[int], Floats]:
     """Rows of the Jacobian that a group solves; and what moves with each of its unknowns, shape (all, own).
 
     A given distance is a single row, whatever the direction of the link that stands for it in the structure.

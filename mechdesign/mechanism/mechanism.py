@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import closing, diagnosis
@@ -21,6 +21,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import assembly_modes, drawn_value, roots_as_drawn
 from mechdesign.mechanism.structure import Undetermined, compile_structure
+from mechdesign.numerics.arrays import Flags, Floats
 
 # Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).
 TIE_ROUNDING = 1e-9
@@ -119,7 +120,7 @@ class Mechanism(Core):
         """Loop equations of the drives' groups at a configuration, for derivatives of any kind."""
         return Linearization(self.forward.structure, self.geometry, configuration)
 
-    def jacobian(self, configuration: Configuration, outputs: Sequence[Coordinate]) -> NDArray[np.float64]:
+    def jacobian(self, configuration: Configuration, outputs: Sequence[Coordinate]) -> Floats:
         """Derivatives of outputs with respect to the drives, per radian; shape (..., outputs, drives)."""
         rates = self.linearize(configuration).drives()
         full = (len(self.drives), *configuration.shape)
@@ -195,11 +196,11 @@ class Pose:
         self.configuration = configuration
 
     @property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Flags:
         """Whether each pose is assembled and within its limits."""
         return self.configuration.valid
 
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
+    def __getitem__(self, name: str) -> Floats:
         coordinate = self.mechanism.coordinate(name)
         value = np.asarray(self.configuration.value(coordinate), dtype=float)
         if coordinate.quantity == "angle":

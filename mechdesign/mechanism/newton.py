@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, plus, rotation, vector
 from mechdesign.mechanism.configuration import Configuration
@@ -15,6 +14,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
 from mechdesign.mechanism.state import State, columns, loop_gap, scalars
 from mechdesign.mechanism.structure import Group
+from mechdesign.numerics.arrays import Flags
 
 STEPS = 10
 # After a correction this small (radians, or parts of the mechanism's size) a further one would be below rounding:
@@ -49,7 +49,7 @@ def solve_newton(
     group = state.structure.groups[index]
     theta: list[Value] = [np.asarray(a, dtype=float) for a in angles]
     s: list[Value] = [np.asarray(a, dtype=float) for a in slides]
-    active: NDArray[np.bool_] | None = None if steps else np.ones((), dtype=bool)
+    active: Flags | None = None if steps else np.ones((), dtype=bool)
     determinant: Value = 0.0
     for _ in range(steps):
         set_unknowns(state, group, theta, s)

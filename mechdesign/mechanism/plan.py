@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mechdesign.mechanism import chunks
 from mechdesign.mechanism.algebra import Value, quiet
@@ -20,6 +20,7 @@ from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.mechanism.structure import Structure
+from mechdesign.numerics.arrays import Flags, Ints
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
@@ -149,7 +150,7 @@ class Plan:
     ) -> Configuration:
         """`solve` without chunks, for arrays of floats that broadcast to `shape`."""
         vectors = self.core.geometry.vectors(dims)
-        reached: NDArray[np.bool_] | None = None
+        reached: Flags | None = None
         guess: Guess | None = None
         if self.iterative:
             begin = self._start(start)
@@ -177,7 +178,7 @@ class Plan:
         dims: Mapping[str, Value],
         shape: tuple[int, ...],
         begin: Start,
-    ) -> tuple[Guess, NDArray[np.bool_]]:
+    ) -> tuple[Guess, Flags]:
         geometry = self.core.geometry
 
         def flat(value: Value) -> Value:
@@ -188,7 +189,7 @@ class Plan:
         begin = begin.map(flat)
         places = {name: flat(v) for name, v in dims.items()}
 
-        def solve(given: Sequence[Value], rows: NDArray[np.intp] | None) -> tuple[Guess, NDArray[np.bool_]]:
+        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Guess, Flags]:
             def some(value: Value) -> Value:
                 return value if rows is None or np.ndim(value) == 0 else value[rows]
 
@@ -232,7 +233,7 @@ class Plan:
         shape: tuple[int, ...],
         dims: Mapping[str, Value],
         vectors: Vectors,
-        reached: NDArray[np.bool_] | None,
+        reached: Flags | None,
         limits: bool,
         given: Sequence[Value] | None = None,
     ) -> Configuration:

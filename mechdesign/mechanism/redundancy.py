@@ -8,10 +8,11 @@ import numpy as np
 
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Fixed, Prismatic
-from mechdesign.mechanism.rigidity import Equations, Vector, null_space
+from mechdesign.mechanism.rigidity import Equations, null_space
+from mechdesign.numerics.arrays import Floats
 
 
-def doubled(equations: Equations, jacobian: Vector) -> tuple[list[int], list[bool]]:
+def doubled(equations: Equations, jacobian: Floats) -> tuple[list[int], list[bool]]:
     """Edges and held coordinates whose equations depend on each other: the support of the left null space."""
     stress = null_space(jacobian.T)
     count = len(equations.graph.edges)
@@ -31,7 +32,7 @@ def owners_of(graph: Graph, edges: Iterable[int]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def repeating(description: Description, equations: Equations, x: Vector, excess: int) -> list[str]:
+def repeating(description: Description, equations: Equations, x: Floats, excess: int) -> list[str]:
     """Links, else joints, that can be left out without changing the motion, as many as there is excess; or none.
 
     Parameters

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import vector, wrap
 from mechdesign.mechanism.configuration import Configuration
@@ -24,8 +23,8 @@ from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
 from mechdesign.mechanism.sketch import Sketch
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
-Vector = NDArray[np.float64]
 # Singular values below this fraction of the largest are zeros, of columns scaled to length 1.
 RANK = 1e-7
 # What closes to this fraction of the mechanism's size is assembled.
@@ -45,7 +44,7 @@ class Equations:
     size: float
 
     @cached_property
-    def _ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    def _ends(self) -> tuple[Ints, Ints, Ints, Ints]:
         edges = self.graph.edges
         slides = [-1 if edge.slide is None else edge.slide for edge in edges]
         columns = ([e.tail for e in edges], [e.head for e in edges], [e.frame for e in edges], slides)
@@ -53,7 +52,7 @@ class Equations:
         return tail, head, frame, slide
 
     @cached_property
-    def _arms(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    def _arms(self) -> tuple[Complexes, Complexes]:
         vectors = self.geometry.nominal
         return np.array(vectors.w, dtype=np.complex128) / self.size, np.array(vectors.d, dtype=np.complex128)
 
@@ -67,18 +66,18 @@ class Equations:
         """Number of unknown angles and slides; the x of all nodes but the first follow, then the y."""
         return self.angles + len(self.graph.slides)
 
-    def pack(self, nodes: NDArray[np.complex128], angles: Vector, slides: Vector) -> Vector:
+    def pack(self, nodes: Complexes, angles: Floats, slides: Floats) -> Floats:
         """Unknowns from positions (lengths as in the study), angles of all classes and slides."""
         scaled = nodes[1:] / self.size
         return np.concatenate([angles[1:], slides / self.size, scaled.real, scaled.imag])
 
-    def unpack(self, x: Vector) -> tuple[NDArray[np.complex128], Vector, Vector]:
+    def unpack(self, x: Floats) -> tuple[Complexes, Floats, Floats]:
         """Positions as fractions of the size, angles of all classes, slides as fractions of the size."""
         places = x[self.inner :].reshape(2, -1)
         nodes = np.concatenate([[0j], vector(places[0], places[1])])
         return nodes, np.concatenate([[0.0], x[: self.angles]]), x[self.angles : self.inner]
 
-    def from_sketch(self, sketch: Sketch, spread: float = 0.0, seed: int = 0) -> Vector:
+    def from_sketch(self, sketch: Sketch, spread: float = 0.0, seed: int = 0) -> Floats:
         """Unknowns as drawn; what is not drawn is put anywhere, and everything is moved by up to `spread`."""
         rng = np.random.default_rng(seed)
         drawn = np.array([np.nan if node is None else node for node in sketch.nodes], dtype=complex)
@@ -96,7 +95,7 @@ class Equations:
         x = self.pack(nodes, angles, slides)
         return x + spread * rng.uniform(-1, 1, len(x))
 
-    def _spans(self, x: Vector) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]:
+    def _spans(self, x: Floats) -> tuple[Complexes, Complexes, Complexes]:
         nodes, angles, slides = self.unpack(x)
         tail, head, frame, slide = self._ends
         w, d = self._arms
@@ -105,16 +104,16 @@ class Equations:
         spans = (w + reach * d) * turn
         return nodes[tail] + spans - nodes[head], spans, d * turn
 
-    def gaps(self, x: Vector) -> NDArray[np.complex128]:
+    def gaps(self, x: Floats) -> Complexes:
         """By how much each edge misses its head, in the study's lengths."""
         return self._spans(x)[0] * self.size
 
-    def jacobian(self, x: Vector, held: Sequence[Coordinate] = ()) -> Vector:
+    def jacobian(self, x: Floats, held: Sequence[Coordinate] = ()) -> Floats:
         """Derivatives of the equations (x and y of each edge, then the held coordinates) by the unknowns."""
         _, spans, directions = self._spans(x)
         return np.vstack([self._edge_rows(spans, directions), *(self._row(x, coordinate) for coordinate in held)])
 
-    def generic(self, held: Sequence[Coordinate] = ()) -> Vector:
+    def generic(self, held: Sequence[Coordinate] = ()) -> Floats:
         """The Jacobian for dimensions without any special relation (but the directions of slides).
 
         Of several draws one of the largest rank: chance can only lower it. Not finite where no draw is, as a held
@@ -124,7 +123,7 @@ class Equations:
         finite = [jacobian for jacobian in draws if np.isfinite(jacobian).all()]
         return min(finite, key=lambda jacobian: null_space(jacobian).shape[1], default=draws[0])
 
-    def drawn(self, held: Sequence[Coordinate], seed: int) -> Vector:
+    def drawn(self, held: Sequence[Coordinate], seed: int) -> Floats:
         """The Jacobian for dimensions drawn at random (but the directions of slides)."""
         rng = np.random.default_rng(seed)
         x = rng.uniform(-1, 1, self.inner + 2 * (len(self.graph.nodes) - 1))
@@ -133,7 +132,7 @@ class Equations:
         rows = self._edge_rows(nodes[head] - nodes[tail], self._spans(x)[2])
         return np.vstack([rows, *(self._row(x, coordinate) for coordinate in held)])
 
-    def _edge_rows(self, spans: NDArray[np.complex128], directions: NDArray[np.complex128]) -> Vector:
+    def _edge_rows(self, spans: Complexes, directions: Complexes) -> Floats:
         tail, head, frame, slide = self._ends
         count, nodes = len(tail), len(self.graph.nodes)
         turning = np.zeros((count, self.graph.classes), dtype=complex)
@@ -149,14 +148,14 @@ class Equations:
         both = [np.hstack([inner.real, placing[:, 1:], none]), np.hstack([inner.imag, none, placing[:, 1:]])]
         return np.stack(both, axis=1).reshape(2 * count, -1)
 
-    def _configuration(self, x: Vector) -> Configuration:
+    def _configuration(self, x: Floats) -> Configuration:
         nodes, angles, slides = self.unpack(x)
         return Configuration(
             self.graph, self.geometry.nominal, (), list(nodes * self.size), list(np.exp(1j * angles)),
             list(slides * self.size), [], np.zeros((), dtype=np.int8), {},
         )  # fmt: skip
 
-    def _row(self, x: Vector, coordinate: Coordinate) -> Vector:
+    def _row(self, x: Floats, coordinate: Coordinate) -> Floats:
         every = [self.unpack(unit) for unit in np.eye(len(x))]
         nodes, angles, slides = (np.array(part).T for part in zip(*every, strict=True))
         # A length's derivative is that of its fraction of the size.
@@ -165,8 +164,8 @@ class Equations:
         return np.asarray(first(self._configuration(x), coordinate, rates)) / scale
 
     def solve(
-        self, x: Vector, held: Sequence[tuple[Coordinate, float]] = (), step: Vector | None = None
-    ) -> tuple[Vector, float]:
+        self, x: Floats, held: Sequence[tuple[Coordinate, float]] = (), step: Floats | None = None
+    ) -> tuple[Floats, float]:
         """Least squares from `x`, some coordinates held (angles in radians): the unknowns and the largest gap.
 
         With a `step` the solution must lie that far from `x` in its direction: a point where two motions cross, or
@@ -178,24 +177,24 @@ class Equations:
         ahead = np.zeros((0, len(x))) if step is None else step[None] / np.linalg.norm(step)
         start = x if step is None else x + step
 
-        def residual(y: Vector) -> Vector:
+        def residual(y: Floats) -> Floats:
             gaps = self._spans(y)[0]
             misses = [self._miss(y, coordinate, value) for coordinate, value in held]
             return np.concatenate([gaps.view(float), misses, ahead @ (y - start)])
 
-        def slope(y: Vector) -> Vector:
+        def slope(y: Floats) -> Floats:
             return np.vstack([self.jacobian(y, coordinates), ahead])
 
         found = least_squares(residual, start, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
         return found.x, float(np.abs(found.fun).max(initial=0.0))
 
-    def _miss(self, x: Vector, coordinate: Coordinate, value: float) -> float:
+    def _miss(self, x: Floats, coordinate: Coordinate, value: float) -> float:
         miss = float(self._configuration(x).value(coordinate)) - value
         if coordinate.quantity == "angle":
             return float(wrap(miss))
         return miss / self.size if coordinate.quantity == "length" else miss
 
-    def assemble(self, sketch: Sketch, held: Sequence[tuple[Coordinate, float]] = ()) -> Vector | None:
+    def assemble(self, sketch: Sketch, held: Sequence[tuple[Coordinate, float]] = ()) -> Floats | None:
         """An assembled configuration near the sketch; None where there is none."""
         for attempt in range(TRIES):
             x, gap = self.solve(self.from_sketch(sketch, 0.1 * attempt, attempt), held)
@@ -203,7 +202,7 @@ class Equations:
                 return x
         return None
 
-    def mobility(self, x: Vector) -> tuple[int, Vector]:
+    def mobility(self, x: Floats) -> tuple[int, Floats]:
         """Degrees of freedom of the finite motion from an assembled configuration, and a second one on its way."""
         motions = null_space(self.jacobian(x))
         ordinary = null_space(self.generic()).shape[1]
@@ -219,7 +218,7 @@ class Equations:
                 best = max(best, (self._realised(y, ordinary), y), key=lambda found: found[0])
         return best
 
-    def _realised(self, x: Vector, ordinary: int) -> int:
+    def _realised(self, x: Floats, ordinary: int) -> int:
         """How many of the motions at a configuration go on beyond the first order."""
         motions = np.linalg.qr(null_space(self.jacobian(x)))[0]
         if motions.shape[1] == ordinary:
@@ -232,7 +231,7 @@ class Equations:
                 kept[:, k] = motions.T @ (y - x) / np.linalg.norm(step)
         return int((np.linalg.svd(kept, compute_uv=False) > KEPT).sum())
 
-    def freedom_without(self, jacobian: Vector, edges: Collection[int], classes: Collection[int]) -> int:
+    def freedom_without(self, jacobian: Floats, edges: Collection[int], classes: Collection[int]) -> int:
         """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place."""
         left = [k for k in range(len(self.graph.edges)) if k not in edges]
         tail, head, _, slide = self._ends
@@ -246,7 +245,7 @@ class Equations:
         return int(null_space(jacobian[np.ix_(rows, kept)]).shape[1])
 
 
-def null_space(matrix: Vector) -> Vector:
+def null_space(matrix: Floats) -> Floats:
     """Basis of the right null space, shape (columns, dimension)."""
     if matrix.shape[0] == 0 or matrix.shape[1] == 0:
         return np.eye(matrix.shape[1])
@@ -257,7 +256,7 @@ def null_space(matrix: Vector) -> Vector:
     return np.asarray(rows[rank:].T * scale[:, None])
 
 
-def separated(basis: Vector, pivots: int) -> list[Vector]:
+def separated(basis: Floats, pivots: int) -> list[Floats]:
     """Basis vectors reduced against each other, so that independent motions come one by one.
 
     Pivots are taken among the first `pivots` entries while these say anything. Entries within rounding are zero.

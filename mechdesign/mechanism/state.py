@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, plus, rotation, vector
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.structure import Group, Structure
+from mechdesign.numerics.arrays import Flags
 
 # Angles of roots, and slides with the x and y of bases behind them, of the groups without a closed form, by group.
 Guess = Mapping[int, tuple[Sequence[Value], Sequence[Value]]]
@@ -41,7 +41,7 @@ class State:
     slides: list[Any]
     closures: list[Value] = field(default_factory=list)
     unknowns: dict[int, tuple[list[Value], list[Value]]] = field(default_factory=dict)
-    converged: list[NDArray[np.bool_]] = field(default_factory=list)
+    converged: list[Flags] = field(default_factory=list)
     determinants: list[Value] = field(default_factory=list)
 
     def arm(self, k: int) -> Value:

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.configuration import Configuration
@@ -23,6 +22,7 @@ from mechdesign.mechanism.continuation import unknowns_of
 from mechdesign.mechanism.newton import equations, set_unknowns
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
+from mechdesign.numerics.arrays import Floats
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.plan import Plan
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 SOLVED = 1e-9
 # The end is sought near the last pose only: this far along the coordinate (radians, or parts of the size).
 NEAR = 0.1
-
-Array = NDArray[np.float64]
 
 
 def turning_point(
@@ -84,7 +82,7 @@ class _Fold:
         self.b, self.c = left[:, -1], right[-1]
 
     @quiet
-    def system(self, y: Array, s: float) -> tuple[Array, Array, State]:
+    def system(self, y: Floats, s: float) -> tuple[Floats, Floats, State]:
         """Matrix and errors of the group's equations, lengths in parts of the mechanism's size."""
         plan, size, count = self.plan, self.plan.core.size, len(self.group.angles)
         given = [np.asarray(v) for v in self.given]
@@ -96,7 +94,7 @@ class _Fold:
         matrix = np.array([[float(entry) for entry in row] for row in rows]) * self.weights / size
         return matrix, np.array([float(entry) for entry in right]) / size, state
 
-    def residual(self, z: Array) -> Array:
+    def residual(self, z: Floats) -> Floats:
         """Errors of the equations and g, for unknowns and the coordinate in their own scales."""
         matrix, errors, _ = self.system(z[:-1] * self.weights, z[-1])
         n = len(errors)

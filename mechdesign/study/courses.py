@@ -7,12 +7,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.study.path_models import ROUND, STRAIGHT, Arc, Circle
-
-Floats = NDArray[np.float64]
-Plane = NDArray[np.complex128]
 
 # Pieces of a spline between two of its points whose lengths are added up.
 PIECES = 64
@@ -36,10 +33,10 @@ class Course:
         Whether the path goes on from its last place to its first.
     """
 
-    places: Plane
+    places: Complexes
     way: Floats
-    directions: Plane
-    bends: Plane
+    directions: Complexes
+    bends: Complexes
     closed: bool = False
 
 
@@ -66,12 +63,12 @@ def _round(center: complex, radius: float, angles: Floats, sign: float, *, close
 def line(begin: complex, end: complex, points: int | None) -> Course:
     """A straight line between two different places, both included."""
     part = np.linspace(0.0, 1.0, points or STRAIGHT)
-    places: Plane = np.asarray(begin + part * (end - begin), dtype=np.complex128)
+    places: Complexes = np.asarray(begin + part * (end - begin), dtype=np.complex128)
     direction = np.full(len(part), (end - begin) / abs(end - begin))
     return Course(places, part * abs(end - begin), direction, np.zeros(len(part), dtype=complex))
 
 
-def polyline(places: Plane) -> Course:
+def polyline(places: Complexes) -> Course:
     """Straight segments; a corner has the direction of the segment that begins there, directions nan for one place."""
     steps = np.diff(places)
     lengths = np.abs(steps)
@@ -87,7 +84,7 @@ def polyline(places: Plane) -> Course:
     return Course(places, way, directions, np.zeros(len(places), dtype=complex))
 
 
-def spline(places: Plane, points: int | None) -> Course:
+def spline(places: Complexes, points: int | None) -> Course:
     """A cubic spline by the length of the chords through three places or more, periodic where the first is the last."""
     from scipy.interpolate import CubicSpline
 
@@ -96,9 +93,9 @@ def spline(places: Plane, points: int | None) -> Course:
     table = np.stack([places.real, places.imag], axis=1)
     curve: Any = CubicSpline(knots, table, bc_type="periodic" if places[0] == places[-1] else "not-a-knot")
 
-    def at(x: Floats, order: int = 0) -> Plane:
+    def at(x: Floats, order: int = 0) -> Complexes:
         found = curve(x, order)
-        plane: Plane = found[:, 0] + 1j * found[:, 1]
+        plane: Complexes = found[:, 0] + 1j * found[:, 1]
         return plane
 
     fine = np.unique(np.concatenate([np.linspace(a, b, PIECES + 1) for a, b in pairwise(knots)]))

@@ -8,17 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import courses
 from mechdesign.study.path_models import Path as PathModel
 from mechdesign.study.pose_models import PoseSection, Sweep
 
 MAX_POSES = 10_000_000
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class PoseGroup:
 
     names: tuple[str, ...]
     values: Mapping[str, Floats]
-    rows: NDArray[np.intp]
+    rows: Ints
 
     def columns(self) -> list[Floats]:
         """Values in the order of the names."""

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study.checker import Checker
 from mechdesign.study.document import Path
 from mechdesign.study.poses import Poses, read_table
@@ -41,7 +41,7 @@ class Target:
     owner: str
     coordinates: tuple[str, ...]
     expression: Expression | None = None
-    table: NDArray[np.float64] | None = None
+    table: Floats | None = None
 
     @property
     def timed(self) -> bool:
@@ -98,9 +98,7 @@ def _check_expression(checker: Checker, owner: str, expression: Expression, path
     return right
 
 
-def _table(
-    checker: Checker, owner: str, value: Wanted, path: Path, folder: pathlib.Path, count: int
-) -> NDArray[np.float64] | None:
+def _table(checker: Checker, owner: str, value: Wanted, path: Path, folder: pathlib.Path, count: int) -> Floats | None:
     try:
         table = np.array(value.rows) if value.file is None else read_table(folder / value.file, most=3)
     except StudyError as error:

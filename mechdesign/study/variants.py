@@ -12,7 +12,6 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError
@@ -24,8 +23,6 @@ from mechdesign.study.loading import Study, load_document
 from mechdesign.study.models import LINK_KEYS
 from mechdesign.study.names import GROUND
 from mechdesign.study.parameters import Parameters
-
-Floats = NDArray[np.float64]
 
 # Sections whose numbers are read once, when the study is loaded.
 SECTIONS = (*(name for name in COMMANDS if name != "optimize"), "requirements")

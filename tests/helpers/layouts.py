@@ -16,7 +16,8 @@ from random import Random
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
+
+from mechdesign.numerics.arrays import Complexes, Floats
 
 GROUND = "ground"
 # The same text, ten times as fast, where PyYAML has its C library.
@@ -134,7 +135,7 @@ class Layout:
 
     # Its equations.
 
-    def _move(self, body: str, at: complex, columns: list[str]) -> NDArray[np.complex128]:
+    def _move(self, body: str, at: complex, columns: list[str]) -> Complexes:
         """Velocity of the place `at` of a body, by the rates (x, y of its frame's origin, angle) of all bodies."""
         row = np.zeros(3 * len(columns), dtype=complex)
         if body in columns:
@@ -142,7 +143,7 @@ class Layout:
             row[k : k + 3] = 1, 1j, 1j * (at - self.bodies[body.removesuffix(":rod")].origin)
         return row
 
-    def _spin(self, body: str, columns: list[str]) -> NDArray[np.float64]:
+    def _spin(self, body: str, columns: list[str]) -> Floats:
         row = np.zeros(3 * len(columns))
         if body in columns:
             row[3 * columns.index(body) + 2] = 1
@@ -162,9 +163,9 @@ class Layout:
                 lines.append((body.name, body.origin, body.turn, f"{body.name}:rod", self.places[body.to], False))
         return lines
 
-    def equations(self, columns: list[str]) -> NDArray[np.float64]:
+    def equations(self, columns: list[str]) -> Floats:
         """Constraints, a row each, on the rates of the bodies `columns`; only rows that they take part in."""
-        rows: list[NDArray[np.float64]] = []
+        rows: list[Floats] = []
         for point, at in self.places.items():
             first, *others = [self.holder(body, point) for body in self.owners(point)]
             for other in others:
@@ -180,7 +181,7 @@ class Layout:
             rows.append(self._spin(clamp.second, columns) - self._spin(clamp.first, columns))
         return np.array([row for row in rows if row.any()]).reshape(-1, 3 * len(columns))
 
-    def rate(self, coordinate: Coordinate, columns: list[str]) -> NDArray[np.float64]:
+    def rate(self, coordinate: Coordinate, columns: list[str]) -> Floats:
         """Derivative of a coordinate by the rates of the bodies."""
         kind, name = coordinate[:2]
         if kind == "angle":
@@ -207,7 +208,7 @@ class Layout:
         span = two - one
         return (span.conjugate() * (moves[1] - moves[0])).real / abs(span)
 
-    def system(self, given: list[Coordinate]) -> NDArray[np.float64]:
+    def system(self, given: list[Coordinate]) -> Floats:
         """Constraints and given coordinates, in rows; square if there are as many as the mobility."""
         columns = self.rigid()
         return np.vstack([self.equations(columns), *(self.rate(c, columns)[None] for c in given)])

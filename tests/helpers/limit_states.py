@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from math import comb, factorial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtr
 
 from mechdesign.analyses.reliability.engine.problem import Problem
-
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats
 
 
 @dataclass(frozen=True)

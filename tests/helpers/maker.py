@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from random import Random
 
 import numpy as np
-from numpy.typing import NDArray
 
 from helpers.layouts import GROUND, Body, Clamp, Coordinate, Guide, Layout
+from mechdesign.numerics.arrays import Floats
 
 # A group: its new links ("link" or telescopic "leg"), its joints (kind, link, link), the base being -1, and its
 # drives (kind, new link). R revolute, P prismatic, S pin in slot, F fixed; which side has the line is drawn.
@@ -297,7 +297,7 @@ class Maker:
         return None
 
 
-def weakest(matrix: NDArray[np.float64]) -> float:
+def weakest(matrix: Floats) -> float:
     """At most the smallest singular value of a square matrix, and no less than that over the root of its size."""
     try:
         return float(1 / np.linalg.norm(np.linalg.inv(matrix)))

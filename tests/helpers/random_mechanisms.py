@@ -5,15 +5,14 @@ from __future__ import annotations
 from functools import cached_property
 from random import Random
 
-import numpy as np
 from hypothesis import event
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from helpers.layouts import Coordinate, Layout
 from helpers.maker import DRIVEN, DYADS, TRIADS, Maker
 from helpers.studies import study_of
 from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.numerics.arrays import Floats
 
 
 class Made:
@@ -47,7 +46,7 @@ class Made:
         rng = self._speed
         return {drive: rng.choice([-1, 1]) * rng.uniform(0.3, 1.0) for drive in self.layout.drives}
 
-    def drives(self, time: NDArray[np.float64], bend: float = 0.0) -> list[NDArray[np.float64]]:
+    def drives(self, time: Floats, bend: float = 0.0) -> list[Floats]:
         """Values of the drives, in the mechanism's order, at constant rates from the pose drawn (at time 0).
 
         With `bend` they are accelerated, each by so many times its rate.
@@ -57,7 +56,7 @@ class Made:
             self.layout.value(self.layout.drives[drive]) + self.rates[drive] * ahead for drive in self.mechanism.drives
         ]
 
-    def at(self, time: NDArray[np.float64], bend: float = 0.0) -> Configuration:
+    def at(self, time: Floats, bend: float = 0.0) -> Configuration:
         """The mechanism at such times."""
         return self.mechanism.forward.solve(self.drives(time, bend))
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Complexes, Floats
+
 # What a design costs that does not assemble, and the more so by how much it does not.
 OPEN = 1e6
 
@@ -135,7 +135,7 @@ def function_generator(ranges: Mapping[str, tuple[float, float]], formula: str, 
 
 
 def timed_path(
-    number: int, shape: Callable[[Floats], NDArray[np.complex128]], ranges: Mapping[str, tuple[float, float]], *,
+    number: int, shape: Callable[[Floats], Complexes], ranges: Mapping[str, tuple[float, float]], *,
     more: Mapping[str, float] | None = None,
 ) -> Problem:  # fmt: skip
     """A coupler point that passes points of a closed curve, one every so many degrees of the crank."""
@@ -217,15 +217,15 @@ def sine(x: Floats) -> Floats:
     return np.asarray(40 * np.sin(np.radians(x - 20)))
 
 
-def ellipse(t: Floats) -> NDArray[np.complex128]:
+def ellipse(t: Floats) -> Complexes:
     return 60 * np.cos(t + 0.4) + 25j * np.sin(t + 0.4) + 40 + 60j
 
 
-def small_ellipse(t: Floats) -> NDArray[np.complex128]:
+def small_ellipse(t: Floats) -> Complexes:
     return 30 * np.cos(t) + 20j * np.sin(t) + 40 + 60j
 
 
-def eight(t: Floats) -> NDArray[np.complex128]:
+def eight(t: Floats) -> Complexes:
     return 40 * np.cos(t) + 20j * np.sin(2 * t) + 50 + 60j
 
 

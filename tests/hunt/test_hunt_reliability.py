@@ -14,13 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from helpers.studies import study_of
-from numpy.typing import NDArray
 from scipy.special import j0, j1
 from scipy.stats import beta
 
 import mechdesign
+from mechdesign.numerics.arrays import Floats
 
-Floats = NDArray[np.float64]
 Seeds = Callable[[int], Iterator[int]]
 
 MODELS = ("normal", "normal_in_disc", "uniform", "contact")

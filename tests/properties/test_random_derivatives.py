@@ -11,32 +11,31 @@ import numpy as np
 import pytest
 from helpers.random_mechanisms import Made, mechanisms
 from hypothesis import assume, given, settings
-from numpy.typing import NDArray
 
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
+from mechdesign.numerics.arrays import Floats
 
 BEND = 0.7
 STEPS = (-2, -1, 0, 1, 2)
-Array = NDArray[np.float64]
 
 
-def slopes(values: list[Array], h: float) -> tuple[Array, Array]:
+def slopes(values: list[Floats], h: float) -> tuple[Floats, Floats]:
     """First derivative from values at -2h ... 2h, and what it may be wrong by."""
     near, far = (values[3] - values[1]) / (2 * h), (values[4] - values[0]) / (4 * h)
     return (4 * near - far) / 3, np.abs(near - far)
 
 
-def bends(values: list[Array], h: float) -> tuple[Array, Array]:
+def bends(values: list[Floats], h: float) -> tuple[Floats, Floats]:
     """Second derivative from values at -2h ... 2h, and what it may be wrong by."""
     near = (values[3] - 2 * values[2] + values[1]) / h**2
     far = (values[4] - 2 * values[2] + values[0]) / (4 * h**2)
     return (4 * near - far) / 3, np.abs(near - far)
 
 
-def agree(exact: object, difference: tuple[Array, Array], rounding: float, what: str) -> None:
+def agree(exact: object, difference: tuple[Floats, Floats], rounding: float, what: str) -> None:
     """An exact derivative equals a difference as far as that can tell."""
     value, error = difference
     exact = np.broadcast_to(np.asarray(exact, dtype=float), value.shape)
@@ -46,7 +45,7 @@ def agree(exact: object, difference: tuple[Array, Array], rounding: float, what:
     assert np.all(miss[told] <= 0), (what, exact, value, error)
 
 
-def along(configurations: list[Configuration], coordinate: Coordinate) -> list[Array]:
+def along(configurations: list[Configuration], coordinate: Coordinate) -> list[Floats]:
     """A coordinate in neighbouring configurations, an angle continued from the middle one."""
     values = [np.broadcast_to(np.asarray(c.value(coordinate), dtype=float), c.shape) for c in configurations]
     if coordinate.quantity == "angle":
@@ -107,7 +106,7 @@ def test_a_jacobian_holds_the_derivatives_by_each_drive(made: Made) -> None:
             agree(jacobian[row, column], slopes(along(near, coordinate), h), 1e-9, f"{names[row]} by drive {column}")
 
 
-def _state(made: Made, time: Array, changes: dict[str, Array]) -> tuple[Configuration, object, object, object]:
+def _state(made: Made, time: Floats, changes: dict[str, Floats]) -> tuple[Configuration, object, object, object]:
     mechanism = made.mechanism
     configuration = mechanism.forward.solve(made.drives(time), changes)
     linear = mechanism.linearize(configuration)

@@ -7,21 +7,19 @@ import cmath
 import numpy as np
 import pytest
 from helpers.studies import study_of
-from numpy.typing import NDArray
 
 from mechdesign.mechanism import Mechanism
+from mechdesign.numerics.arrays import Complexes
 
-Points = NDArray[np.complex128]
 
-
-def meet(a: Points | complex, r: float, b: Points | complex, s: float, side: int) -> Points:
+def meet(a: Complexes | complex, r: float, b: Complexes | complex, s: float, side: int) -> Complexes:
     """Where the circles of radius r about a and s about b meet, left (+1) or right (-1) of the way from a to b."""
     span = b - a
     along = (abs(span) ** 2 + r * r - s * s) / (2 * abs(span))
     return a + span / abs(span) * (along + 1j * side * np.sqrt(r * r - along**2))
 
 
-def points(mechanism: Mechanism, pose: dict[str, object], names: str) -> list[Points]:
+def points(mechanism: Mechanism, pose: dict[str, object], names: str) -> list[Complexes]:
     solved = mechanism.solve(pose)  # type: ignore[arg-type]
     assert solved.valid.all()
     return [solved[f"{name}.x"] + 1j * solved[f"{name}.y"] for name in names]

@@ -9,11 +9,11 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.workspace.panels import Effort, find_panels
 from mechdesign.analyses.workspace.rays import Designs, trace
 from mechdesign.analyses.workspace.region import BRISK, answer, questions
 from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.numerics.roots import bracketed_roots
 
 ARM = """
 units: {length: dimensionless}

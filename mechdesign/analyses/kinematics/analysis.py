@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary
@@ -20,6 +19,7 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -136,7 +136,7 @@ def motion_table(motion: Motion) -> Table:
 
 def extremes_table(
     motion: Motion, ends: Sequence[Boundary] = (), names: Collection[str] | None = None
-) -> tuple[Table, NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[Table, Flags]:  # fmt: skip
     """Smallest and largest values, exact for some outputs or all; see `kinematics.extremes.extremes`."""
     question, poses = motion.asked, motion.asked.poses
     return extremes(

@@ -6,18 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, Margins, joints_of
-from mechdesign.analyses.kinematics.probing import Floats, Found, Indices, probe
+from mechdesign.analyses.kinematics.probing import Found, probe
 from mechdesign.analyses.poses import CHUNK
-from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.turning import turning_point
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.roots import bracketed_roots
 
 # The mechanism within steps `lane` at values of the swept coordinate.
-Solve = Callable[[Indices, Floats], Configuration]
+Solve = Callable[[Ints, Floats], Configuration]
 
 # Step, as a part of the sweep's, that tells whether a margin rises or falls at a pose.
 SLOPE = 1e-4
@@ -69,14 +69,14 @@ class ChangePoint:
 class _Sweep:
     margins: Margins
     at: Floats
-    valid: NDArray[np.bool_]
+    valid: Flags
     scale: Floats  # largest absolute value of each margin
 
-    def role(self, name: str) -> NDArray[np.bool_]:
+    def role(self, name: str) -> Flags:
         return np.array([cause.role == name for cause in self.margins.causes], dtype=bool)
 
 
-def boundaries(margins: Margins, valid: NDArray[np.bool_]) -> tuple[list[Boundary], list[ChangePoint]]:
+def boundaries(margins: Margins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint]]:
     """All ends of the motion in the order of the sweep, and all change points.
 
     Between two poses a margin is looked for that changes its sign, or whose slopes at the poses admit that it does so
@@ -106,7 +106,7 @@ def boundaries(margins: Margins, valid: NDArray[np.bool_]) -> tuple[list[Boundar
     return kept, changes
 
 
-def _suspects(sweep: _Sweep) -> tuple[Indices, Indices, Floats]:
+def _suspects(sweep: _Sweep) -> tuple[Ints, Ints, Floats]:
     """Steps of the sweep that may hold something, poses at which a closure is zero, and the margins' scale."""
     at, valid = sweep.at, sweep.valid
     steps, rows = [np.flatnonzero(valid[1:] != valid[:-1])], [np.zeros(0, dtype=np.intp)]
@@ -127,7 +127,7 @@ def _suspects(sweep: _Sweep) -> tuple[Indices, Indices, Floats]:
     return some[at[some + 1] != at[some]], np.unique(np.concatenate(rows)), scale
 
 
-def _suspect(here: Floats, slope: Floats, touch: Floats) -> NDArray[np.bool_]:
+def _suspect(here: Floats, slope: Floats, touch: Floats) -> Flags:
     """Steps in which a margin changes its sign or, by its values and slopes at both ends, may do so twice.
 
     A convex margin stays above its tangents; twice their slope leaves room for others. Where a slope is not a number
@@ -137,21 +137,21 @@ def _suspect(here: Floats, slope: Floats, touch: Floats) -> NDArray[np.bool_]:
     crossed = ((a >= 0) != (b >= 0)) & (np.isfinite(a) | np.isfinite(b))
     dip = (a >= 0) & (b >= 0) & ~(left > 0) & ~(right < 0) & ~(a + 2 * left > touch) & ~(b - 2 * right > touch)
     hump = (a < 0) & (b < 0) & (left > 0) & (right < 0) & (a + 2 * left >= 0) & (b - 2 * right >= 0)
-    found: NDArray[np.bool_] = crossed | dip | hump
+    found: Flags = crossed | dip | hump
     return found
 
 
-def _within(sweep: _Sweep, steps: Indices) -> tuple[list[Boundary], list[ChangePoint]]:
+def _within(sweep: _Sweep, steps: Ints) -> tuple[list[Boundary], list[ChangePoint]]:
     """What lies inside some steps of the sweep."""
     margins, valid = sweep.margins, sweep.valid
     begin, end = sweep.at[steps], sweep.at[steps + 1]
     rows = np.where(valid[steps], steps, steps + 1)
     start = margins.start(sweep.at[rows])
 
-    def solve(lane: Indices, x: Floats) -> Configuration:
+    def solve(lane: Ints, x: Floats) -> Configuration:
         return margins.solve(x, None if start is None else start.take(lane))
 
-    def evaluate(lane: Indices, x: Floats) -> Floats:
+    def evaluate(lane: Ints, x: Floats) -> Floats:
         return margins.evaluate(x, None if start is None else start.take(lane))
 
     probes = probe(evaluate, begin, end, np.where(sweep.role("reached"), COARSE, FINE))
@@ -172,7 +172,7 @@ def _within(sweep: _Sweep, steps: Indices) -> tuple[list[Boundary], list[ChangeP
 
 
 def _located(
-    sweep: _Sweep, lane: Indices, good: Floats, bad: Floats, steps: Indices, rows: Indices, start: Configuration | None
+    sweep: _Sweep, lane: Ints, good: Floats, bad: Floats, steps: Ints, rows: Ints, start: Configuration | None
 ) -> list[Boundary]:
     """Ends of the motion between places of which one is valid and the other is not."""
     if not len(lane):
@@ -218,7 +218,7 @@ def _halved(
 
 
 def _zeros(
-    sweep: _Sweep, which: Indices, causes: list[Cause], inner: Floats, good: Floats, bad: Floats,
+    sweep: _Sweep, which: Ints, causes: list[Cause], inner: Floats, good: Floats, bad: Floats,
     start: Configuration | None,
 ) -> Floats:  # fmt: skip
     """Where the margins that end the motion are zero, without the allowance for rounding; `good` for other causes."""
@@ -227,7 +227,7 @@ def _zeros(
     if not len(smooth):
         return found
 
-    def margin(left: Indices, x: Floats) -> Floats:
+    def margin(left: Ints, x: Floats) -> Floats:
         lane = smooth[left]
         values = sweep.margins.evaluate(x, None if start is None else start.take(lane))
         one: Floats = values[which[lane], np.arange(len(lane))]
@@ -267,7 +267,7 @@ def _named(
     return place, pose, cause
 
 
-def _causes(sweep: _Sweep, bad: Floats, start: Configuration | None) -> tuple[Indices, list[Cause]]:
+def _causes(sweep: _Sweep, bad: Floats, start: Configuration | None) -> tuple[Ints, list[Cause]]:
     """What ends the motion just beyond its end: the margin that is most below zero, and its index."""
     margins = sweep.margins
     values = margins.evaluate(bad, start) / np.where(sweep.scale > 0, sweep.scale, 1.0)[:, None]
@@ -281,7 +281,7 @@ def _causes(sweep: _Sweep, bad: Floats, start: Configuration | None) -> tuple[In
 
 
 def _isolated(
-    sweep: _Sweep, roots: Found, lows: Found, steps: Indices, solve: Solve
+    sweep: _Sweep, roots: Found, lows: Found, steps: Ints, solve: Solve
 ) -> tuple[list[Boundary], list[ChangePoint]]:
     """Places inside steps at which the motion ends without a gap beside them, or at which two assemblies meet."""
     closure = sweep.role("closure")[lows.function] & (np.abs(lows.value) <= TOUCHING * sweep.scale[lows.function])
@@ -308,7 +308,7 @@ def _isolated(
     return ends, changes
 
 
-def _at_poses(sweep: _Sweep, rows: Indices) -> list[ChangePoint]:
+def _at_poses(sweep: _Sweep, rows: Ints) -> list[ChangePoint]:
     """Change points that lie at poses of the sweep, also at its first and last."""
     if not len(rows):
         return []

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mechdesign.analyses.kinematics.lines import Floats, leaf_of
+from mechdesign.analyses.kinematics.lines import leaf_of
 from mechdesign.analyses.kinematics.peaks import Curve
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.numerics.arrays import Floats
 
 
 class Curves:

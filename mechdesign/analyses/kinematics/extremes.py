@@ -11,23 +11,22 @@ from numpy.typing import NDArray
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.curves import Curves
-from mechdesign.analyses.kinematics.lines import Indices, Line
+from mechdesign.analyses.kinematics.lines import Line
 from mechdesign.analyses.kinematics.peaks import STILL, Curve, Peak, peaks, searched
 from mechdesign.analyses.kinematics.targets import Error
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
-Array = NDArray[np.float64]
-
 
 def extremes(
-    study: Study, outputs: Sequence[Coordinate], errors: Sequence[Error], arrays: Mapping[str, Array], poses: Poses,
+    study: Study, outputs: Sequence[Coordinate], errors: Sequence[Error], arrays: Mapping[str, Floats], poses: Poses,
     swept: str | None, reason: NDArray[np.int8], ends: Sequence[Boundary] = (), asked: Collection[str] | None = None,
-) -> tuple[Table, NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[Table, Flags]:  # fmt: skip
     """Smallest and largest value of each output and error over the motion, and the ratio of the times between.
 
     Where one coordinate is swept they are those of the whole motion, from limit to limit, between its poses too;
@@ -121,15 +120,15 @@ class _Between:
     study: Study
     outputs: Sequence[Coordinate]
     errors: Sequence[Error]
-    arrays: Mapping[str, Array]
+    arrays: Mapping[str, Floats]
     poses: Poses
     swept: str
-    valid: NDArray[np.bool_]
+    valid: Flags
     ends: Sequence[Boundary]
 
     def refine(
-        self, found: Array, index: Indices, some: NDArray[np.bool_], moving: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:  # fmt: skip
+        self, found: Floats, index: Ints, some: Flags, moving: Flags
+    ) -> Flags:  # fmt: skip
         """Put better extremes than those of the poses into a table; returns the designs whose motion is torn.
 
         Parameters
@@ -144,7 +143,7 @@ class _Between:
             Which move; those found to move are added.
         """
         study, poses, count = self.study, self.poses, len(self.outputs)
-        mine: Indices = np.flatnonzero(some[:count])
+        mine: Ints = np.flatnonzero(some[:count])
         wrong = bool(some[count:].any())
         watched = [study.mechanism.coordinate(name) for name in (targets.needed(study, poses) if wrong else ())]
         curves = Curves([*(self.outputs[k] for k in mine.tolist()), *watched], study.units.angle_factor)
@@ -162,18 +161,18 @@ class _Between:
             self._take(peak, sign, still, found[end], index[end], moving, every, rough=True)
         return line.torn
 
-    def _sizes(self, found: Array) -> Array:
+    def _sizes(self, found: Floats) -> Floats:
         """Sizes that rounding is judged by, shape (names, designs)."""
         turn = 2 * np.pi / self.study.units.angle_factor
         sizes = {"length": self.study.mechanism.size, "angle": turn}
         quantities = [*(output.quantity for output in self.outputs), *(error.quantity for error in self.errors)]
         own = np.array([sizes.get(quantity, 0.0) for quantity in quantities])
-        values: Array = np.nan_to_num(np.abs(found[..., 0])).max(axis=0)
+        values: Floats = np.nan_to_num(np.abs(found[..., 0])).max(axis=0)
         return np.asarray(np.maximum(own, values).T)
 
     def _take(
-        self, peak: Peak, sign: int, still: Array, found: Array, index: Indices, moving: NDArray[np.bool_],
-        which: Indices, rough: bool = False,
+        self, peak: Peak, sign: int, still: Floats, found: Floats, index: Ints, moving: Flags,
+        which: Ints, rough: bool = False,
     ) -> None:  # fmt: skip
         """Put the better ones of some names into the table; where places are `rough`, only those of better values."""
         value, still = found[:, which, 0].T, still[which]
@@ -186,7 +185,7 @@ class _Between:
         )
 
     def _of_errors(
-        self, line: Line, curves: Sequence[Curve], watched: Sequence[Coordinate], sign: int, still: Array
+        self, line: Line, curves: Sequence[Curve], watched: Sequence[Coordinate], sign: int, still: Floats
     ) -> Peak:  # fmt: skip
         """Smallest errors times a sign."""
         study, poses = self.study, self.poses
@@ -194,7 +193,7 @@ class _Between:
         names = [error.name for error in self.errors]
         drive = study.mechanism.coordinate(self.swept)
 
-        def errors(leaves: Array, row: Indices, place: Array) -> Array:
+        def errors(leaves: Floats, row: Ints, place: Floats) -> Floats:
             values = {c.name: curve(leaves, leaves)[0] for c, curve in zip(watched, curves, strict=True)}
             values |= {name: column[row] for name, column in held.items() if name in values}
             if self.swept in values:
@@ -204,7 +203,7 @@ class _Between:
                 table[names.index(error.name)] = error.values
             return sign * table
 
-        def along(node: Indices, place: Array) -> Array:
+        def along(node: Ints, place: Floats) -> Floats:
             leaves = line.near(line.sample(line.row[node], place)[0], node)
             return errors(leaves, line.row[node], place)
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.rates import drive_velocities
@@ -20,11 +19,9 @@ from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 # How far a link may turn between neighbouring poses (radians), by their places and by its slope at either.
 SURE = 0.3
@@ -108,7 +105,7 @@ class Line:
     """
 
     def __init__(
-        self, study: Study, poses: Poses, swept: str, valid: NDArray[np.bool_], leaves: Sequence[Leaf],
+        self, study: Study, poses: Poses, swept: str, valid: Flags, leaves: Sequence[Leaf],
         ends: Sequence[Boundary] = (),
     ) -> None:  # fmt: skip
         self.study, self.poses = study, poses
@@ -146,7 +143,7 @@ class Line:
         self._refine()
         self._unwrap()
 
-    def sample(self, row: Indices, place: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def sample(self, row: Ints, place: Floats) -> tuple[Floats, Floats, Flags]:
         """Values and slopes of all leaves with the swept coordinate at `place`, everything else as in poses `row`."""
         given = [values[row] for values in self.given]
         given[self.which] = place
@@ -164,7 +161,7 @@ class Line:
             shift = np.round((known[self._rows] - own) / (2 * np.pi))
             self.values[leaf] = self.values[leaf] + 2 * np.pi * np.nan_to_num(shift)[beside]
 
-    def near(self, values: Floats, node: Indices) -> Floats:
+    def near(self, values: Floats, node: Ints) -> Floats:
         """Values of the leaves with their angles on the branch of poses of the line."""
         turning = self.turning
         values = values.copy()
@@ -172,7 +169,7 @@ class Line:
         return values
 
     @quiet
-    def _measured(self, configuration: Configuration) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    def _measured(self, configuration: Configuration) -> tuple[Floats, Floats, Flags]:
         mechanism, given = self.study.mechanism, self.plan.structure.given
         linear = mechanism.linearize(configuration)
         unit = [float(k == self.which) for k in range(len(given))]
@@ -186,7 +183,7 @@ class Line:
         valid = configuration.valid
         return np.where(valid, table[0], np.nan), np.where(valid, table[1], np.nan), valid
 
-    def _add(self, row: Indices, position: Floats, place: Floats, values: Floats, slopes: Floats) -> Indices:
+    def _add(self, row: Ints, position: Floats, place: Floats, values: Floats, slopes: Floats) -> Ints:
         index = len(self.row) + np.arange(len(row))
         self.row = np.concatenate([self.row, row])
         self.position, self.place = np.concatenate([self.position, position]), np.concatenate([self.place, place])
@@ -194,7 +191,7 @@ class Line:
         self.slopes = np.concatenate([self.slopes, slopes], axis=1)
         return index
 
-    def _taken(self, valid: NDArray[np.bool_], steps: Sequence[int]) -> Indices:
+    def _taken(self, valid: Flags, steps: Sequence[int]) -> Ints:
         """Valid poses of the sweep that the line begins with: its ends, those beside its limits, and some between."""
         at = np.arange(len(valid)) % self.each
         taken = at % -(-self.each // ENOUGH) == 0
@@ -206,7 +203,7 @@ class Line:
             taken[step : step + 2] = True
         return np.flatnonzero(taken & valid)
 
-    def _segments(self, valid: NDArray[np.bool_], inside: Sequence[Boundary]) -> tuple[Indices, Indices]:
+    def _segments(self, valid: Flags, inside: Sequence[Boundary]) -> tuple[Ints, Ints]:
         """Pairs of poses between which the motion goes on: of the sweep, and its limits."""
         node = np.full(self.poses.count, -1)
         node[self._rows] = np.arange(len(self._rows))
@@ -227,7 +224,7 @@ class Line:
         moving = self.place[begin] != self.place[end]
         return begin[moving], end[moving]
 
-    def _divided(self, step: int, node: Indices, ends: Sequence[Boundary]) -> Iterator[Indices]:
+    def _divided(self, step: int, node: Ints, ends: Sequence[Boundary]) -> Iterator[Ints]:
         """Pairs of poses within a step that holds limits of motion."""
         at = [int(node[step])]
         for end in ends:
@@ -260,7 +257,7 @@ class Line:
             return -1
         return int(self._add(np.array([row]), step + (at - a) / (b - a), at, values, slopes)[0])
 
-    def divide(self, segment: Indices, parts: Floats) -> None:
+    def divide(self, segment: Ints, parts: Floats) -> None:
         """Put poses into some segments, at `parts` of their length, shape (segments, parts) or (parts,).
 
         A segment that holds a pose that is not valid is dropped.

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.motion_limits import Limits, as_given
-from mechdesign.analyses.kinematics.probing import Floats, Indices, probe
+from mechdesign.analyses.kinematics.probing import probe
 from mechdesign.analyses.kinematics.transmission import BEYOND, transmission_extremes
 from mechdesign.analyses.poses import solve_poses
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -38,7 +38,7 @@ class _Samples:
 
     position: Floats  # along the sweep, in rows
     place: Floats  # of the swept coordinate; the row where there is none
-    end: NDArray[np.bool_]  # whether it is a limit rather than a pose
+    end: Flags  # whether it is a limit rather than a pose
     angle: Floats
     sines: Floats
     cosines: Floats
@@ -55,7 +55,7 @@ class _Toggle:
 
 
 def loop_tables(
-    study: Study, poses: Poses, valid: NDArray[np.bool_], limits: Limits | None
+    study: Study, poses: Poses, valid: Flags, limits: Limits | None
 ) -> dict[str, Table]:  # fmt: skip
     """Tables ``loops`` and, where one coordinate is swept, ``toggles``; none without four-bars and slider-cranks.
 
@@ -86,7 +86,7 @@ def _values(loops: tuple[FourBar, ...], configuration: Configuration) -> tuple[F
 
 
 def _sample(study: Study, loops: tuple[FourBar, ...], poses: Poses, limits: Limits | None) -> _Samples:
-    rows: list[Indices] = []
+    rows: list[Ints] = []
     found: list[tuple[Floats, Floats, Floats]] = []
     for solved in solve_poses(study, poses):
         rows.append(solved.rows)
@@ -111,7 +111,7 @@ def _sample(study: Study, loops: tuple[FourBar, ...], poses: Poses, limits: Limi
 
 
 def _loops(
-    study: Study, loops: tuple[FourBar, ...], samples: _Samples, poses: Poses, valid: NDArray[np.bool_],
+    study: Study, loops: tuple[FourBar, ...], samples: _Samples, poses: Poses, valid: Flags,
     limits: Limits | None,
 ) -> Table:  # fmt: skip
     units = study.units
@@ -187,7 +187,7 @@ def _toggles(
     begin, end = samples.place[first], samples.place[first + 1]
     start = limits.margins.start(np.where(samples.end[first], end, begin))
 
-    def values(lane: Indices, x: Floats) -> Floats:
+    def values(lane: Ints, x: Floats) -> Floats:
         """Sine and cosine of each lane's function."""
         _, sine, cosine = _values(loops, limits.margins.solve(x, None if start is None else start.take(lane)))
         pick = function[lane], np.arange(len(lane))
@@ -230,7 +230,7 @@ def _once(toggles: list[_Toggle]) -> list[_Toggle]:
     return sorted(kept, key=lambda toggle: (toggle.position, toggle.function))
 
 
-def _suspects(sines: Floats) -> tuple[Indices, Indices]:
+def _suspects(sines: Floats) -> tuple[Ints, Ints]:
     """Function and first sample of each step in which a sine may be zero."""
     known = np.isfinite(sines)
     size = np.where(known, np.abs(sines), np.inf)

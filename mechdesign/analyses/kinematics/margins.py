@@ -6,17 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import radians
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value, cross
 from mechdesign.mechanism.change_points import closing_groups
 from mechdesign.mechanism.structure import Group
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup
-
-Floats = NDArray[np.float64]
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
 

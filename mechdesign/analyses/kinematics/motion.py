@@ -19,11 +19,10 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.mechanism.turns import angles_of
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Poses, Study
 from mechdesign.study.sections import KinematicsSection
-
-Array = NDArray[np.float64]
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
@@ -125,17 +124,17 @@ class Motion:
     """
 
     asked: Asked
-    arrays: dict[str, Array] = field(default_factory=dict)
+    arrays: dict[str, Floats] = field(default_factory=dict)
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
-    smooth: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     @property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Flags:
         """Whether each pose is assembled and within its limits."""
         return np.equal(self.reason, 0)
 
-    def put(self, name: str, rows: NDArray[np.intp], values: object) -> None:
+    def put(self, name: str, rows: Ints, values: object) -> None:
         """Set some rows of a column."""
         if name not in self.arrays:
             self.arrays[name] = np.full(self.asked.poses.count, np.nan)
@@ -162,7 +161,7 @@ class Motion:
         if self.asked.square or self.asked.section.loads:
             self._statics(linear, rows, regular)
 
-    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: NDArray[np.bool_]) -> None:
+    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> None:
         drives = drive_rates(self.asked.study, self.asked.section, self.asked.poses, solved, linear)
         velocity = linear.velocity(drives.velocities)
         acceleration = linear.acceleration(velocity, drives.accelerations)
@@ -176,7 +175,7 @@ class Motion:
                 value = np.where(regular, in_study_units(self.asked.study, output, value), np.nan)
                 self.put(f"{output.name}_{order}", solved.rows, value)
 
-    def _statics(self, linear: Linearization, rows: NDArray[np.intp], regular: NDArray[np.bool_]) -> None:
+    def _statics(self, linear: Linearization, rows: Ints, regular: Flags) -> None:
         mechanism, configuration = self.asked.study.mechanism, linear.configuration
         rates, drives = linear.drives(), self.asked.drives
         if self.asked.square:

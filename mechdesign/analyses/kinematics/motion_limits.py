@@ -14,6 +14,7 @@ from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.turns import angles_of
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup
@@ -40,7 +41,7 @@ def motion_limits(
     swept: str,
     reason: NDArray[np.int8],
     outputs: Sequence[Coordinate],
-    arrays: Mapping[str, NDArray[np.float64]],
+    arrays: Mapping[str, Floats],
 ) -> Limits:
     """Every value of the swept coordinate at which the motion ends, with the pose there, and change points as warnings.
 
@@ -90,7 +91,7 @@ def motion_limits(
 
 
 def as_given(
-    study: Study, margins: Margins, given: NDArray[np.float64], places: Sequence[float], rows: Sequence[int]
+    study: Study, margins: Margins, given: Floats, places: Sequence[float], rows: Sequence[int]
 ) -> list[float]:
     """Places on a sweep in the study's unit; those at a pose as the study gives it, not there and back through radians.
 
@@ -110,7 +111,7 @@ def as_given(
     return found
 
 
-def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> NDArray[np.float64]:
+def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> Floats:
     """An output at the limits."""
     poses = [end.configuration for end in ends]
     found = [np.nan if pose is None else float(in_study_units(study, output, pose.value(output))) for pose in poses]
@@ -118,7 +119,7 @@ def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> NDArray[n
 
 
 def _hidden(
-    swept: str, unit: str, places: list[float], ends: list[Boundary], margins: Margins, valid: NDArray[np.bool_]
+    swept: str, unit: str, places: list[float], ends: list[Boundary], margins: Margins, valid: Flags
 ) -> list[str]:
     """A warning where the motion ends between neighbouring poses that are both valid: their rows do not tell."""
     steps = [int(end.position) for end in ends]

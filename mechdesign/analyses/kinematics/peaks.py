@@ -6,16 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.kinematics.lines import Floats, Indices, Line
-from mechdesign.analyses.roots import bracketed_roots
-from mechdesign.mechanism.golden import lowest
+from mechdesign.analyses.kinematics.lines import Line
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.minima import lowest
+from mechdesign.numerics.roots import bracketed_roots
 
 # Value and slope of a function from the values and slopes of a line's leaves, shape (leaves, n).
 Curve = Callable[[Floats, Floats], tuple[Floats, Floats]]
 # Values of functions, shape (functions, n), beside poses of a line with the swept coordinate elsewhere.
-Along = Callable[[Indices, Floats], Floats]
+Along = Callable[[Ints, Floats], Floats]
 
 # How far from its place an extreme may be found, as a part of its segment.
 PRECISION = 1e-13
@@ -44,11 +44,11 @@ class Peak:
     value: Floats
     place: Floats
     position: Floats
-    node: Indices
+    node: Ints
 
     def better(
-        self, value: Floats, row: Indices, still: Floats, moving: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:  # fmt: skip
+        self, value: Floats, row: Ints, still: Floats, moving: Flags
+    ) -> Flags:  # fmt: skip
         """Where it is smaller than at the best pose of the sweep, or is that pose's extreme but beside it.
 
         Parameters
@@ -104,7 +104,7 @@ def peaks(
     ])  # fmt: skip
     times = np.array(signs)[which]
 
-    def at(which: Sequence[Curve], lane: Indices, x: Floats) -> tuple[Floats, Floats]:
+    def at(which: Sequence[Curve], lane: Ints, x: Floats) -> tuple[Floats, Floats]:
         return _at(line, which, curve[lane], line.begin[segment[lane]], x)
 
     low, high = line.place[line.begin[segment]], line.place[line.end[segment]]
@@ -136,7 +136,7 @@ def peaks(
     return found
 
 
-def _best_poses(line: Line, values: Floats, still: Floats, rows: bool) -> tuple[Indices, Indices]:
+def _best_poses(line: Line, values: Floats, still: Floats, rows: bool) -> tuple[Ints, Ints]:
     """Function and pose where a pose of the line is the best; those of the sweep itself only if `rows`."""
     design = line.row // line.each
     with np.errstate(invalid="ignore"):
@@ -205,7 +205,7 @@ def _curves(curves: Sequence[Curve], values: Floats, slopes: Floats) -> tuple[Fl
     )
 
 
-def _at(line: Line, curves: Sequence[Curve], which: Indices, node: Indices, place: Floats) -> tuple[Floats, Floats]:
+def _at(line: Line, curves: Sequence[Curve], which: Ints, node: Ints, place: Floats) -> tuple[Floats, Floats]:
     """Value and slope of curve `which` of each lane at `place`, beside a pose of the line."""
     values, slopes, _ = line.sample(line.row[node], place)
     values = line.near(values, node)
@@ -217,7 +217,7 @@ def _at(line: Line, curves: Sequence[Curve], which: Indices, node: Indices, plac
 
 
 def _first_smallest(
-    line: Line, still: Floats, function: Indices, node: Indices, value: Floats, place: Floats, position: Floats
+    line: Line, still: Floats, function: Ints, node: Ints, value: Floats, place: Floats, position: Floats
 ) -> Peak:  # fmt: skip
     """Of many candidates, the first along the sweep of those that are the smallest but for rounding."""
     shape = still.shape

@@ -10,17 +10,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.roots import bracketed_roots
-from mechdesign.mechanism.golden import GOLDEN, lowest
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.minima import GOLDEN, lowest
+from mechdesign.numerics.roots import bracketed_roots
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 # Values of all functions in intervals `lane` at `x`: shape (functions, n).
-Evaluate = Callable[[Indices, Floats], Floats]
+Evaluate = Callable[[Ints, Floats], Floats]
 # Values of one function in parts of intervals at `x`.
-One = Callable[[Indices, Floats], Floats]
+One = Callable[[Ints, Floats], Floats]
 
 # Where each part of an interval is looked at: near its ends too, so that the slope there is seen, and off the round
 # numbers at which roots like to lie.
@@ -31,9 +29,9 @@ LOOKS = np.array([0.0, 1e-4, *((np.arange(8) + GOLDEN) / 8), 1 - 1e-4, 1.0])
 class Found:
     """Places within intervals: the interval, the place, and the function it belongs to with its value there."""
 
-    lane: Indices
+    lane: Ints
     place: Floats
-    function: Indices
+    function: Ints
     value: Floats
 
     @staticmethod
@@ -59,7 +57,7 @@ class Probes:
         Changes of sign, and smallest absolute values inside the intervals.
     """
 
-    lane: Indices
+    lane: Ints
     place: Floats
     roots: Found
     lows: Found
@@ -80,7 +78,7 @@ def probe(evaluate: Evaluate, begin: Floats, end: Floats, precision: Floats) -> 
     grid, values = _look(evaluate, lane, low, high)
     for j in range(len(values)):
 
-        def one(part: Indices, x: Floats, j: int = j, lane: Indices = lane) -> Floats:
+        def one(part: Ints, x: Floats, j: int = j, lane: Ints = lane) -> Floats:
             found: Floats = evaluate(lane[part], x)[j]
             return found
 
@@ -101,7 +99,7 @@ def probe(evaluate: Evaluate, begin: Floats, end: Floats, precision: Floats) -> 
     return Probes(lane, low + (high - low) / 2, Found.joined(roots), Found.joined(lows))
 
 
-def _look(evaluate: Evaluate, lane: Indices, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+def _look(evaluate: Evaluate, lane: Ints, low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """Places at which the parts are looked at, shape (looks, parts), and the functions there."""
     grid = low + (high - low) * LOOKS[:, None]
     grid[-1] = high
@@ -109,7 +107,7 @@ def _look(evaluate: Evaluate, lane: Indices, low: Floats, high: Floats) -> tuple
     return grid, values.reshape(len(values), *grid.shape)
 
 
-def _bottoms(one: One, grid: Floats, values: Floats, sign: int) -> tuple[Indices, Floats, Floats]:
+def _bottoms(one: One, grid: Floats, values: Floats, sign: int) -> tuple[Ints, Floats, Floats]:
     """Part, place and value of each smallest positive value (`sign` 1) or largest negative one (-1) between looks."""
     v = sign * values
     inner = v[1:-1]
@@ -129,8 +127,8 @@ def _bottoms(one: One, grid: Floats, values: Floats, sign: int) -> tuple[Indices
 
 
 def _roots(
-    one: One, precision: float, grid: Floats, values: Floats, part: Indices, place: Floats, value: Floats
-) -> tuple[Indices, Floats]:
+    one: One, precision: float, grid: Floats, values: Floats, part: Ints, place: Floats, value: Floats
+) -> tuple[Ints, Floats]:
     """Part and place of each change of sign between the looks and the places added to them."""
     parts = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)), part])
     places = np.concatenate([grid.ravel(), place])
@@ -148,7 +146,7 @@ def _roots(
     )
 
 
-def _divided(lane: Indices, low: Floats, high: Floats, part: Indices, root: Floats) -> tuple[Indices, Floats, Floats]:
+def _divided(lane: Ints, low: Floats, high: Floats, part: Ints, root: Floats) -> tuple[Ints, Floats, Floats]:
     """The parts divided at further roots, in order."""
     owner = np.concatenate([np.arange(len(lane)), part])
     begin = np.concatenate([low, root])

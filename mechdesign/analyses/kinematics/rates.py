@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.jacobians import determinant, jacobian
 from mechdesign.analyses.poses import SolvedPoses, radians
@@ -15,12 +14,11 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.outputs import second
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.sections import KinematicsSection
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +106,7 @@ def drive_velocities(
 
 def _inverted(
     mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]
-) -> tuple[Array, NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[Floats, Flags]:  # fmt: skip
     """J of the given coordinates, and where it is regular."""
     matrix = jacobian(linear, linear.drives(), given)
     drives = [mechanism.coordinate(name) for name in mechanism.drives]
@@ -116,8 +114,8 @@ def _inverted(
 
 
 def _solvable(
-    matrix: Array, given: Sequence[Coordinate], drives: Sequence[Coordinate], size: float
-) -> NDArray[np.bool_]:  # fmt: skip
+    matrix: Floats, given: Sequence[Coordinate], drives: Sequence[Coordinate], size: float
+) -> Flags:  # fmt: skip
     """Whether J is regular: its determinant over the lengths of its rows (at least 1), all without units."""
     rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
     columns = np.array([size if c.quantity == "length" else 1.0 for c in drives])
@@ -127,7 +125,7 @@ def _solvable(
         return np.asarray(np.abs(determinant(pure / lengths[..., None])) >= STALLED)
 
 
-def _solve(matrix: Array, good: NDArray[np.bool_], right: Sequence[Value]) -> list[Array]:
+def _solve(matrix: Floats, good: Flags, right: Sequence[Value]) -> list[Floats]:
     safe = np.where(good[..., None, None], matrix, np.eye(matrix.shape[-1]))
     sides = np.stack([np.broadcast_to(np.asarray(side, dtype=float), good.shape) for side in right], axis=-1)
     found = np.linalg.solve(safe, sides[..., None])[..., 0]

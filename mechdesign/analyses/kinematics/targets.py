@@ -6,17 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.mechanism.algebra import dot, norm2
 from mechdesign.mechanism.model import Quantity
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.targets import Target, timing
-
-Array = NDArray[np.float64]
 
 # Distances between poses and pieces of a path that are held at once.
 BLOCK = 1 << 20
@@ -38,7 +37,7 @@ class Error:
 
     output: str
     quantity: Quantity
-    values: Array
+    values: Floats
 
     @property
     def name(self) -> str:
@@ -57,7 +56,7 @@ def needed(study: Study, poses: Poses) -> tuple[str, ...]:
 
 
 def errors(
-    study: Study, poses: Poses, values: Mapping[str, Array], rows: NDArray[np.intp], *, between: bool = False
+    study: Study, poses: Poses, values: Mapping[str, Floats], rows: Ints, *, between: bool = False
 ) -> Iterator[Error]:
     """Errors of all targets, a point's x and y before its distance.
 
@@ -88,8 +87,8 @@ def errors(
 
 
 def _wanted(
-    study: Study, target: Target, poses: Poses, values: Mapping[str, Array], rows: NDArray[np.intp], between: bool
-) -> Sequence[Array] | None:
+    study: Study, target: Target, poses: Poses, values: Mapping[str, Floats], rows: Ints, between: bool
+) -> Sequence[Floats] | None:
     """What each coordinate of a target should be; None where that is not known between the poses."""
     if target.expression is not None:
         varied = {name: column[rows] for name, column in poses.parameters.items()}
@@ -109,7 +108,7 @@ def _wanted(
     return [foot.real, foot.imag]
 
 
-def _interpolated(table: Array, at: Array, turn: float | None) -> list[Array]:
+def _interpolated(table: Floats, at: Floats, turn: float | None) -> list[Floats]:
     """Columns of a table at values of its first, linearly; nan outside.
 
     Where `turn` is given, values outside the table are taken at the turn in which it may hold them.
@@ -123,7 +122,7 @@ def _interpolated(table: Array, at: Array, turn: float | None) -> list[Array]:
     return [np.where(outside | np.isnan(at), np.nan, np.interp(at, table[:, 0], column)) for column in table[:, 1:].T]
 
 
-def nearest(points: NDArray[np.complex128], corners: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def nearest(points: Complexes, corners: Complexes) -> Complexes:
     """The point of a polyline that is nearest to each point.
 
     Parameters
@@ -149,7 +148,7 @@ def nearest(points: NDArray[np.complex128], corners: NDArray[np.complex128]) -> 
     return found
 
 
-def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None, valid: NDArray[np.bool_]) -> Table:
+def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None, valid: Flags) -> Table:
     """Mean and largest errors of each design over the valid poses that have a target."""
     shape = (poses.designs, poses.count // poses.designs)
     at = poses.values[swept] if swept is not None else np.tile(np.arange(shape[1], dtype=float), shape[0])
@@ -185,7 +184,7 @@ def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None,
     )
 
 
-def gaps(study: Study, found: Sequence[Error], poses: Poses, valid: NDArray[np.bool_]) -> list[str]:
+def gaps(study: Study, found: Sequence[Error], poses: Poses, valid: Flags) -> list[str]:
     """Warnings where a valid pose has no target."""
     warnings = []
     for error in found:

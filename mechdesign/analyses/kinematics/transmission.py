@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.lines import Floats, Leaf, Line
+from mechdesign.analyses.kinematics.lines import Leaf, Line
 from mechdesign.analyses.kinematics.peaks import Curve, peaks
 from mechdesign.analyses.poses import solve_poses
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
 from mechdesign.mechanism.rates import Rates
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -26,8 +26,8 @@ SQUARE = 1e-10
 
 
 def transmission_table(
-    study: Study, poses: Poses, swept: str | None, whole: NDArray[np.bool_]
-) -> tuple[Table, NDArray[np.bool_]] | None:  # fmt: skip
+    study: Study, poses: Poses, swept: str | None, whole: Flags
+) -> tuple[Table, Flags] | None:  # fmt: skip
     """The part of table ``loops`` that a design's dimensions do not name otherwise; None without such loops.
 
     Parameters
@@ -78,9 +78,9 @@ def _angles(loops: tuple[FourBar, ...], configuration: Configuration) -> Floats:
 
 
 def transmission_extremes(
-    study: Study, loops: Sequence[FourBar], poses: Poses, swept: str, valid: NDArray[np.bool_],
+    study: Study, loops: Sequence[FourBar], poses: Poses, swept: str, valid: Flags,
     ends: Sequence[Boundary] = (),
-) -> tuple[list[tuple[Floats, Floats]], NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[list[tuple[Floats, Floats]], Flags]:  # fmt: skip
     """Smallest and largest transmission angles over the motion along a sweep, and the designs whose motion is torn.
 
     The square of its sine has the same extremes as the angle and is smooth where that is 0 or a right angle.

@@ -16,10 +16,10 @@ from mechdesign.analyses.optimize.judging import CHUNK, Batch, Designs, Judge
 from mechdesign.analyses.optimize.sensitivity import active_bounds, neighbours, sensitivity_table
 from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
 from mechdesign.analyses.workspace.analysis import index_meanings
-from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.analyses.workspace.region import GRID_TOLERANCE, questions
 from mechdesign.errors import AssemblyError, Interrupted, StudyError
 from mechdesign.journal import Journal
+from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from mechdesign.analyses.poses import SolvedPoses, solve_poses
-from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 

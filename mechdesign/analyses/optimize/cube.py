@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 
 
@@ -20,7 +19,7 @@ def bounds(study: Study, designs: dict[str, Floats], name: str, count: int) -> t
     return np.broadcast_to(low, count), np.broadcast_to(high, count)
 
 
-def from_cube(study: Study, u: Floats) -> tuple[dict[str, Floats], NDArray[np.bool_]]:
+def from_cube(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags]:
     """Designs at points of the unit cube, and which of them have a range for every variable.
 
     Parameters

@@ -13,13 +13,10 @@ from contextlib import suppress
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Explorer, Objective
 from mechdesign.analyses.optimize.lockstep import Ask, side_by_side
-from mechdesign.analyses.workspace.rays import Floats
-
-Integers = NDArray[np.intp]
+from mechdesign.numerics.arrays import Floats, Ints
 
 # Steps of differences, and half the widths of the boxes in which they are used, in parts of the ranges.
 LADDER = ((1e-4, 0.3), (1e-5, 0.03))
@@ -99,7 +96,7 @@ class _Descent:
                 self.plain[part.column] = 0.0
         # A root mean square that is the only goal is made small by its square, which is smoother.
         self.curvature = 0.0
-        self._last: tuple[Floats, Integers] = np.empty((0, 0)), np.empty(0, dtype=np.intp)
+        self._last: tuple[Floats, Ints] = np.empty((0, 0)), np.empty(0, dtype=np.intp)
         self._in_vain = 0
         # Whether slopes were asked for at the last point.
         self._taken = True
@@ -120,7 +117,7 @@ class _Descent:
         with suppress(_InVain):
             optimiser(*arguments)
 
-    def ask(self, ask: Ask, points: Floats) -> Integers:
+    def ask(self, ask: Ask, points: Floats) -> Ints:
         """Rows of points; the best of them, or of those before, is where the next stage begins."""
         if self._in_vain > (ROUGH_MOST_IN_VAIN if self.explorer.rough else MOST_IN_VAIN):
             raise _InVain
@@ -132,7 +129,7 @@ class _Descent:
         self._in_vain = 0 if merit.min() < merit[0] else self._in_vain + 1
         return rows
 
-    def terms(self, rows: Integers) -> tuple[Floats, Floats, Floats]:
+    def terms(self, rows: Ints) -> tuple[Floats, Floats, Floats]:
         """The smooth sum, shape (m, 1), rows that bound each worst, and what may not be positive; nan where unknown."""
         known = self.explorer.known
         lines = known.rows[rows]
@@ -164,7 +161,7 @@ class _Descent:
                 xtol=1e-14, ftol=1e-14, gtol=None,
             )  # fmt: skip
 
-    def at(self, ask: Ask, u: Floats, step: float) -> Integers:
+    def at(self, ask: Ask, u: Floats, step: float) -> Ints:
         """Rows of a point, and of those for its slopes where they cost little more and are likely to be asked for next.
 
         They are not where the point before was not taken.
@@ -175,7 +172,7 @@ class _Descent:
         self._taken = False
         return rows
 
-    def _stencil(self, ask: Ask, u: Floats, step: float) -> tuple[Floats, Integers]:
+    def _stencil(self, ask: Ask, u: Floats, step: float) -> tuple[Floats, Ints]:
         """A point, and those a step from it along each variable, inside the cube."""
         sides = [np.clip(u + sign * step * np.eye(len(u)), 0.0, 1.0) for sign in (-1, 1)]
         points = np.concatenate([u[None], *sides])

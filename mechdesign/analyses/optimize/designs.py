@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.errors import Problem, StudyError
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 
 # A step that ends this little (as a fraction of it) beyond the bound is still taken, as in sweeps.
@@ -60,7 +59,7 @@ def _size(study: Study, name: str, total: int) -> Problem:
     return study.problem(message, "optimize", "variables", name)
 
 
-def normalised(values: Floats, feasible: NDArray[np.bool_], *, smallest: bool) -> Floats:
+def normalised(values: Floats, feasible: Flags, *, smallest: bool) -> Floats:
     """Values as fractions of their range over the feasible designs, 1 the best [S1, eq. 27]; nan for the others.
 
     An index that is the same for all designs counts 0.

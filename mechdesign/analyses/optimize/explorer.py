@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Merits of points that miss a condition, of points without a value, and of those of which nothing is known: beyond any
 # goal, with room for their order.
@@ -112,12 +111,12 @@ class Known:
     shortfall: Floats
 
     @property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Flags:
         """Points that have values."""
         return np.asarray(~np.isnan(self.values).any(axis=1) & ~np.isnan(self.margins).any(axis=1))
 
     @property
-    def feasible(self) -> NDArray[np.bool_]:
+    def feasible(self) -> Flags:
         """Points that have values and meet every condition."""
         return np.asarray(self.valid & (self.margins >= 0).all(axis=1))
 
@@ -185,7 +184,7 @@ class Explorer:
         u, values, margins, rows = (filled[:, a:b] for a, b in zip(self._ends[:4], self._ends[1:5], strict=True))
         return Known(u, values, margins, rows, filled[:, -1])
 
-    def __call__(self, u: Floats) -> NDArray[np.intp]:
+    def __call__(self, u: Floats) -> Ints:
         """Rows of `known` that hold these points, shape (m, dimensions).
 
         Raises

@@ -14,10 +14,10 @@ from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.assembling import assembly_margins, shortfall
 from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal, goals_of
 from mechdesign.analyses.poses import solve_poses
-from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.analyses.workspace.region import BRISK, GRID_TOLERANCE, Question, answer, questions, split
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.expressions import Number
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError, choose
 from mechdesign.study import Study
@@ -210,7 +210,7 @@ class Evaluator:
         reasons = [str(reason) for reason in batch.reasons]
         return Evaluated(batch.values, batch.rows, batch.shortfall, batch.assembly_margins, batch.errors, reasons)
 
-    def _workspaces(self, batch: _Batch, rows: NDArray[np.intp]) -> None:
+    def _workspaces(self, batch: _Batch, rows: Ints) -> None:
         if not len(rows):
             return
         assert self.question is not None
@@ -224,7 +224,7 @@ class Evaluator:
             for half in np.array_split(rows, 2):
                 self._workspaces(batch, half)
 
-    def _regional(self, batch: _Batch, rows: NDArray[np.intp], question: Question, places: dict[str, Floats]) -> None:
+    def _regional(self, batch: _Batch, rows: Ints, question: Question, places: dict[str, Floats]) -> None:
         given = answer(question, places, len(rows), BRISK)
         for each in self.goals:
             if each.regional:
@@ -235,9 +235,7 @@ class Evaluator:
                     ]
         batch.reasons[rows[~(given.panels.closes & (given.values["area"] > 0))]] = EMPTY
 
-    def _tables(
-        self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: NDArray[np.intp]
-    ) -> None:
+    def _tables(self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints) -> None:
         places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
         wanted = {*tables, "motion"} if self.squares.intersection(*tables.values()) else set(tables)
         stack = stacked.tables(self.study, command, wanted, len(rows), places, parameters, self._outputs,
@@ -265,7 +263,7 @@ class Evaluator:
             for k in rows[left].tolist():
                 batch.left.setdefault(k, {}).setdefault(command, []).extend(goals)
 
-    def _grade(self, batch: _Batch, command: str, rows: NDArray[np.intp], margins: Floats) -> None:
+    def _grade(self, batch: _Batch, command: str, rows: Ints, margins: Floats) -> None:
         """Note how far some designs are from assembling."""
         batch.shortfall[rows] = shortfall(margins)
         if command in self._clear:
@@ -336,18 +334,18 @@ class _Batch:
         self.shortfall = np.where(self.feasible, 1.0, np.nan)
 
     @property
-    def feasible(self) -> NDArray[np.bool_]:
+    def feasible(self) -> Flags:
         """Designs that nothing is said against."""
         return np.asarray(self.reasons == "", dtype=bool)
 
-    def take(self, values: Mapping[str, Number], rows: NDArray[np.intp]) -> dict[str, Floats]:
+    def take(self, values: Mapping[str, Number], rows: Ints) -> dict[str, Floats]:
         """Values of some designs."""
         return {
             name: np.broadcast_to(np.asarray(value, dtype=float), len(self.reasons))[rows]
             for name, value in values.items()
         }
 
-    def judge(self, each: Goal, result: Result, rows: NDArray[np.intp]) -> Floats:
+    def judge(self, each: Goal, result: Result, rows: Ints) -> Floats:
         """Note the values of a goal by a result of some designs; returns them."""
         values, listed = each.judged(result, len(rows))
         self.values[each][rows] = values
@@ -357,7 +355,7 @@ class _Batch:
             self.rows[each][rows] = listed
         return values
 
-    def note(self, rows: NDArray[np.intp], wrong: NDArray[np.bool_], reasons: NDArray[np.object_]) -> None:
+    def note(self, rows: Ints, wrong: Flags, reasons: NDArray[np.object_]) -> None:
         """Say what is wrong with some of the rows, where nothing has been said yet."""
         new = wrong & (self.reasons[rows] == "")
         self.reasons[rows[new]] = reasons[new]
@@ -366,7 +364,7 @@ class _Batch:
 FAILED_ARRAY = np.array(FAILED, dtype=object)
 
 
-def _first(reason: NDArray[np.int8]) -> NDArray[np.intp]:
+def _first(reason: NDArray[np.int8]) -> Ints:
     """The first reason of each design's poses, shape (designs,); 0 where none fails."""
     worst = np.where(reason == 0, len(FAILED), reason).min(axis=1, initial=len(FAILED))
     return np.where(worst == len(FAILED), 0, worst).astype(np.intp)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Part
 from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, bounds_of
-from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.journal import Journal, digest
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.parallel import workers
 from mechdesign.progress import Progress
 from mechdesign.study import Study
@@ -46,7 +46,7 @@ class Designs:
     conditions: tuple[tuple[Goal, float, bool], ...]
     values: dict[Goal, Floats]
     errors: dict[str, Floats]
-    feasible: NDArray[np.bool_]
+    feasible: Flags
     codes: NDArray[np.int32]
     words: list[str]
 
@@ -213,7 +213,7 @@ class Judge:
         )  # fmt: skip
 
 
-def met(values: Floats, bound: float, upper: bool) -> NDArray[np.bool_]:
+def met(values: Floats, bound: float, upper: bool) -> Flags:
     """Which values satisfy a condition; nan never does."""
     return values <= bound if upper else values >= bound
 

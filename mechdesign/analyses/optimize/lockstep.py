@@ -7,12 +7,11 @@ from queue import SimpleQueue
 from threading import Thread
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.explorer import Explorer, Spent
-from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 
-Ask = Callable[[Floats], NDArray[np.intp]]
+Ask = Callable[[Floats], Ints]
 
 
 def side_by_side(explorer: Explorer, tasks: Sequence[Callable[[Ask], None]]) -> None:
@@ -27,10 +26,10 @@ def side_by_side(explorer: Explorer, tasks: Sequence[Callable[[Ask], None]]) -> 
         If the evaluations are used up; all tasks have ended then.
     """
     asked: SimpleQueue[tuple[int, Floats | None, BaseException | None]] = SimpleQueue()
-    answers: list[SimpleQueue[NDArray[np.intp] | None]] = [SimpleQueue() for _ in tasks]
+    answers: list[SimpleQueue[Ints | None]] = [SimpleQueue() for _ in tasks]
 
     def run(k: int) -> None:
-        def ask(points: Floats) -> NDArray[np.intp]:
+        def ask(points: Floats) -> Ints:
             asked.put((k, points, None))
             rows = answers[k].get()
             if rows is None:

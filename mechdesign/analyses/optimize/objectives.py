@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.region import COLUMNS, batched, split
 from mechdesign.commands import COMMANDS
+from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
 from mechdesign.study.optimize_models import Condition, OptimizeSection
@@ -51,7 +51,7 @@ class Goal:
         """Whether it is an index of the workspace that is evaluated for many designs at once."""
         return self.regional and batched(self.column)
 
-    def worst(self, result: Result, designs: int = 1) -> NDArray[np.float64]:
+    def worst(self, result: Result, designs: int = 1) -> Floats:
         """The value of each design's worst row; nan where none counts or one has no value.
 
         Parameters
@@ -66,7 +66,7 @@ class Goal:
         """
         return self.judged(result, designs)[0]
 
-    def judged(self, result: Result, designs: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    def judged(self, result: Result, designs: int = 1) -> tuple[Floats, Floats | None]:
         """As `worst`, and the rows themselves, signed, that it is the worst of.
 
         Returns
@@ -82,7 +82,7 @@ class Goal:
         alike = designs > 0 and np.ptp(counts.sum(axis=1)) == 0
         return found, values[counts].reshape(designs, -1) if alike else None
 
-    def residuals(self, result: Result, designs: int = 1) -> NDArray[np.float64] | None:
+    def residuals(self, result: Result, designs: int = 1) -> Floats | None:
         """Errors whose squares have this goal's square as their sum, shape (designs, rows); None where it has none.
 
         Parameters

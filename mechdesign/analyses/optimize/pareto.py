@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.explorer import Explorer, Known, Spent
-from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 
 # Evaluations where the study says none, a goal; and how many generations a population is given of them.
 ALLOWANCE, GENERATIONS = 1200, 25
@@ -68,7 +67,7 @@ def evolve(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
         return
 
 
-def front(values: Floats) -> NDArray[np.intp]:
+def front(values: Floats) -> Ints:
     """Rows that no other row surpasses; of equal rows the first.
 
     Parameters
@@ -83,7 +82,7 @@ def front(values: Floats) -> NDArray[np.intp]:
     return np.sort(first[rows])
 
 
-def promising(known: Known, signs: Floats, count: int) -> NDArray[np.intp]:
+def promising(known: Known, signs: Floats, count: int) -> Ints:
     """Rows to spread a population from: of the front so far those with the widest gaps about them.
 
     Parameters
@@ -106,7 +105,7 @@ def normalised(values: Floats) -> Floats:
     return np.asarray((values - low) / np.where(span > 0, span, 1.0))
 
 
-def distinct(values: Floats) -> NDArray[np.intp]:
+def distinct(values: Floats) -> Ints:
     """Rows of a front, its ends among them, of which no two are closer than `CLOSE` in every goal."""
     share = normalised(values)
     ends = [int(np.lexsort((share.sum(axis=1), column))[0]) for column in share.T]

@@ -15,7 +15,7 @@ import numpy as np
 
 from mechdesign.analyses.optimize.descent import LADDER, ROUGH, descend
 from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Objective, Spent
-from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.numerics.arrays import Floats
 
 # Evaluations per row of weights and per (variables + 1): the fewest of a start, and the default of a search.
 START, USUAL = 500, 1800

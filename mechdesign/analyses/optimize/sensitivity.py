@@ -10,7 +10,7 @@ from mechdesign.analyses.optimize.cube import bounds
 from mechdesign.analyses.optimize.designs import ROUNDING
 from mechdesign.analyses.optimize.judging import met
 from mechdesign.analyses.optimize.tables import Comparison, steps
-from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 

@@ -18,9 +18,9 @@ from mechdesign.analyses.optimize.assembling import assembly_margins
 from mechdesign.analyses.poses import SolvedPoses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
-from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.expressions import Expression
 from mechdesign.linearity import is_linear
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
@@ -69,7 +69,7 @@ class Stack:
     result: Result
     reason: NDArray[np.int8]
     listed: bool
-    open: Mapping[str, NDArray[np.bool_]]
+    open: Mapping[str, Flags]
     assembly_margins: Floats | None = None
 
 
@@ -218,7 +218,7 @@ def tables(
 def _motion(
     study: Study, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None,
     also: Callable[[SolvedPoses], object] | None,
-) -> tuple[dict[str, Table], NDArray[np.int8], NDArray[np.bool_]]:  # fmt: skip
+) -> tuple[dict[str, Table], NDArray[np.int8], Flags]:  # fmt: skip
     """Tables, reasons, and the designs whose motion ends where no limit is known."""
     question = dataclasses.replace(asked(study), poses=poses)
     motion = move(question, also=also)

@@ -6,13 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.cube import bounds
 from mechdesign.analyses.optimize.designs import best, normalised
 from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judging import Designs
-from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
@@ -40,7 +39,7 @@ class Comparison:
     designs: Designs
     weights: Floats
     cpi: Floats
-    winners: NDArray[np.intp]
+    winners: Ints
     meanings: Mapping[str, tuple[str, str]]
 
     @classmethod
@@ -82,13 +81,13 @@ def unit_of(study: Study, name: str) -> str:
     return study.units.label(place.quantity) if place is not None else ""
 
 
-def variable_columns(compared: Comparison, rows: NDArray[np.intp] | slice) -> Iterator[Column]:
+def variable_columns(compared: Comparison, rows: Ints | slice) -> Iterator[Column]:
     """The design variables of some designs."""
     for name, column in compared.designs.variables.items():
         yield Column(name, column[rows], unit_of(compared.study, name), "design variable")
 
 
-def value_columns(compared: Comparison, rows: NDArray[np.intp] | slice) -> Iterator[Column]:
+def value_columns(compared: Comparison, rows: Ints | slice) -> Iterator[Column]:
     """The goals' values of some designs."""
     for each in compared.designs.goals:
         unit, meaning = _unit_and_meaning(compared, each)

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_columns, pose_in_words
 from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, Model, UnreachableError, cheapest
@@ -23,6 +22,7 @@ from mechdesign.analyses.reliability.methods import METHODS
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.analyses.reliability.tolerances import retold, tolerances
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.document import Document, Mark
@@ -30,8 +30,6 @@ from mechdesign.study.loading import load_document
 from mechdesign.study.poses import Poses
 from mechdesign.study.reliability_models import Precision
 from mechdesign.study.rewriting import rewritten
-
-Floats = NDArray[np.float64]
 
 # How often a target is corrected, and the failures that the study's own samples must show to confirm one.
 _ROUNDS = 5
@@ -73,7 +71,7 @@ class _Round:
     analytic: Floats
     simulated: Sequence[Estimate]
 
-    def missed(self, asked: float) -> NDArray[np.bool_]:
+    def missed(self, asked: float) -> Flags:
         """Poses that fail more often than asked, beyond what chance explains."""
         return np.array([estimate.low > asked for estimate in self.simulated])
 
@@ -257,7 +255,7 @@ def _notes(
     return notes
 
 
-def _idle(model: Model, scales: Floats) -> NDArray[np.bool_]:
+def _idle(model: Model, scales: Floats) -> Flags:
     """Allocated tolerances that change no limited error at any pose, to the first order."""
     shares = [_shares(model, scales, k)[model.free] for k in range(len(model.settings))]
     return np.asarray(~(np.abs(shares) > _NOTHING).any(axis=0))

@@ -28,13 +28,12 @@ from mechdesign.analyses.reliability.unseen import unseen
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.memory import keep_freed_memory
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.threads import one_thread
-
-Floats = NDArray[np.float64]
 
 # Poses whose sensitivities are computed together.
 _BLOCK = 2048
@@ -178,7 +177,7 @@ class NominalPoses:
     """
 
     reason: NDArray[np.int8]
-    groups: tuple[tuple[NDArray[np.intp], Configuration, Floats, bool, Rates], ...]
+    groups: tuple[tuple[Ints, Configuration, Floats, bool, Rates], ...]
     values: Floats
 
     @staticmethod
@@ -199,7 +198,7 @@ class NominalPoses:
         return NominalPoses(reason, tuple(groups), values)
 
     @property
-    def assembled(self) -> NDArray[np.bool_]:
+    def assembled(self) -> Flags:
         """Poses that can be computed, those outside the limits of motion included."""
         return np.isin(self.reason, (Reason.OK, Reason.LIMIT))
 

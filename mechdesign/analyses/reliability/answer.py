@@ -14,11 +14,10 @@ from mechdesign.analyses.reliability.question import Question
 from mechdesign.analyses.reliability.simulation import Sums
 from mechdesign.analyses.reliability.sobol import Indices
 from mechdesign.analyses.reliability.task import Found
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-
-Floats = NDArray[np.float64]
 
 _KINDS = {
     "length": ("length", "velocity", "acceleration"),
@@ -75,6 +74,6 @@ class Answer:
             [self.study.units.label(_KINDS[c.coordinate.quantity][c.order]) for c in channels],
         )
 
-    def at(self, rows: NDArray[np.intp]) -> list[Column]:
+    def at(self, rows: Ints) -> list[Column]:
         """Columns of the poses of these rows."""
         return [Column(c.name, c.values[rows], c.unit, c.meaning) for c in pose_columns(self.study, self.poses)]

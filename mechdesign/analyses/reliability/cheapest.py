@@ -12,15 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.error_limits import Band, Disc
 from mechdesign.analyses.reliability.first_order import FirstOrder
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.tolerances import Tolerance, moments
-
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats, Ints
 
 # Tolerances stay between these multiples of what is given.
 TIGHTEST, WIDEST = 1e-3, 10.0
@@ -51,7 +49,7 @@ class Model:
     sources: Sources
     linear: FirstOrder
     tolerances: Sequence[Tolerance]
-    free: NDArray[np.intp]
+    free: Ints
     widest: Floats
 
     def scales(self, x: Floats) -> Floats:

@@ -9,12 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.marginals import Marginal, Normal
 from mechdesign.errors import StudyError
-
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats
 
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.correlation import pair_nodes
 from mechdesign.analyses.reliability.marginals import Normal
 from mechdesign.analyses.reliability.pins import PIN_LAWS
 from mechdesign.analyses.reliability.sources import Pin, Sources
-
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +32,8 @@ class Cumulants:
 
     mean: Floats
     covariance: Floats
-    third: tuple[NDArray[np.intp], Floats]
-    fourth: tuple[NDArray[np.intp], Floats]
+    third: tuple[Ints, Floats]
+    fourth: tuple[Ints, Floats]
 
 
 def cumulants(sources: Sources) -> Cumulants:
@@ -102,7 +100,7 @@ def _of_pairs(sources: Sources, covariance: Floats) -> Iterator[tuple[tuple[int,
         yield (one, other, other, other), expected(x * y**3) - 3.0 * b * c
 
 
-def _terms(found: dict[tuple[int, ...], float], order: int) -> tuple[NDArray[np.intp], Floats]:
+def _terms(found: dict[tuple[int, ...], float], order: int) -> tuple[Ints, Floats]:
     terms = [(each, value) for places, value in found.items() if value for each in sorted(set(permutations(places)))]
     index = np.array([each for each, _ in terms], dtype=np.intp).reshape(-1, order)
     return index, np.array([value for _, value in terms], dtype=float)

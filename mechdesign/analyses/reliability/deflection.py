@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.error_limits import Channel
 from mechdesign.analyses.stiffness.analysis import Asked
@@ -21,10 +20,9 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.reliability_models import LOADS
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +46,11 @@ class Elastic:
         return np.asarray(np.einsum("ckp,k->cp", self.flexibility, self.load))
 
     @property
-    def held(self) -> NDArray[np.bool_]:
+    def held(self) -> Flags:
         """Poses that hold the load."""
         return np.asarray(np.isfinite(self.flexibility).all(axis=(0, 1)))
 
-    def take(self, poses: Sequence[int] | NDArray[np.intp]) -> Elastic:
+    def take(self, poses: Sequence[int] | Ints) -> Elastic:
         """Some of the poses."""
         return replace(self, flexibility=self.flexibility[:, :, poses])
 
@@ -117,7 +115,7 @@ class Elasticity:
                 flexibility[k, : self.asked.size, assembled] = np.where(held, moved, np.nan).T
         return Elastic(flexibility, self.load)
 
-    def _rates(self, configuration: Configuration) -> tuple[Rates, NDArray[np.bool_]]:
+    def _rates(self, configuration: Configuration) -> tuple[Rates, Flags]:
         """What moves by unit loads, which are the leading axis, and which poses hold them."""
         from mechdesign.analyses.stiffness.force_method import load, twists_of
 

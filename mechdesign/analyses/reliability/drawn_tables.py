@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from mechdesign.analyses.reliability.answer import Answer
 from mechdesign.analyses.reliability.error_limits import correlation
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
+from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Column, Table
-
-Floats = NDArray[np.float64]
 
 # A histogram has about so many bins, of samples that vary no farther than so many standard deviations.
 BINS, WIDEST = 60, 6.0

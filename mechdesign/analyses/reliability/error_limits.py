@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study.reliability_models import SUFFIXES
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.error_limits import Channel
@@ -17,9 +16,9 @@ from mechdesign.analyses.reliability.sources import Source, Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.reliability_models import LOADS
 
-Floats = NDArray[np.float64]
 ORDERS = ("position", "velocity", "acceleration")
 
 
@@ -30,7 +29,7 @@ class Rates:
     velocity: tuple[Value, ...]
     acceleration: tuple[Value, ...]
 
-    def take(self, index: NDArray[np.intp] | int) -> Rates:
+    def take(self, index: Ints | int) -> Rates:
         """Those of some poses, or of one."""
 
         def part(values: tuple[Value, ...]) -> tuple[Value, ...]:
@@ -58,13 +57,13 @@ class FirstOrder:
 
     sources: tuple[Source, ...]
     components: Floats
-    owner: NDArray[np.intp]
+    owner: Ints
     mean: Floats
     variance: Floats
     correlation: Floats | None
     offset: Floats | None = None
 
-    def take(self, poses: Sequence[int] | NDArray[np.intp]) -> FirstOrder:
+    def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
         """Some of the poses."""
         offset = None if self.offset is None else self.offset[:, poses]
         return replace(self, components=self.components[:, :, poses], offset=offset)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.engine.problem import Problem
 from mechdesign.analyses.reliability.first_order import derivatives
 from mechdesign.analyses.reliability.simulation import Setting, errors_of, limited_part, solve
 from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.errors import MechanismError
-
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats
 
 # Step of the difference quotients of the made mechanisms, which are known to rounding, in standard deviations.
 _STEP = 1e-5

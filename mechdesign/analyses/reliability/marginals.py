@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study.reliability_models import Spread
-
-Floats = NDArray[np.float64]
 
 # A tolerance is three standard deviations of a normal law, which `truncated_normal` is cut at [S2, eq. 5].
 SIGMAS = 3.0

@@ -7,16 +7,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.sampling import generator
 from mechdesign.analyses.reliability.simulation import Setting, Sums, simulate, simulate_chunk, sums_of
 from mechdesign.analyses.reliability.task import Found, Partial, Task, wanted_precision
+from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL
-
-Floats = NDArray[np.float64]
 
 # Streams of their own, beside those of the chunks.
 _SEARCH, _QUASI = 1, 2

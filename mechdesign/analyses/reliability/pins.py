@@ -11,9 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats
 
 # Half the squared radius, in standard deviations, at which a normal pin of sigma 1/3 reaches the unit circle, and the
 # share of the normal law that lies outside.

@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
-
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Flags, Floats
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 # Beyond this many standard deviations the normal density is zero in double precision.
@@ -86,7 +84,7 @@ def _rare(
     used = (size > 0) & np.isfinite(ends)
     flat = np.count_nonzero(used[: 2 * len(bands)])
 
-    def broken(u: Floats, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def broken(u: Floats, held: Flags) -> Flags:
         found = np.asarray(held[:flat].any(axis=0))
         for disc in discs:
             found |= np.hypot(*(mean[k] + rows[k] @ u for k in (disc.x, disc.y))) > disc.radius
@@ -100,7 +98,7 @@ def _rare(
 def half_spaces(
     normals: Floats,
     distances: Floats,
-    broken: Callable[[Floats, NDArray[np.bool_]], NDArray[np.bool_]] | None = None,
+    broken: Callable[[Floats, Flags], Flags] | None = None,
 ) -> float:
     """Probability that a standard normal point lies in any half-space ``normal . u > distance``, to some 1e-3 of it.
 

@@ -9,15 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.cumulants import Cumulants, cumulants
 from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Drawn, Sources
 from mechdesign.analyses.reliability.task import Task
+from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
-
-Floats = NDArray[np.float64]
 
 # Longest and shortest steps of the differences, as a part of the mechanism's size or in radians, and between them as a
 # part of the standard deviation: the longest is the fourth root of rounding, at which a second derivative has about

@@ -16,10 +16,9 @@ from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.plan import Plan
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import Progress
-
-Floats = NDArray[np.float64]
 
 # The density's grid, in standard deviations [S2, Fig. 4], and the chunks it is counted over: a million samples.
 CELLS = 25
@@ -211,7 +210,7 @@ def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
     )
 
 
-def _trend(errors: Sequence[Floats], valid: NDArray[np.bool_], within: NDArray[np.bool_] | None) -> Floats:
+def _trend(errors: Sequence[Floats], valid: Flags, within: Flags | None) -> Floats:
     count = len(valid)
     begins = np.arange(0, count, _TREND_STEP)
     broken = np.zeros(count, dtype=bool) if within is None else ~within
@@ -249,7 +248,7 @@ def solve(setting: Setting, made: Made) -> Configuration:
     return solved.beside(setting.nominal, [channel.coordinate for channel in setting.channels])
 
 
-def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], NDArray[np.bool_]]:
+def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], Flags]:
     """Errors (value minus nominal) of each channel for made mechanisms, and which of them are assembled."""
     mechanism, solved = setting.mechanism, solve(setting, made)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -261,9 +260,9 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[list[Floats], N
     return errors, np.broadcast_to(solved.valid, (count,))
 
 
-def keeps(setting: Setting, errors: Sequence[Floats]) -> NDArray[np.bool_] | None:
+def keeps(setting: Setting, errors: Sequence[Floats]) -> Flags | None:
     """Which samples keep every limit; one that is not assembled is nan and keeps none. None where there are none."""
-    kept: NDArray[np.bool_] | None = None
+    kept: Flags | None = None
     with np.errstate(invalid="ignore"):
         for band in setting.bands:
             error = errors[band.output]

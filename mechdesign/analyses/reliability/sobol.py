@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.engine.precision import CONFIDENCE
@@ -26,13 +25,12 @@ from mechdesign.analyses.reliability.sampling import CHUNK, generator
 from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Drawn, Sources
 from mechdesign.analyses.reliability.task import Task
+from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.reliability_models import SAMPLING, ReliabilitySection
-
-Floats = NDArray[np.float64]
 
 REPLICATES = 16
 # Mechanisms solved a pose, and poses, where the study does not say how many points.

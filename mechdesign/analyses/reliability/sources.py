@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.correlation import Correlation
 from mechdesign.analyses.reliability.marginals import Marginal, marginal
@@ -15,10 +14,9 @@ from mechdesign.analyses.reliability.pins import PIN_LAWS
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 from mechdesign.study.reliability_models import LOADS, Clearance
-
-Floats = NDArray[np.float64]
 
 # Of all that varies, in radians or in sizes of the mechanism; of loads.
 MOST, HEAVY = 1e6, 1e100
@@ -96,7 +94,7 @@ class Drawn:
     radii: list[Floats | float]
     pins: list[tuple[Floats, Floats]]
 
-    def take(self, chosen: NDArray[np.bool_]) -> Drawn:
+    def take(self, chosen: Flags) -> Drawn:
         """Some of them."""
         return Drawn(
             [values[chosen] for values in self.scalars],

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability import drawn_tables
 from mechdesign.analyses.reliability.answer import Answer
@@ -13,9 +12,6 @@ from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.question import links_meant
 from mechdesign.analyses.reliability.sobol import columns as index_columns
 from mechdesign.results import Column, Table
-
-Floats = NDArray[np.float64]
-
 
 # Where nothing was computed.
 _UNKNOWN = Estimate(float("nan"), float("nan"), float("nan"), 0)

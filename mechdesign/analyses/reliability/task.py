@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mechdesign.analyses.reliability.engine.precision import Precision as Wanted
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import FirstOrder
 from mechdesign.analyses.reliability.simulation import Setting, Sums
 from mechdesign.analyses.reliability.sources import Sources
+from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import Progress
 from mechdesign.study.reliability_models import Precision
-
-Floats = NDArray[np.float64]
 
 # Samples that `auto` draws at most where the study says nothing, and its precision.
 MOST, RELATIVE = 2_000_000, 0.05

@@ -9,15 +9,13 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.marginals import Lognormal, Marginal, Normal, Triangular, TruncatedNormal, Uniform
 from mechdesign.analyses.reliability.sources import Scalar, Sources
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.document import plain
 from mechdesign.study.reliability_models import Clearance, Cost, Dimension
-
-Floats = NDArray[np.float64]
 
 # Digits that allocated numbers are written with, rounded down: what is tighter keeps what was asked.
 DIGITS = 6

@@ -16,7 +16,6 @@ from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
 from mechdesign.analyses.stiffness.legs import Guide, Hinge, Leg, NotSerialError, find_legs
 from mechdesign.analyses.stiffness.loads import Effects, displacements_table, effects_of, forces_table
 from mechdesign.analyses.stiffness.network import Network, build_network
-from mechdesign.analyses.stiffness.screws import Array
 from mechdesign.analyses.stiffness.serial import hold_by_legs
 from mechdesign.analyses.stiffness.tables import (
     Springs,
@@ -28,6 +27,7 @@ from mechdesign.analyses.stiffness.tables import (
 )
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
@@ -116,10 +116,10 @@ class Found:
         What the study's loads do, where it has any.
     """
 
-    matrices: dict[str, Array]
-    rank: NDArray[np.intp]
-    free: Array
-    margin: Array
+    matrices: dict[str, Floats]
+    rank: Ints
+    free: Floats
+    margin: Floats
     reason: NDArray[np.int8]
     springs: list[Springs]
     effects: Effects | None
@@ -239,9 +239,7 @@ def _loaded(asked: Asked, configuration: Configuration) -> Loaded:
     return load(twists, asked.size)
 
 
-def _cautions(
-    study: Study, poses: Poses, asked: Asked, known: NDArray[np.bool_], rank: NDArray[np.intp], margin: Array
-) -> list[str]:
+def _cautions(study: Study, poses: Poses, asked: Asked, known: Flags, rank: Ints, margin: Floats) -> list[str]:
     links = study.mechanism.description.links
     told = [
         f"link '{name}' has a single point, and so no beam: it is rigid, though 'elastic' names it; give it two ends"

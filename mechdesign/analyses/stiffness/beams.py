@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.stiffness.screws import Array
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.model import Link
+from mechdesign.numerics.arrays import Complexes, Floats
 
-Places = NDArray[np.complex128]
 # Of beams that come equally near to a slide, but for this share of the link's length, it rides on the first listed.
 NEAREST = 1e-9
 
@@ -53,11 +51,11 @@ class Course:
     """
 
     names: tuple[str, ...]
-    corners: Places
-    along: Places
-    starts: Array
+    corners: Complexes
+    along: Complexes
+    starts: Floats
 
-    def foot(self, point: str, place: Places) -> Array:
+    def foot(self, point: str, place: Complexes) -> Floats:
         """Distance, shape (n,), at which a point that is at `place` is borne: a corner by itself."""
         if point in self.names:
             return np.asarray(self.starts[self.names.index(point)])
@@ -69,7 +67,7 @@ class Course:
         near = np.argmax(away <= away.min(axis=0) + NEAREST * self.starts[-1], axis=0)[None]
         return np.asarray(np.take_along_axis(self.starts[:-1] + ahead, near, axis=0)[0])
 
-    def place(self, distance: Array) -> Places:
+    def place(self, distance: Floats) -> Complexes:
         """The place, shape (n,), at a distance along the beams."""
         if not len(self.along):
             return np.asarray(self.corners[0])
@@ -77,7 +75,7 @@ class Course:
         start, corner, along = (np.take_along_axis(v, last, axis=0)[0] for v in (self.starts, self.corners, self.along))
         return np.asarray(corner + (distance - start) * along)
 
-    def between(self, low: Array, high: Array) -> Iterator[tuple[Places, Places, Array]]:
+    def between(self, low: Floats, high: Floats) -> Iterator[tuple[Complexes, Complexes, Floats]]:
         """Middle, direction and length of each straight piece between two distances; none that is empty everywhere."""
         for corner, along, (start, end) in zip(self.corners, self.along, pairwise(self.starts), strict=False):
             first, last = np.clip(low, start, end), np.clip(high, start, end)

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.stiffness.beams import Course, course_of
 from mechdesign.analyses.stiffness.legs import Beam, Bearing, Element, Guide, Leg, Shift
-from mechdesign.analyses.stiffness.screws import Array, Chain, hinge_twist, slide_twist
+from mechdesign.analyses.stiffness.screws import Chain, hinge_twist, slide_twist
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.study.stiffness_models import Profile, StiffnessSection
 
 # A point this many times as far from the joints as they lie apart is far away.
 FAR = 10.0
 
 
-def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]) -> Chain:
+def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration, at: Complexes) -> Chain:
     """A leg's joints and elastic elements in each pose, seen from places `at`."""
     found = list(freedoms(leg.elements, section, configuration, at))
     return Chain(
@@ -30,9 +30,7 @@ def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration, 
     )
 
 
-def looked_at_from(
-    points: Iterable[str], at: NDArray[np.complex128], configuration: Configuration, length: float
-) -> NDArray[np.complex128]:
+def looked_at_from(points: Iterable[str], at: Complexes, configuration: Configuration, length: float) -> Complexes:
     """From where joints are seen: the asked point, or their middle where that is far from them, and would hide them."""
     places = [configuration.point(point) for point in dict.fromkeys(points)]
     if not places:
@@ -42,8 +40,8 @@ def looked_at_from(
 
 
 def freedoms(
-    elements: Iterable[Element], section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]
-) -> Iterator[tuple[Array, Value | None]]:
+    elements: Iterable[Element], section: StiffnessSection, configuration: Configuration, at: Complexes
+) -> Iterator[tuple[Floats, Value | None]]:
     """Twists (3, n) that elements allow, seen from places `at`, and their compliances; None where they are free."""
     for element in elements:
         if isinstance(element, Beam):
@@ -62,8 +60,8 @@ def freedoms(
 
 
 def _bearing(
-    bearing: Bearing, section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]
-) -> Iterator[tuple[Array, Value]]:
+    bearing: Bearing, section: StiffnessSection, configuration: Configuration, at: Complexes
+) -> Iterator[tuple[Floats, Value]]:
     given = section.bearings[bearing.name]
     across = [1.0 + 0j, 1j] if bearing.slide is None else [1j * _slide_direction(bearing.slide, configuration)]
     if given.radial is not None:
@@ -73,15 +71,15 @@ def _bearing(
         yield hinge_twist(configuration.point(bearing.point) - at), bearing.give / given.moment
 
 
-def _slide_direction(slide: int, configuration: Configuration) -> NDArray[np.complex128]:
+def _slide_direction(slide: int, configuration: Configuration) -> Complexes:
     k = next(k for k, edge in enumerate(configuration.graph.edges) if edge.slide == slide)
     direction = configuration.vectors.d[k] * configuration.rotations[configuration.graph.edges[k].frame]
     return np.broadcast_to(np.asarray(direction, dtype=complex), configuration.shape)
 
 
 def _beam(
-    beam: Beam, section: StiffnessSection, configuration: Configuration, at: NDArray[np.complex128]
-) -> Iterator[tuple[Array, Value]]:
+    beam: Beam, section: StiffnessSection, configuration: Configuration, at: Complexes
+) -> Iterator[tuple[Floats, Value]]:
     course = course_of(beam.beams, configuration)
     tail, head = (course.foot(point, configuration.point(point)) for point in (beam.tail, beam.head))
     profile = section.sections[beam.section]
@@ -89,8 +87,8 @@ def _beam(
 
 
 def bending(
-    course: Course, low: Array, high: Array, profile: Profile, at: NDArray[np.complex128]
-) -> Iterator[tuple[Array, Value]]:
+    course: Course, low: Floats, high: Floats, profile: Profile, at: Complexes
+) -> Iterator[tuple[Floats, Value]]:
     """Twists (3, n) of what lies between two distances along the beams of a link, and their compliances."""
     stretch, bend, shear = rigidities(profile)
     for middle, along, length in course.between(low, high):

@@ -16,9 +16,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.stiffness.screws import RANK, RIGID, Array, screw_product
+from mechdesign.analyses.stiffness.screws import RANK, RIGID, screw_product
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Wrenches of unit size with a determinant above this are solved in closed form, the others by singular values.
 REGULAR = 1e-4
@@ -42,13 +42,13 @@ class Held:
         Smallest singular value of the wrenches (unit columns, moments scaled); infinite where not needed.
     """
 
-    stiffness: Array
-    compliance: Array
-    rank: NDArray[np.intp]
-    free: Array
-    margin: Array
+    stiffness: Floats
+    compliance: Floats
+    rank: Ints
+    free: Floats
+    margin: Floats
 
-    def seen_from(self, arm: NDArray[np.complex128]) -> Held:
+    def seen_from(self, arm: Complexes) -> Held:
         """The same body asked at points that are `arm` (n,) away; a pin is asked where it is.
 
         Nothing is inverted, so that a point may be far away: C' = M C M^T, K' = M^-T K M^-1  [S4].
@@ -64,14 +64,14 @@ class Held:
         )
 
 
-def moved_to(arm: NDArray[np.complex128]) -> Array:
+def moved_to(arm: Complexes) -> Floats:
     """M, shape (n, 3, 3), that takes a body's twist to that at a point `arm` away; its inverse is that of `-arm`."""
     found = np.tile(np.eye(3), (len(arm), 1, 1))
     found[:, 0, 2], found[:, 1, 2] = -arm.imag, arm.real
     return found
 
 
-def hold(wrenches: Sequence[Array], compliances: Sequence[Array], length: float, size: int = 3) -> Held:
+def hold(wrenches: Sequence[Floats], compliances: Sequence[Floats], length: float, size: int = 3) -> Held:
     """Stiffness and compliance from the wrenches (3, m, n) and compliances (m, m, n) of all legs.
 
     Parameters
@@ -107,7 +107,7 @@ def hold(wrenches: Sequence[Array], compliances: Sequence[Array], length: float,
     return Held(stiffness / outer, compliance * outer, rank, free, margin)
 
 
-def principal(soft: Array) -> tuple[Array, Array, Array]:
+def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
     """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi)."""
     mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
     radius = np.hypot(half, soft[:, 0, 1])
@@ -119,14 +119,14 @@ def principal(soft: Array) -> tuple[Array, Array, Array]:
     return low, high, angle
 
 
-def directional(soft: Array, direction: float) -> Array:
+def directional(soft: Floats, direction: float) -> Floats:
     """Stiffness to a force in a direction (radians), the displacement counted along it."""
     along = np.array([np.cos(direction), np.sin(direction)])
     with np.errstate(divide="ignore"):
         return np.asarray(1 / np.einsum("i,nij,j->n", along, soft[:, :2, :2], along))
 
 
-def _inverse(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _inverse(matrix: Floats) -> tuple[Floats, Flags]:
     """Inverse (size, size, n) of the square wrench matrix where it is regular, and where that is."""
     norms = np.sqrt((matrix**2).sum(axis=0)).prod(axis=0)
     if len(matrix) == 2:
@@ -141,7 +141,7 @@ def _inverse(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
     return adjugate / np.where(regular, determinant, 1.0), regular
 
 
-def _exact(inverse: Array, compliances: Sequence[Array]) -> Array:
+def _exact(inverse: Floats, compliances: Sequence[Floats]) -> Floats:
     """C = W^-T C_c W^-1, poses first."""
     size, n = inverse.shape[0], inverse.shape[2]
     total = np.zeros((size, size, n))
@@ -153,7 +153,7 @@ def _exact(inverse: Array, compliances: Sequence[Array]) -> Array:
     return np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
 
 
-def _sum_of_legs(legs: Sequence[Array], compliances: Sequence[Array]) -> Array:
+def _sum_of_legs(legs: Sequence[Floats], compliances: Sequence[Floats]) -> Floats:
     """K = sum W C_c^-1 W^T, poses first; nan where a C_c is singular  [S4, eq. 22]."""
     size, n = legs[0].shape[0], legs[0].shape[2]
     total = np.zeros((size, size, n))
@@ -174,7 +174,7 @@ def _sum_of_legs(legs: Sequence[Array], compliances: Sequence[Array]) -> Array:
     return np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
 
 
-def _add_congruence(total: Array, outer: Array, inner: Array) -> None:
+def _add_congruence(total: Floats, outer: Floats, inner: Floats) -> None:
     """Add outer inner outer^T to `total` in place; the last axis runs over poses."""
     size = len(total)
     for i, j in np.ndindex(len(inner), len(inner)):
@@ -184,14 +184,14 @@ def _add_congruence(total: Array, outer: Array, inner: Array) -> None:
                 total[a, b] += weighted * outer[b, j]
 
 
-def _inverse_of_three(block: Array) -> Array:
+def _inverse_of_three(block: Floats) -> Floats:
     values, vectors = np.linalg.eigh(np.moveaxis(block, 2, 0))
     with np.errstate(divide="ignore"):
         inverse = np.where(values > RIGID * values[:, -1:], 1 / values, np.nan)
     return np.moveaxis(np.einsum("nij,nj,nkj->nik", vectors, inverse, vectors), 0, 2)
 
 
-def _general(legs: Sequence[Array], compliances: Sequence[Array], size: int) -> tuple[Array, ...]:
+def _general(legs: Sequence[Floats], compliances: Sequence[Floats], size: int) -> tuple[Floats, ...]:
     """Stiffness, compliance, rank, free twist and margin by singular values, in scaled coordinates."""
     n = legs[0].shape[2]
     wrenches, values = _independent(legs, compliances)
@@ -213,7 +213,7 @@ def _general(legs: Sequence[Array], compliances: Sequence[Array], size: int) -> 
     return stiffness, compliance, rank, free, singular[:, size - 1]
 
 
-def _independent(legs: Sequence[Array], compliances: Sequence[Array]) -> tuple[Array, Array]:
+def _independent(legs: Sequence[Floats], compliances: Sequence[Floats]) -> tuple[Floats, Floats]:
     """Wrenches (n, size, M) of unit length on which C_c is diagonal, and its diagonal (n, M), zero where rigid."""
     wrenches, values = [], []
     for leg, block in zip(legs, compliances, strict=True):
@@ -227,7 +227,7 @@ def _independent(legs: Sequence[Array], compliances: Sequence[Array]) -> tuple[A
     return np.concatenate(wrenches, axis=2), np.concatenate(values, axis=1)
 
 
-def _alike(pattern: NDArray[np.bool_], rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+def _alike(pattern: Flags, rows: Ints) -> Iterator[Ints]:
     """Rows of equal patterns together."""
     if len(rows):
         _, which = np.unique(pattern[rows], axis=0, return_inverse=True)
@@ -235,7 +235,7 @@ def _alike(pattern: NDArray[np.bool_], rows: NDArray[np.intp]) -> Iterator[NDArr
             yield rows[which.reshape(-1) == k]
 
 
-def _compliance(fixed: Array, elastic: Array, values: Array) -> Array:
+def _compliance(fixed: Floats, elastic: Floats, values: Floats) -> Floats:
     """Compliance where `fixed` wrenches are rigid and `elastic` ones have compliances `values` > 0."""
     n, size, _ = fixed.shape
     left, singular, _ = (
@@ -252,7 +252,7 @@ def _compliance(fixed: Array, elastic: Array, values: Array) -> Array:
     return result
 
 
-def _saddle(wrenches: Array, values: Array) -> Array:
+def _saddle(wrenches: Floats, values: Floats) -> Floats:
     """X of [[0, W], [W^T, -C_c]] [X; lambda] = [w; 0] for unit wrenches w, where W has full rank and C_c is regular."""
     n, size, count = wrenches.shape
     largest = values.max(axis=1)

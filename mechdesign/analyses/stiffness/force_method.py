@@ -19,15 +19,15 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.stiffness.beams import course_of
 from mechdesign.analyses.stiffness.chains import bending, freedoms, looked_at_from
 from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to
 from mechdesign.analyses.stiffness.network import Network
-from mechdesign.analyses.stiffness.screws import RANK, RIGID, Array
+from mechdesign.analyses.stiffness.screws import RANK, RIGID
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study.stiffness_models import StiffnessSection
 
 # Of states of self-stress, those with less than this share of the largest compliance are rounding: rigid.
@@ -55,11 +55,11 @@ class Twists:
     """
 
     network: Network
-    twist: Array
-    compliance: Array
-    free: NDArray[np.bool_]
-    within: Array
-    arm: NDArray[np.complex128]
+    twist: Floats
+    compliance: Floats
+    free: Flags
+    within: Floats
+    arm: Complexes
     length: float
 
 
@@ -81,11 +81,11 @@ class Loaded:
 
     held: Held
     twists: Twists
-    stress: Array
-    shift: Array
+    stress: Floats
+    shift: Floats
 
     @cached_property
-    def wrenches(self) -> Array:
+    def wrenches(self) -> Floats:
         """Wrench that each edge bears about the asked point, a column for each unit load, shape (n, edges, 3, size)."""
         network, size = self.twists.network, self.stress.shape[2]
         around, onward = _ways(network)
@@ -98,7 +98,7 @@ class Loaded:
         return np.asarray(back[:, None] @ plain @ self._loads[:, None])
 
     @cached_property
-    def displacements(self) -> dict[str, Array]:
+    def displacements(self) -> dict[str, Floats]:
         """Twist of each vertex about the asked point, a column for each unit load, shape (n, 3, size)."""
         twists, size = self.twists, self.stress.shape[2]
         scale = np.array([1.0, 1.0, 1.0 / twists.length])
@@ -111,7 +111,7 @@ class Loaded:
         return found
 
     @property
-    def _loads(self) -> Array:
+    def _loads(self) -> Floats:
         """Loads at the asked point as loads where the twists are seen from, shape (n, size, size)."""
         size = self.stress.shape[2]
         return moved_to(self.twists.arm).swapaxes(1, 2)[:, :size, :size]
@@ -141,8 +141,8 @@ def twists_of(network: Network, section: StiffnessSection, configuration: Config
 
 def _beam_freedoms(
     network: Network, ways: Sequence[int], section: StiffnessSection, configuration: Configuration,
-    origin: NDArray[np.complex128],
-) -> Iterator[tuple[Array, Array, Value]]:  # fmt: skip
+    origin: Complexes,
+) -> Iterator[tuple[Floats, Floats, Value]]:  # fmt: skip
     """Of the beams of one link, cut wherever something sits: edges (edges, n) that go over a part, twist, compliance.
 
     What slides changes its order along the beams from pose to pose: the parts are sorted in each.
@@ -170,7 +170,7 @@ def load(twists: Twists, size: int) -> Loaded:
     """
     n, (around, onward) = len(twists.twist), _ways(twists.network)
 
-    def of(chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def of(chosen: Flags) -> tuple[Floats, Floats]:
         within, twist = twists.within[:, :, chosen], twists.twist[:, :, chosen]
         loops = (around @ within)[:, :, None] * twist[:, None]
         return loops.reshape(n, 3 * len(around), twist.shape[2]), (onward @ within)[:, None] * twist[:, :size]
@@ -189,7 +189,7 @@ def load(twists: Twists, size: int) -> Loaded:
     return Loaded(held.seen_from(twists.arm), twists, stress, shift)
 
 
-def _ways(network: Network) -> tuple[Array, Array]:
+def _ways(network: Network) -> tuple[Floats, Floats]:
     """Signs of the edges around each loop, shape (loops, edges), and on the way to the asked body, shape (edges,)."""
     loops = np.array([network.signs(loop) for loop in network.loops]).reshape(-1, len(network.edges))
     return loops, network.signs(network.paths[network.asked])
@@ -213,14 +213,14 @@ class _Statics:
         Smallest singular value (of unit columns) that is not lost; infinite where not needed.
     """
 
-    inverse: Array
-    particular: Array
-    stress: Array | None
-    lost: Array | None
-    margin: Array
+    inverse: Floats
+    particular: Floats
+    stress: Floats | None
+    lost: Floats | None
+    margin: Floats
 
     @staticmethod
-    def of(loops: Array, way: Array) -> _Statics:
+    def of(loops: Floats, way: Floats) -> _Statics:
         """Square and regular matrices are inverted; the others go through singular values."""
         norm = np.sqrt((loops**2).sum(axis=1) + (way**2).sum(axis=1))
         norm = np.where(norm > 0, norm, 1.0)[:, None]
@@ -250,7 +250,7 @@ class _Statics:
         )
 
 
-def _inverses(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _inverses(matrix: Floats) -> tuple[Floats, Flags]:
     """Inverses, and where the smallest singular value is certainly above `REGULAR`."""
     n, size, _ = matrix.shape
     inverse, regular = np.zeros((n, size, size)), np.ones(n, dtype=bool)
@@ -263,7 +263,7 @@ def _inverses(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
     return inverse, regular & ((inverse**2).sum(axis=(1, 2)) < 1 / REGULAR**2)
 
 
-def _unkept(vectors: Array, keep: NDArray[np.bool_]) -> Array:
+def _unkept(vectors: Floats, keep: Flags) -> Floats:
     """Projector onto the singular vectors (columns) that are not kept; exactly zero where all are."""
     n, size, _ = vectors.shape
     others = np.ones((n, size), dtype=bool)
@@ -272,14 +272,14 @@ def _unkept(vectors: Array, keep: NDArray[np.bool_]) -> Array:
     return np.asarray(chosen @ chosen.swapaxes(1, 2))
 
 
-def _onto(matrix: Array) -> Array:
+def _onto(matrix: Floats) -> Floats:
     """Projector onto the range of symmetric matrices of order one."""
     values, vectors = np.linalg.eigh(matrix)
     kept = vectors * (values > RANK**2)[:, None]
     return np.asarray(kept @ kept.swapaxes(1, 2))
 
 
-def _least_energy(statics: _Statics, loops: Array, way: Array, compliance: Array) -> tuple[Array, Array]:
+def _least_energy(statics: _Statics, loops: Floats, way: Floats, compliance: Floats) -> tuple[Floats, Floats]:
     """What elastic joints bear under unit loads, shape (n, joints, size), and the loops' wrenches."""
     stress = statics.particular
     onward, around = way.swapaxes(1, 2), loops.swapaxes(1, 2)
@@ -298,7 +298,7 @@ def _least_energy(statics: _Statics, loops: Array, way: Array, compliance: Array
     return bears - loops.swapaxes(1, 2) @ more, stress + more
 
 
-def _held(compliance: Array, statics: _Statics, length: float, size: int) -> Held:
+def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> Held:
     """Compliance where the body is held, stiffness where it is not rigid, and what is free, unscaled."""
     n = len(compliance)
     lost = statics.lost if statics.lost is not None else np.zeros((n, size, size))
@@ -330,6 +330,6 @@ def _held(compliance: Array, statics: _Statics, length: float, size: int) -> Hel
     return Held(stiffness / outer, compliance * outer, size - freedom, twist, statics.margin)
 
 
-def _by(values: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:
+def _by(values: Ints) -> Iterator[tuple[int, Ints]]:
     for value in np.unique(values):
         yield int(value), np.flatnonzero(values == value)

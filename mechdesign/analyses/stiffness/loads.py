@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.force_method import Loaded
 from mechdesign.analyses.stiffness.network import Network
-from mechdesign.analyses.stiffness.screws import Array
 from mechdesign.mechanism import Configuration
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -31,9 +30,9 @@ class Effects:
         Where those are without a load.
     """
 
-    forces: Array
-    moved: NDArray[np.complex128]
-    places: NDArray[np.complex128]
+    forces: Floats
+    moved: Complexes
+    places: Complexes
 
     @staticmethod
     def unknown(network: Network, poses: int, loads: int) -> Effects:
@@ -45,7 +44,7 @@ class Effects:
             np.full((poses, points), complex(np.nan, np.nan)),
         )
 
-    def put(self, rows: NDArray[np.intp], part: Effects) -> None:
+    def put(self, rows: Ints, part: Effects) -> None:
         """Fill in some poses."""
         self.forces[rows], self.moved[rows], self.places[rows] = part.forces, part.moved, part.places
 

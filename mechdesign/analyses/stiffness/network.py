@@ -14,16 +14,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
 from mechdesign.analyses.stiffness.legs import Beam, Element, Hinge, joint_elements
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study.stiffness_models import StiffnessSection
 
-Signs = NDArray[np.float64]
 Way = tuple[tuple[int, int], ...]
 
 
@@ -82,7 +81,7 @@ class Network:
                 found[edge.name] = (*found.get(edge.name, ()), k)
         return tuple(found.values())
 
-    def signs(self, way: Sequence[tuple[int, int]]) -> Signs:
+    def signs(self, way: Sequence[tuple[int, int]]) -> Floats:
         """Sign of each edge on a way, 0 where it is not on it, shape (edges,)."""
         found = np.zeros(len(self.edges))
         for edge, sign in way:

@@ -13,11 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value, cross, vector
-
-Array = NDArray[np.float64]
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # Below this share of the largest singular value a direction counts as lost. Elbows at full stretch, found through the
 # root of a difference, are straight to 1e-8 only.
@@ -26,17 +24,17 @@ RANK = 1e-7
 RIGID = 1e-12
 
 
-def hinge_twist(place: NDArray[np.complex128]) -> Array:
+def hinge_twist(place: Complexes) -> Floats:
     """Twist (3, n) of a revolute joint at places (n,) seen from the origin: [py, -px, 1]  [S4, eq. 6]."""
     return np.stack([place.imag, -place.real, np.ones(place.shape)])
 
 
-def slide_twist(direction: NDArray[np.complex128]) -> Array:
+def slide_twist(direction: Complexes) -> Floats:
     """Twist (3, n) of a prismatic joint along unit vectors (n,): [ax, ay, 0]."""
     return np.stack([direction.real, direction.imag, np.zeros(direction.shape)])
 
 
-def screw_product(a: Array, b: Array) -> Array:
+def screw_product(a: Floats, b: Floats) -> Floats:
     """Cross product over the leading axis (3): the wrench on which two twists do no work, or the other way round."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
@@ -57,13 +55,13 @@ class Chain:
         Places of the first and last joint from the origin.
     """
 
-    passive: Sequence[Array]
-    elastic: Sequence[Array]
+    passive: Sequence[Floats]
+    elastic: Sequence[Floats]
     compliance: Sequence[Value]
-    base: NDArray[np.complex128]
-    tip: NDArray[np.complex128]
+    base: Complexes
+    tip: Complexes
 
-    def take(self, index: NDArray[np.intp]) -> Chain:
+    def take(self, index: Ints) -> Chain:
         """Poses by index."""
         return Chain(
             [twist[:, index] for twist in self.passive],
@@ -74,7 +72,7 @@ class Chain:
         )
 
 
-def joint_rank(passive: Sequence[Array], length: float) -> NDArray[np.intp] | int:
+def joint_rank(passive: Sequence[Floats], length: float) -> Ints | int:
     """Rank of the free joints' twists in each pose, rotations scaled by a length."""
     count = len(passive)
     if count < 2:
@@ -87,7 +85,7 @@ def joint_rank(passive: Sequence[Array], length: float) -> NDArray[np.intp] | in
     return np.asarray((values > RANK * values[:, :1]).sum(axis=1), dtype=np.intp)
 
 
-def reciprocal_wrenches(passive: Sequence[Array], rank: int, length: float, count: int) -> Array:
+def reciprocal_wrenches(passive: Sequence[Floats], rank: int, length: float, count: int) -> Floats:
     """Wrenches on which free joints of a given rank do no work, a basis (3, 3 - rank, n)  [S4, eqs. 13-15].
 
     Closed form for up to two independent joints; the null space by singular values where joints depend on each other.
@@ -107,7 +105,7 @@ def reciprocal_wrenches(passive: Sequence[Array], rank: int, length: float, coun
     return np.asarray(basis)
 
 
-def _one_joint(twist: Array) -> Array:
+def _one_joint(twist: Floats) -> Floats:
     dx, dy, turn = twist
     one, zero = np.ones(dx.shape), np.zeros(dx.shape)
     if turn.all():
@@ -116,7 +114,7 @@ def _one_joint(twist: Array) -> Array:
     return np.stack([np.stack([-dy, zero]), np.stack([dx, zero]), np.stack([zero, one])])
 
 
-def constraint_compliance(wrenches: Array, chain: Chain) -> Array:
+def constraint_compliance(wrenches: Floats, chain: Chain) -> Floats:
     """C_c = W^T C W, shape (m, m, n), as the sum over elastic joints of c (W^T s)(W^T s)^T  [S4, eq. 20]."""
     _, m, n = wrenches.shape
     total = np.zeros((m, m, n))
@@ -146,12 +144,12 @@ class Spring:
         Direction of its line in [0, pi); nan for a rotational spring.
     """
 
-    stiffness: Array
-    place: NDArray[np.complex128]
-    angle: Array
+    stiffness: Floats
+    place: Complexes
+    angle: Floats
 
 
-def equivalent_springs(wrenches: Array, chain: Chain, length: float) -> list[Spring]:
+def equivalent_springs(wrenches: Floats, chain: Chain, length: float) -> list[Spring]:
     """Springs that hold the body as a leg does: one on the line of one wrench, two for two; none for three.
 
     Two wrenches reciprocal to a slide give two parallel springs at +-a along it from the tip, a = sqrt(c11/c22), the
@@ -174,7 +172,7 @@ def equivalent_springs(wrenches: Array, chain: Chain, length: float) -> list[Spr
     ]
 
 
-def _single(wrench: Array, chain: Chain, length: float) -> Spring:
+def _single(wrench: Floats, chain: Chain, length: float) -> Spring:
     compliance = constraint_compliance(wrench[:, None], chain)[0, 0]
     force = vector(wrench[0], wrench[1])
     size = np.abs(force)
@@ -189,7 +187,7 @@ def _single(wrench: Array, chain: Chain, length: float) -> Spring:
     )
 
 
-def _parallel_springs(twist: Array, chain: Chain) -> list[Spring]:
+def _parallel_springs(twist: Floats, chain: Chain) -> list[Spring]:
     with np.errstate(divide="ignore", invalid="ignore"):
         along = vector(twist[0], twist[1])
         along = along / np.abs(along)
@@ -219,7 +217,7 @@ def _parallel_springs(twist: Array, chain: Chain) -> list[Spring]:
     return springs
 
 
-def _pin_springs(twist: Array, chain: Chain) -> list[Spring]:
+def _pin_springs(twist: Floats, chain: Chain) -> list[Spring]:
     with np.errstate(divide="ignore", invalid="ignore"):
         place = vector(-twist[1] / twist[2], twist[0] / twist[2])
         basis = _one_joint(np.stack([place.imag, -place.real, np.ones(place.shape)]))
@@ -236,7 +234,7 @@ def _pin_springs(twist: Array, chain: Chain) -> list[Spring]:
         ]
 
 
-def _scaled(twist: Array, length: float) -> Array:
+def _scaled(twist: Floats, length: float) -> Floats:
     unit = twist.copy()
     unit[2] *= length
     return np.asarray(unit / np.linalg.norm(unit, axis=0))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.stiffness.chains import chain_of, looked_at_from
 from mechdesign.analyses.stiffness.compliance import Held, hold
@@ -19,6 +18,7 @@ from mechdesign.analyses.stiffness.screws import (
 )
 from mechdesign.analyses.stiffness.tables import Springs
 from mechdesign.mechanism import Configuration
+from mechdesign.numerics.arrays import Ints
 from mechdesign.study.stiffness_models import StiffnessSection
 
 
@@ -46,7 +46,7 @@ def hold_by_legs(
     if not chains:
         return _restrict(hold([np.zeros((3, 0, n))], [np.zeros((0, 0, n))], length, body), condensed), []
     springs: list[Springs] = []
-    parts: list[tuple[NDArray[np.intp], Held]] = []
+    parts: list[tuple[Ints, Held]] = []
     every = np.stack(ranks, axis=1)
     for signature, rows in _signatures(every):
         here = chains if len(rows) == n else [chain.take(rows) for chain in chains]
@@ -64,7 +64,7 @@ def hold_by_legs(
     return _restrict(_join(parts, n).seen_from(at - origin), condensed), springs
 
 
-def _signatures(ranks: NDArray[np.intp]) -> list[tuple[list[int], NDArray[np.intp]]]:
+def _signatures(ranks: Ints) -> list[tuple[list[int], Ints]]:
     """Poses in which all legs have the same ranks together."""
     if (ranks == ranks[:1]).all():
         return [(ranks[0].tolist(), np.arange(len(ranks)))]
@@ -72,7 +72,7 @@ def _signatures(ranks: NDArray[np.intp]) -> list[tuple[list[int], NDArray[np.int
     return [(kind.tolist(), np.flatnonzero(which.reshape(-1) == k)) for k, kind in enumerate(kinds)]
 
 
-def _join(parts: Sequence[tuple[NDArray[np.intp], Held]], n: int) -> Held:
+def _join(parts: Sequence[tuple[Ints, Held]], n: int) -> Held:
     if len(parts) == 1:
         return parts[0][1]
     order = np.argsort(np.concatenate([rows for rows, _ in parts]))

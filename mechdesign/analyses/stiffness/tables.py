@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import directional, principal
 from mechdesign.analyses.stiffness.legs import Leg
-from mechdesign.analyses.stiffness.screws import Array
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -22,11 +21,11 @@ from mechdesign.study.poses import Poses
 class Springs:
     """Rows of the table of springs, in no order."""
 
-    row: NDArray[np.intp]
-    leg: NDArray[np.intp]
-    stiffness: Array
-    place: NDArray[np.complex128]
-    angle: Array
+    row: Ints
+    leg: Ints
+    stiffness: Floats
+    place: Complexes
+    angle: Floats
 
 
 def _kinds(size: int, what: str) -> dict[tuple[int, int], str]:
@@ -35,7 +34,7 @@ def _kinds(size: int, what: str) -> dict[tuple[int, int], str]:
     return {(i, j): prefix[(i == 2) + (j == 2)] + what for i in range(size) for j in range(i, size)}
 
 
-def _entries(study: Study, letter: str, matrix: Array, what: str, meaning: str) -> list[Column]:
+def _entries(study: Study, letter: str, matrix: Floats, what: str, meaning: str) -> list[Column]:
     return [
         Column(f"{letter}{i + 1}{j + 1}", matrix[:, i, j], study.units.label(kind), meaning)
         for (i, j), kind in _kinds(matrix.shape[1], what).items()
@@ -45,11 +44,11 @@ def _entries(study: Study, letter: str, matrix: Array, what: str, meaning: str) 
 def stiffness_table(
     study: Study,
     poses: Poses,
-    stiff: Array,
-    soft: Array,
-    rank: NDArray[np.intp],
-    free: Array,
-    valid: NDArray[np.bool_],
+    stiff: Floats,
+    soft: Floats,
+    rank: Ints,
+    free: Floats,
+    valid: Flags,
     method: str,
     direction: float | None,
 ) -> Table:
@@ -96,7 +95,7 @@ def stiffness_table(
     return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
 
 
-def eigen_table(study: Study, poses: Poses, soft: Array, length: float) -> Table:
+def eigen_table(study: Study, poses: Poses, soft: Floats, length: float) -> Table:
     """``eigen.csv``: eigen-stiffnesses of a body, softest first, and the twists along which they act.
 
     Of K with rotations counted as lengths: a twist (dx, dy, length dphi) of unit size meets a wrench along itself.
@@ -125,7 +124,7 @@ def eigen_table(study: Study, poses: Poses, soft: Array, length: float) -> Table
     return Table("eigen", tuple(columns), "eigen-stiffnesses by the characteristic length")
 
 
-def compliance_table(study: Study, poses: Poses, soft: Array) -> Table:
+def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
     """``compliance.csv``: C11 ... C33."""
     columns = pose_columns(study, poses) + _entries(study, "C", soft, "compliance", "displacement per load")
     return Table(
@@ -157,7 +156,7 @@ def springs_table(study: Study, poses: Poses, legs: Sequence[Leg], springs: Sequ
     return Table("springs", tuple(columns), "springs that hold the body as its legs do")
 
 
-def deflections_table(study: Study, poses: Poses, loads: Array, soft: Array) -> Table:
+def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -> Table:
     units = study.units
     size = soft.shape[1]
     moved = np.einsum("nij,lj->nli", soft, loads[:, :size]).reshape(-1, size)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.field import Field, Places
-from mechdesign.analyses.workspace.rays import Designs, Floats, Ints, trace
+from mechdesign.analyses.workspace.rays import Designs, trace
 from mechdesign.analyses.workspace.slices import VALUE, Sliced
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
-Complex = NDArray[np.complex128]
 # Values that are looked at, of the whole range.
 VALUES = 25
 # Names among the dimensions by which a point and the margin that is looked at are given.
@@ -48,7 +47,7 @@ class _Turned(Field):
         assert self.sliced is not None
         return self.sliced.rounding[list(self.rows)] if self.rows else np.zeros(1)
 
-    def margins(self, z: Complex, places: Places, *, assembly: bool = True) -> Floats:
+    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
         """Those margins, shape (margins, *z.shape)."""
         assert self.sliced is not None
         sizes = dict(places)

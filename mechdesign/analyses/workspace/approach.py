@@ -6,17 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.continuation import MAX_CHANGE
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import Guess, State
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 # Corrections of Newton's method: most poses need few.
 FEW, STEPS = 5, 30
 # A correction that leaves less of the determinant than this is towards a fold (at the fold itself: a half).
@@ -39,18 +36,18 @@ class Approach:
     held: tuple[float, ...]
     signs: Sequence[float]
 
-    def state(self, z: Complex, sizes: Mapping[str, Floats], table: Floats) -> State:
+    def state(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats) -> State:
         """The whole mechanism with its unknowns as they are."""
         return self.plan.run(self._given(z), self._vectors(sizes), self._guess(table), steps=0)
 
-    def step(self, z: Complex, sizes: Mapping[str, Floats], table: Floats, steps: int) -> State:
+    def step(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats, steps: int) -> State:
         """Newton's corrections; what comes after the last group that needs them is left unsolved."""
         forms = [group.form for group in self.plan.structure.groups]
         modes = self.plan.modes[: len(forms) - forms[::-1].index("newton")]
         return self.plan.run(self._given(z), self._vectors(sizes), self._guess(table), modes, steps)
 
     def corrected(
-        self, z: Complex, sizes: Mapping[str, Floats], table: Floats, ahead: Value, patient: Flags
+        self, z: Complexes, sizes: Mapping[str, Floats], table: Floats, ahead: Value, patient: Flags
     ) -> tuple[Floats, Floats]:
         """Unknowns of poses near guesses, by Newton's method alone, and their grip (see `solve`).
 
@@ -75,7 +72,9 @@ class Approach:
             found[:, rows], grip[rows] = self._watched(z[rows], own, table[:, rows], ahead)
         return found, grip
 
-    def _watched(self, z: Complex, sizes: Mapping[str, Floats], table: Floats, ahead: Floats) -> tuple[Floats, Floats]:
+    def _watched(
+        self, z: Complexes, sizes: Mapping[str, Floats], table: Floats, ahead: Floats
+    ) -> tuple[Floats, Floats]:
         """Poses by single corrections, each pose until it is found or seen to lie beyond a fold; and their grip.
 
         Towards a fold the equations are those of a parabola: from one side of it corrections never pass to the other,
@@ -126,7 +125,7 @@ class Approach:
                 break
         return table, grip
 
-    def _given(self, z: Complex) -> list[Value]:
+    def _given(self, z: Complexes) -> list[Value]:
         return [z.real, z.imag, *self.held]
 
     def _vectors(self, sizes: Mapping[str, Floats]) -> Vectors:
@@ -143,7 +142,7 @@ class Approach:
                 row = end
         return found
 
-    def expected(self, table: Floats, slopes: Floats, way: Complex) -> Floats:
+    def expected(self, table: Floats, slopes: Floats, way: Complexes) -> Floats:
         """What unknowns are expected to change some way from a pose."""
         change = slopes[0] * way.real + slopes[1] * way.imag
         # Beside a fold the unknowns change too fast for their slopes to tell.

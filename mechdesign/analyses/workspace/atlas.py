@@ -10,15 +10,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from mechdesign.analyses.workspace.approach import Approach, Complex, Flags, Floats, unknowns
+from mechdesign.analyses.workspace.approach import Approach, unknowns
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import unknowns_of
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import State
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Distance of neighbouring poses, as a share of the mechanism's size.
 SPACING = 0.03
@@ -36,7 +36,6 @@ BACK, ASIDE = 3, 1e-3
 COARSE = 3
 # Poses of all designs that are kept for the next question.
 KEPT = 500_000
-Ints = NDArray[np.intp]
 SIDES = np.array([1, 1j, -1, -1j])
 
 
@@ -61,7 +60,7 @@ class _Poses:
     tree: cKDTree
     table: Floats
     slopes: Floats
-    lattice: Complex
+    lattice: Complexes
     grip: Floats
 
 
@@ -114,7 +113,7 @@ class Atlas:
         """Distance of neighbouring poses."""
         return SPACING * self.plan.core.size
 
-    def solve(self, z: Complex, places: Mapping[str, Value]) -> tuple[Configuration, Floats]:
+    def solve(self, z: Complexes, places: Mapping[str, Value]) -> tuple[Configuration, Floats]:
         """The mechanism with its point at `z`, and how far it is from where assemblies meet: its grip.
 
         The grip is the product of the squared determinants: zero at a fold, linear in the distance to it, and negative
@@ -138,7 +137,7 @@ class Atlas:
         with np.errstate(all="ignore"):
             found, grip = self.approach.corrected(goal, sizes, table, self.approach.expected(table, slopes, way), ~far)
 
-            def again(rows: Ints, step: Complex) -> Floats:
+            def again(rows: Ints, step: Complexes) -> Floats:
                 own = {name: value[rows] for name, value in sizes.items()}
                 goal[rows], start = near[rows] + step, table[:, rows]
                 ahead = self.approach.expected(start, slopes[:, :, rows], step)
@@ -169,7 +168,7 @@ class Atlas:
         grip[far & ~open_] = np.nan
         return _shaped(told, shape), grip.reshape(shape)
 
-    def _nearest(self, z: Complex, sizes: Mapping[str, Floats]) -> tuple[Complex, Floats, Floats, Floats]:
+    def _nearest(self, z: Complexes, sizes: Mapping[str, Floats]) -> tuple[Complexes, Floats, Floats, Floats]:
         """Places of the nearest solved poses (nan where there is none), their unknowns, slopes and grip."""
         if not sizes or self.empty:
             return _pick(self.known[b""], z)
@@ -214,7 +213,7 @@ class Atlas:
             design, lattice, table = design[reached], lattice[reached], table[:, reached]
         return self._grown(sizes, design, lattice, table)
 
-    def _grown(self, sizes: Mapping[str, Floats], design: Ints, lattice: Complex, table: Floats) -> list[_Poses]:
+    def _grown(self, sizes: Mapping[str, Floats], design: Ints, lattice: Complexes, table: Floats) -> list[_Poses]:
         """Poses of all designs, from solved ones to their neighbours on the lattice until nothing more closes."""
         count = max((len(value) for value in sizes.values()), default=1)
         seen = set(zip(design.tolist(), lattice.tolist(), strict=True))
@@ -255,7 +254,7 @@ class Atlas:
             found.append(_Poses(tree, table[:, lanes], slopes[:, :, lanes], lattice[lanes], grip[lanes]))
         return found
 
-    def _slopes(self, lattice: Complex, sizes: Mapping[str, Floats], table: Floats) -> Floats:
+    def _slopes(self, lattice: Complexes, sizes: Mapping[str, Floats], table: Floats) -> Floats:
         """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
         h = STEP * self.plan.core.size
         z = self.origin + self.spacing * lattice
@@ -292,7 +291,7 @@ class Atlas:
         return found
 
 
-def _pick(poses: _Poses, z: Complex) -> tuple[Complex, Floats, Floats, Floats]:
+def _pick(poses: _Poses, z: Complexes) -> tuple[Complexes, Floats, Floats, Floats]:
     """Place, unknowns, slopes and grip of the pose nearest to each place; nan where there is none."""
     if not poses.tree.n:
         shape = (len(poses.table), len(z))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.workspace.meetings import Meetings
-from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, trace
+from mechdesign.analyses.workspace.rays import Designs, Intervals, trace
 from mechdesign.errors import AssemblyError
+from mechdesign.numerics.arrays import Floats, Ints
 
 # Panel ends nearer to each other than this are one (radians): what lies between them is lost in rounding.
 TOGETHER = 1e-7

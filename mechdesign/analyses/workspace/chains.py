@@ -6,11 +6,9 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Complex = NDArray[np.complex128]
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
+
 # Places nearer than this (rows or columns of a grid) are one: that of a dip is known to about half the digits.
 SAME = 1e-6
 # Ends of curves nearer than this many of their last steps belong together.
@@ -54,7 +52,7 @@ def chains(places: Floats, pairs: Ints) -> list[Floats]:
     return found
 
 
-def joined(curves: Sequence[Complex], exact: float) -> list[Complex]:
+def joined(curves: Sequence[Complexes], exact: float) -> list[Complexes]:
     """Curves with those whose ends meet put together; one whose own ends meet is closed. Single points come last.
 
     Parameters
@@ -95,5 +93,5 @@ def joined(curves: Sequence[Complex], exact: float) -> list[Complex]:
     return [curve for curve, keep in zip(rest, left, strict=True) if keep] + points
 
 
-def _last(curve: Complex, end: int) -> float:
+def _last(curve: Complexes, end: int) -> float:
     return float(abs(curve[1] - curve[0]) if end == 0 else abs(curve[-1] - curve[-2]))

@@ -12,15 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.workspace.chains import SAME, chains
 from mechdesign.analyses.workspace.minima import CROSSED, TOUCHED, dips
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.roots import bracketed_roots
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 # Values at fractional rows and columns of a grid.
 Function = Callable[[Floats, Floats], Floats]
 # Roots are found to this part of a grid line's piece; one where the function does not vanish is a gap in its domain.

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.panels import Panels
 from mechdesign.analyses.workspace.pieces import Pieces
-from mechdesign.analyses.workspace.rays import SAME, Designs, Floats, Intervals, Ints, trace
+from mechdesign.analyses.workspace.rays import SAME, Designs, Intervals, trace
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 SLACK = 1e-9
 # Rays of the narrowest panel; and how far inside its ends it is traced where the ends themselves are degenerate.
@@ -43,7 +43,7 @@ class Patch:
     leaves: int
     piece: int = 1
 
-    def grid(self, about: complex) -> NDArray[np.complex128]:
+    def grid(self, about: complex) -> Complexes:
         """Nodes, shape (rays, GRID), denser towards both curves."""
         radius = self.inner[:, None] + self.fractions() * (self.outer - self.inner)[:, None]
         return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
@@ -53,7 +53,7 @@ class Patch:
         k = int(np.argmax(self.outer - self.inner))
         return complex(about + 0.5 * (self.inner[k] + self.outer[k]) * np.exp(1j * self.theta[k]))
 
-    def holds(self, z: NDArray[np.complex128], about: complex) -> NDArray[np.bool_]:
+    def holds(self, z: Complexes, about: complex) -> Flags:
         """Which places lie in the patch, as far as its rays tell."""
         radius, theta = np.abs(z - about), self.theta[0] + (np.angle(z - about) - self.theta[0]) % (2 * np.pi)
         inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.field import Field
 from mechdesign.analyses.workspace.panels import Effort, find_panels
 from mechdesign.analyses.workspace.rays import Designs, trace
 from mechdesign.analyses.workspace.region import BRISK, Answer, Question, answer
 from mechdesign.mechanism.derivatives import regularity
+from mechdesign.numerics.arrays import Complexes
 
 # Poses no more regular than this (0 at a singularity, at most 1) are singular but for rounding.
 REGULAR = 1e-10
@@ -37,7 +37,7 @@ def singular_everywhere(question: Question) -> bool:
     return singular(field, z)
 
 
-def singular(field: Field, z: NDArray[np.complex128]) -> bool:
+def singular(field: Field, z: Complexes) -> bool:
     """Whether the mechanism is in a forward singularity with its point at each of the places `z`."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         return bool((np.asarray(regularity(field.mechanism.linearize(field.configuration(z, {})))) <= REGULAR).all())

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from mechdesign.numerics.arrays import Floats, Ints
+
 # Steps of the search for the lowest place between three samples.
 STEPS = 24
 GOLDEN = 0.5 * (3 - np.sqrt(5))

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.workspace.curves import GRID, Patch
 from mechdesign.analyses.workspace.field import Field
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.roots import bracketed_roots
 
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 # How far the boundary may lie from where it is interpolated (far only where a ray is nearly tangent to it), the nearest
 # first; and how exactly it is found: parts of the interval.
 WIDE, ACCURACY = (1e-4, 1e-3, 1e-2, 0.1), 1e-15
@@ -44,7 +42,7 @@ class Ends:
     field: Field
     about: complex
     patch: Patch
-    determinant: Callable[[Complex], Floats]
+    determinant: Callable[[Complexes], Floats]
 
     @cached_property
     def _curves(self) -> Callable[[Floats], Floats]:
@@ -52,7 +50,7 @@ class Ends:
 
         return CubicSpline(self.patch.theta, np.stack([self.patch.inner, self.patch.outer]), axis=1)
 
-    def extended(self, curve: Complex, row: Floats, column: Floats) -> Complex:
+    def extended(self, curve: Complexes, row: Floats, column: Floats) -> Complexes:
         """A curve, given by its points and their rows and columns, to the boundary where it ends beside it."""
         if len(curve) < 2 or curve[0] == curve[-1]:
             return curve
@@ -101,7 +99,7 @@ class Ends:
         ends = self._curves(theta)
         middle, way = ends[int(outside)], ends[int(not outside)] - ends[int(outside)]
 
-        def evaluate(which: NDArray[np.intp], t: Floats) -> Floats:
+        def evaluate(which: Ints, t: Floats) -> Floats:
             z = self.about + (middle[which] + t * way[which]) * np.exp(1j * theta[which])
             return np.asarray(self.field.margins(np.asarray(z), {})[margin])
 
@@ -115,7 +113,7 @@ class Ends:
         met = np.isfinite(wide)
         t = nan.copy()
 
-        def inside(which: NDArray[np.intp], t: Floats) -> Floats:
+        def inside(which: Ints, t: Floats) -> Floats:
             return evaluate(every[met][which], t)
 
         t[met] = bracketed_roots(

@@ -13,10 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.meetings import ROOTS, parabola
-from mechdesign.analyses.workspace.rays import Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Margins (margins + 2, n) of rays at radii and values; the last two are zero at the lower and upper end of the range.
 Margins = Callable[[Ints, Floats, Floats], Floats]
@@ -75,7 +74,7 @@ class Starts:
     outwards: Floats
     reach: Floats
     step: float
-    singular: NDArray[np.bool_]
+    singular: Flags
 
 
 def extended(margins: Margins, cut: Cut, at: Starts, alone: bool) -> tuple[Floats, Floats, Ints]:
@@ -158,7 +157,7 @@ def extended(margins: Margins, cut: Cut, at: Starts, alone: bool) -> tuple[Float
     return radius, value, pair
 
 
-def _farthest(ray: Ints, place: Floats, use: NDArray[np.bool_]) -> Ints:
+def _farthest(ray: Ints, place: Floats, use: Flags) -> Ints:
     """Which is farthest of those to be used of each ray."""
     order = np.lexsort((place, ray))
     order = order[use[order]]
@@ -166,7 +165,7 @@ def _farthest(ray: Ints, place: Floats, use: NDArray[np.bool_]) -> Ints:
     return last
 
 
-def _clear(margins: Margins, ray: Ints, names: Ints, r: Floats, v: Floats, alone: bool) -> NDArray[np.bool_]:
+def _clear(margins: Margins, ray: Ints, names: Ints, r: Floats, v: Floats, alone: bool) -> Flags:
     """Whether no other margin is negative; if they may be, those of the range's ends only."""
     found, lane = margins(ray, r, v), np.arange(len(ray))
     size = np.where(np.isfinite(found), np.abs(found), 0.0).max(axis=0, initial=0.0)
@@ -177,7 +176,7 @@ def _clear(margins: Margins, ray: Ints, names: Ints, r: Floats, v: Floats, alone
 
 def _newton(
     margins: Margins, rays: Ints, names: Ints, radius: Floats, value: Floats, at: Starts
-) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+) -> tuple[Floats, Floats, Flags, Flags]:
     """Radius and value where two margins are zero, or one and its slope over the range; if met; if it is extreme."""
     r, v = radius.copy(), value.copy()
     good, left = np.zeros(len(rays), dtype=bool), np.arange(len(rays))

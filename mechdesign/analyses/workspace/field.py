@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.atlas import Atlas, hidden
 from mechdesign.analyses.workspace.indices.local import Entries, Local
@@ -20,6 +19,7 @@ from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rates import Rates
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 Places = Mapping[str, Value]
 # Determinants below this part of the largest of those at some distances (of the mechanism's size) from the point's
@@ -57,7 +57,7 @@ class Field:
         """Coordinates whose Jacobian is meant: the point's, then the held ones."""
         return self.plan.structure.given
 
-    def configuration(self, z: NDArray[np.complex128], places: Places) -> Configuration:
+    def configuration(self, z: Complexes, places: Places) -> Configuration:
         """The mechanism with its point at `z`; outside the region what can still be computed is given.
 
         Unlike `Plan.solve` this leaves finite what does not depend on a leg that cannot reach, so that margins keep
@@ -90,7 +90,7 @@ class Field:
     def _atlas(self) -> Atlas:
         return Atlas.of(self.plan, self.held)
 
-    def margins(self, z: NDArray[np.complex128], places: Places, *, assembly: bool = True) -> NDArray[np.float64]:
+    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
         """All margins at points `z`, shape (margins, *z.shape), in the order of `labels`; nan where unknown.
 
         Those of the assembly come last and may be left out.
@@ -133,7 +133,7 @@ class Field:
         return tuple(found)
 
     @cached_property
-    def singular(self) -> NDArray[np.bool_]:
+    def singular(self) -> Flags:
         """Which margins end where a leg is stretched or folded, so that indices have square roots there."""
         closures = len(self._closure_names())
         return np.arange(len(self.labels)) < closures
@@ -163,7 +163,7 @@ class Field:
         return [float(np.sign(d)) for d in self._determinants(sketch)]
 
     @cached_property
-    def rounding(self) -> NDArray[np.float64]:
+    def rounding(self) -> Floats:
         """Values of each margin that have no sign of their own: of determinants what rounding leaves, else 0.
 
         A determinant may touch zero along a whole curve (cranks that meet in one pin while the point goes round it);
@@ -182,7 +182,7 @@ class Field:
     def _determinants(self, configuration: Configuration) -> list[Value]:
         return determinants(self.mechanism.linearize(configuration))
 
-    def local(self, z: NDArray[np.complex128], places: Places) -> Local:
+    def local(self, z: Complexes, places: Places) -> Local:
         """What local indices at points `z` are computed from."""
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             configuration = self.configuration(z, places)

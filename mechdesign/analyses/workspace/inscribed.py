@@ -13,13 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.curves import Patch
 from mechdesign.analyses.workspace.field import Field
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 # Cells of the raster along each side, and how many of its best places are tried.
 CELLS, TRIALS = 96, 4
 # Samples of a border; those of rectangles lie at its corners, too.
@@ -68,8 +66,8 @@ class _Shape:
     `size` is what shall be large, with its slopes.
     """
 
-    points: Callable[[Floats, Floats], Complex]
-    slopes: Callable[[Floats], Complex]
+    points: Callable[[Floats, Floats], Complexes]
+    slopes: Callable[[Floats], Complexes]
     size: Callable[[Floats], tuple[float, Floats]]
 
 
@@ -103,7 +101,7 @@ def inscribed(
     size = max(high.real - low.real, high.imag - low.imag)
     sector = _sector(about, scan, size)
 
-    def margins(z: Complex) -> Floats:
+    def margins(z: Complexes) -> Floats:
         return np.concatenate([field.margins(z, {}), sector(z)])
 
     # With a cell more all round, so that what ends the region along a side of its box is met, too.
@@ -151,21 +149,21 @@ def _holds(outside: Floats, size: float) -> bool:
     return bool((outside < -POINT * size).any())
 
 
-def _sector(about: complex, scan: tuple[float, float], size: float) -> Callable[[Complex], Floats]:
+def _sector(about: complex, scan: tuple[float, float], size: float) -> Callable[[Complexes], Floats]:
     """Margins of a scan of less than a turn: distances from its sides (beyond half a turn one is enough)."""
     start, stop = (np.exp(1j * angle) for angle in scan)
     span = scan[1] - scan[0]
     if span >= 2 * np.pi * (1 - 1e-12):
         return lambda z: np.zeros((0, *z.shape))
 
-    def margins(z: Complex) -> Floats:
+    def margins(z: Complexes) -> Floats:
         left, right = ((z - about) * np.conj(start)).imag, -((z - about) * np.conj(stop)).imag
         return np.stack([left, right]) if span <= np.pi * (1 + 1e-12) else np.maximum(left, right)[None]
 
     return margins
 
 
-def _discs(free: NDArray[np.bool_], dx: float, dy: float) -> list[tuple[int, int, float]]:
+def _discs(free: Flags, dx: float, dy: float) -> list[tuple[int, int, float]]:
     """Cells far from the boundary, the farthest first, none within another's circle: column, row, distance."""
     from scipy.ndimage import distance_transform_edt
 
@@ -190,7 +188,7 @@ def _thin(patches: Sequence[Patch], about: complex, x: Floats, y: Floats) -> tup
     return (int(np.argmin(np.abs(x - z.real))), int(np.argmin(np.abs(y - z.imag))), float(x[1] - x[0]))
 
 
-def _boxes(free: NDArray[np.bool_]) -> list[tuple[int, int, int, int]]:
+def _boxes(free: Flags) -> list[tuple[int, int, int, int]]:
     """Large rectangles of free cells, the largest first, each with its middle outside those before it.
 
     Per row the largest that stands on it, by the stack of rising columns: first column, row, last column, row.
@@ -217,11 +215,11 @@ def _boxes(free: NDArray[np.bool_]) -> list[tuple[int, int, int, int]]:
     return kept[:TRIALS]
 
 
-def _circle_points(p: Floats, u: Floats) -> Complex:
+def _circle_points(p: Floats, u: Floats) -> Complexes:
     return np.asarray(complex(p[0], p[1]) + p[2] * np.exp(2j * np.pi * u))
 
 
-def _circle_slopes(u: Floats) -> Complex:
+def _circle_slopes(u: Floats) -> Complexes:
     return np.stack([np.ones(len(u)), np.full(len(u), 1j), np.exp(2j * np.pi * u)])
 
 
@@ -231,12 +229,12 @@ def _sides(u: Floats) -> tuple[Floats, Floats]:
     return np.clip(np.minimum(v, 3 - v), 0, 1), np.clip(np.minimum(v - 1, 4 - v), 0, 1)
 
 
-def _rectangle_points(p: Floats, u: Floats) -> Complex:
+def _rectangle_points(p: Floats, u: Floats) -> Complexes:
     a, b = _sides(u)
     return np.asarray(p[0] + a * (p[1] - p[0]) + 1j * (p[2] + b * (p[3] - p[2])))
 
 
-def _rectangle_slopes(u: Floats) -> Complex:
+def _rectangle_slopes(u: Floats) -> Complexes:
     a, b = _sides(u)
     return np.stack([1 - a + 0j, a + 0j, 1j * (1 - b), 1j * b])
 
@@ -254,7 +252,7 @@ RECTANGLE = _Shape(_rectangle_points, _rectangle_slopes, _area)
 
 @dataclass(frozen=True)
 class _Grow:
-    margins: Callable[[Complex], Floats]
+    margins: Callable[[Complexes], Floats]
     size: float
 
     def best(self, shape: _Shape, start: Floats) -> Floats | None:
@@ -292,14 +290,14 @@ class _Grow:
             p = answer.x
         return p * self.size if depth > -LATE else None
 
-    def _with_slopes(self, z: Complex) -> tuple[Floats, Floats, Floats]:
+    def _with_slopes(self, z: Complexes) -> tuple[Floats, Floats, Floats]:
         """Margins and their slopes along x and y, by parts of the size."""
         h = STEP * self.size
         around = self.margins(z[:, None] + np.array([0, h, -h, 1j * h, -1j * h]))
         x, y = (around[..., 1] - around[..., 2]) / (2 * STEP), (around[..., 3] - around[..., 4]) / (2 * STEP)
         return around[..., 0], x, y
 
-    def _distances(self, z: Complex) -> Floats:
+    def _distances(self, z: Complexes) -> Floats:
         """Margins over their slopes: about the distance to the border, in parts of the size."""
         value, x, y = self._with_slopes(z)
         steep = np.hypot(x, y)
@@ -307,7 +305,7 @@ class _Grow:
         known = np.isfinite(steep) & (steep > FLAT * np.abs(value))
         return np.where(known, value / np.where(known, steep, 1.0), 1.0)
 
-    def _constraints(self, shape: _Shape, p: Floats, u: Floats, which: NDArray[np.intp]) -> Mapping[str, Any]:
+    def _constraints(self, shape: _Shape, p: Floats, u: Floats, which: Ints) -> Mapping[str, Any]:
         """The margins at places of the border, each divided by its slope as it is now."""
         lane, along = np.arange(len(u)), shape.slopes(u)
         _, x, y = self._with_slopes(self.size * shape.points(p, u))
@@ -325,7 +323,7 @@ class _Grow:
 
         return {"type": "ineq", "fun": values, "jac": slopes}
 
-    def _lowest(self, shape: _Shape, p: Floats, u: Floats) -> tuple[Floats, NDArray[np.intp], float]:
+    def _lowest(self, shape: _Shape, p: Floats, u: Floats) -> tuple[Floats, Ints, float]:
         """Places of the border where a margin is smallest, the margins, and the lowest of them all."""
         values = self._distances(self.size * shape.points(p, u))
         low = (values <= np.roll(values, 1, axis=1)) & (values < np.roll(values, -1, axis=1))
@@ -356,7 +354,7 @@ class _Grow:
         better = depth < lowest
         return np.where(better, vertex, place) % 1.0, which, float(np.minimum(depth, lowest).min())
 
-    def _fewer(self, u: Floats, which: NDArray[np.intp]) -> tuple[Floats, NDArray[np.intp]]:
+    def _fewer(self, u: Floats, which: Ints) -> tuple[Floats, Ints]:
         """The latest of places that lie beside each other."""
         kept: list[int] = []
         for k in range(len(u) - 1, -1, -1):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.workspace.indices import Local, Prepared
-from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.numerics.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.chains import joined
 from mechdesign.analyses.workspace.contours import zero_curves
@@ -22,9 +21,8 @@ from mechdesign.analyses.workspace.field import Field
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.structure import Group
+from mechdesign.numerics.arrays import Complexes, Floats
 
-Complex = NDArray[np.complex128]
-Floats = NDArray[np.float64]
 FORWARD, INVERSE = "forward", "inverse"
 # Ends of curves this near to each other, as a part of the region, are one.
 SAME = 1e-8
@@ -49,7 +47,7 @@ class Locus:
 
     kind: str
     cause: str
-    points: Complex
+    points: Complexes
 
 
 def causes(field: Field) -> list[tuple[str, str]]:
@@ -97,17 +95,17 @@ def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus
     if field.same_assembly or not names or all(singular(field, patch.grid(about)) for patch in patches):
         return []
 
-    def values(z: Complex) -> Floats:
+    def values(z: Complexes) -> Floats:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             found = determinants(field.mechanism.linearize(field.configuration(z, {})))
         return np.stack([np.broadcast_to(np.asarray(d, dtype=float), z.shape) for d in found])
 
-    curves: list[list[Complex]] = [[] for _ in names]
+    curves: list[list[Complexes]] = [[] for _ in names]
     for patch in patches:
         grid, place = patch.grid(about), _places(patch, about)
         for k, at_nodes in enumerate(values(grid)):
 
-            def determinant(z: Complex, k: int = k) -> Floats:
+            def determinant(z: Complexes, k: int = k) -> Floats:
                 return np.asarray(values(z)[k])
 
             seams = _seams(at_nodes)
@@ -123,7 +121,7 @@ def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus
     ]
 
 
-def _places(patch: Patch, about: complex) -> Callable[[Floats, Floats], Complex]:
+def _places(patch: Patch, about: complex) -> Callable[[Floats, Floats], Complexes]:
     """Points of the plane at fractional rows and columns of a patch's grid."""
     from scipy.interpolate import CubicSpline
 
@@ -131,7 +129,7 @@ def _places(patch: Patch, about: complex) -> Callable[[Floats, Floats], Complex]
     columns = np.arange(len(fractions))
     inner, outer = CubicSpline(patch.theta, patch.inner), CubicSpline(patch.theta, patch.outer)
 
-    def place(row: Floats, column: Floats) -> Complex:
+    def place(row: Floats, column: Floats) -> Complexes:
         theta, fraction = np.interp(row, rows, patch.theta), np.interp(column, columns, fractions)
         low = inner(theta)
         return np.asarray(about + (low + fraction * (outer(theta) - low)) * np.exp(1j * theta))
@@ -158,9 +156,9 @@ def _seams(values: Floats) -> list[tuple[int, int, int]]:
     return found
 
 
-def _once(curves: Sequence[Complex], exact: float) -> list[Complex]:
+def _once(curves: Sequence[Complexes], exact: float) -> list[Complexes]:
     """Curves without those that repeat another (the seam of two patches)."""
-    kept: list[Complex] = []
+    kept: list[Complexes] = []
     for curve in curves:
         ends = {0: (curve[0], curve[-1]), 1: (curve[-1], curve[0])}
         if not any(
@@ -175,7 +173,7 @@ def _once(curves: Sequence[Complex], exact: float) -> list[Complex]:
 def around(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus]:
     """Singularities that bound a region, as curves."""
     told = causes(field)
-    pieces: list[tuple[str, str, Complex]] = []
+    pieces: list[tuple[str, str, Complexes]] = []
     for patch in patches:
         for radius, margin in ((patch.inner, patch.enters), (patch.outer, patch.leaves)):
             if margin >= 0 and told[margin][0] != "limit":

@@ -12,11 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.workspace.field import Places
-from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints
+from mechdesign.analyses.workspace.rays import Designs, Intervals
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.roots import bracketed_roots
 
 # They meet on a ray itself where what should be zero is this small a part of what it is on the other ray.
 ZERO = 1e-11
@@ -61,7 +61,7 @@ class Meetings:
     span: Floats
 
     @staticmethod
-    def between(intervals: Intervals, codes: Ints, left: Ints, leading: NDArray[np.bool_]) -> Meetings:
+    def between(intervals: Intervals, codes: Ints, left: Ints, leading: Flags) -> Meetings:
         """What may meet between the rays `left` and those that follow them, by how they differ.
 
         Parameters
@@ -166,7 +166,7 @@ def _ends(intervals: Intervals, rays: Ints) -> tuple[list[int], Floats]:
 
 
 def _differences(
-    pair: Ints, here: tuple[list[int], Floats], there: tuple[list[int], Floats], leading: NDArray[np.bool_]
+    pair: Ints, here: tuple[list[int], Floats], there: tuple[list[int], Floats], leading: Flags
 ) -> Iterator[Meetings]:
     """What may meet between rays that all have the ends `here` and rays that have the ends `there`."""
     forward = len(here[0]) <= len(there[0])

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
+from mechdesign.numerics.arrays import Floats, Ints
+
 # Values of the function of some lanes (indices) at places of shape (axes, lanes, samples).
 Sample = Callable[[Ints, Floats], Floats]
 # Samples along an axis about the lowest one, and the share of their range that is left after each round: on a line,

@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.breaks import TOGETHER, Search, signatures
 from mechdesign.analyses.workspace.raster import Raster
-from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, curved, trace
+from mechdesign.analyses.workspace.rays import Designs, Intervals, curved, trace
 from mechdesign.errors import AssemblyError
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 PROBES = 4
 DOUBLINGS = 16
@@ -68,7 +68,7 @@ class Panels:
     low: Floats
     high: Floats
     reach: Floats
-    closes: NDArray[np.bool_]
+    closes: Flags
     intervals: Ints
     seen: Floats
 

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.indices import Local, Prepared
 from mechdesign.analyses.workspace.panels import Panels
-from mechdesign.analyses.workspace.rays import Designs, Floats, Ints, trace
+from mechdesign.analyses.workspace.rays import Designs, trace
 from mechdesign.analyses.workspace.rules import cosine, cubic, spread
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Places in the maps stay this far from the ends: rounding leaves nothing nearer to corners, or to the boundary.
 EDGE_U, EDGE_V = 1e-3, 1e-5
@@ -63,7 +63,7 @@ class _Places:
     u: Floats
     v: Floats
 
-    def pick(self, index: Ints | NDArray[np.bool_]) -> _Places:
+    def pick(self, index: Ints | Flags) -> _Places:
         return _Places(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
 
 
@@ -73,7 +73,7 @@ def find_peaks(
     indices: Sequence[Prepared],
     samples: int,
     tolerance: float,
-    wanted: NDArray[np.bool_],
+    wanted: Flags,
 ) -> Peaks:
     """Extremes of indices over the regions.
 

@@ -11,12 +11,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.panels import Panels
-from mechdesign.analyses.workspace.rays import SAME, Designs, Floats, Intervals, Ints, trace
+from mechdesign.analyses.workspace.rays import SAME, Designs, Intervals, trace
 from mechdesign.analyses.workspace.rules import cubic, spread
 from mechdesign.mechanism.variant import drawn, elsewhere
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Rays beside the ends of panels (radians, but never more than this part of the panel), until one meets what the panel's
 # other rays meet. Nearer than the first, breaks have been put together.
@@ -51,7 +51,7 @@ class Pieces:
     panels: Panels
     scan: tuple[float, float]
     number: Ints
-    drawn: NDArray[np.bool_]
+    drawn: Flags
     slots: Ints
     piece: Ints
 
@@ -218,7 +218,7 @@ class Pieces:
         held[known[found.ray[inside]]] = slot[inside]
         return held
 
-    def _sketched(self, design: Ints) -> NDArray[np.complex128]:
+    def _sketched(self, design: Ints) -> Complexes:
         """The point's place in the sketch of each design: its drives as drawn, as far as it can be assembled so."""
         field, places = self.designs.field, self.designs.of(design)
         mechanism, (x, y) = field.mechanism, field.outputs[:2]
@@ -311,7 +311,7 @@ def _is_turn(scan: tuple[float, float]) -> bool:
     return scan[1] - scan[0] >= 2 * np.pi * (1 - 1e-12)
 
 
-def _doubtful(panels: Panels, scan: tuple[float, float], count: int) -> NDArray[np.bool_]:
+def _doubtful(panels: Panels, scan: tuple[float, float], count: int) -> Flags:
     """Designs whose region may have several pieces: several intervals a ray, or rays between that meet nothing."""
     doubtful = np.bincount(panels.design[panels.intervals != 1], minlength=count) > 0
     apart = panels.low[1:] != panels.high[:-1]

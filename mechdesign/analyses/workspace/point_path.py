@@ -7,19 +7,18 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.boundaries import Boundary, boundaries
 from mechdesign.analyses.kinematics.margins import Margins
 from mechdesign.analyses.poses import in_study_units
-from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.mechanism.outputs import first
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup
 
-Floats = NDArray[np.float64]
 # Poses in which the motion is looked for, a turn; rows of the table of one path.
 POSES, ROWS = 720, 361
 # Gauss nodes of the arc length: doubled from the first to the last until two agree to the tolerance.
@@ -208,7 +207,7 @@ def _turns(path: _Path) -> tuple[Floats, Floats]:
     for axis in (0, 1):
         cell = np.flatnonzero(speed[axis, 1:] * speed[axis, :-1] < 0)
 
-        def slope(which: NDArray[np.intp], at: Floats, axis: int = axis) -> Floats:
+        def slope(which: Ints, at: Floats, axis: int = axis) -> Floats:
             part: Floats = path.speed(at)[axis]
             return part
 

@@ -18,13 +18,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.integrands import Integrand
 from mechdesign.analyses.workspace.panels import Panels
 from mechdesign.analyses.workspace.radial import BLOCK, RADII, along, evaluate, pieces
-from mechdesign.analyses.workspace.rays import Designs, Floats, Ints, trace
+from mechdesign.analyses.workspace.rays import Designs, trace
 from mechdesign.analyses.workspace.rules import Rule, cubic, spread
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 ANGLES = Rule.of(20, 4, 6.0)
 MOST_PASSES = 24
@@ -94,7 +94,7 @@ def integrate(
     samples: int,
     counted: tuple[float, float],
     integrands: Sequence[Integrand],
-    endless: NDArray[np.bool_],
+    endless: Flags,
     whole: float = 0.0,
 ) -> Integral:
     """Area and means of local indices of every design, to a relative tolerance.

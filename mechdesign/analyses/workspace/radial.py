@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.integrands import Integrand
-from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, clearances
+from mechdesign.analyses.workspace.rays import Designs, Intervals, clearances
 from mechdesign.analyses.workspace.rules import Rule, cosine
 from mechdesign.mechanism.algebra import Value
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 RADII = Rule.of(11, 2, 0.5)
 # Pieces evaluated at once (11 nodes each).
@@ -35,7 +35,7 @@ NEAR = 0.5
 
 # Integrals and their estimated errors (integrands, pieces); the place of the kink, in [-1, 1], and whether that is a
 # forward singularity (pieces).
-Integrals = tuple[Floats, Floats, Floats, NDArray[np.bool_]]
+Integrals = tuple[Floats, Floats, Floats, Flags]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class Pieces:
     start: Floats
     stop: Floats
 
-    def pick(self, index: NDArray[np.bool_] | Ints | slice) -> Pieces:
+    def pick(self, index: Flags | Ints | slice) -> Pieces:
         """Pieces by index."""
         return Pieces(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
 
@@ -94,7 +94,7 @@ class Pieces:
         return np.minimum(self.origin, self.origin + self.span), np.maximum(self.origin, self.origin + self.span)
 
 
-def pieces(intervals: Intervals, reach: Floats, singular: NDArray[np.bool_]) -> Pieces:
+def pieces(intervals: Intervals, reach: Floats, singular: Flags) -> Pieces:
     """The intervals of rays, in halves where a further singularity (of the margins `singular`) is near an end."""
     below, above = clearances(intervals, reach, singular)
     inner, outer = intervals.inner, intervals.outer
@@ -163,9 +163,7 @@ def along(
     return value, error, looked * len(RADII.nodes)
 
 
-def _refined(
-    designs: Designs, design: Ints, theta: Floats, parts: Pieces, share: Floats, crossed: NDArray[np.bool_]
-) -> Floats:
+def _refined(designs: Designs, design: Ints, theta: Floats, parts: Pieces, share: Floats, crossed: Flags) -> Floats:
     """Where to split: the ridge or singularity near `share` (of [-1, 1]) of pieces; the middle where that is 0."""
     at = 0.5 * (parts.start + parts.stop) + 0.5 * (parts.stop - parts.start) * share
     ridges = np.flatnonzero(share)

@@ -14,16 +14,15 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.across import Across
 from mechdesign.analyses.workspace.curves import SLACK
 from mechdesign.analyses.workspace.extremes import Starts, extended
 from mechdesign.analyses.workspace.field import Field, Places
-from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints, trace
+from mechdesign.analyses.workspace.rays import Designs, Intervals, trace
 from mechdesign.analyses.workspace.slices import VALUE, Lanes, Misses, Sliced, Stretches, as_intervals, merged
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
-Complex = NDArray[np.complex128]
 # Values of the range that are looked at everywhere, and rounds in which others are put between.
 VALUES, ROUNDS = 25, 6
 # Rays are told apart to this angle (radians).
@@ -75,11 +74,11 @@ class Endings(Field):
         return np.asarray(np.where((high < count) & (high > low), (3 + low) * count + high, single))
 
     @property
-    def singular(self) -> NDArray[np.bool_]:
+    def singular(self) -> Flags:
         """No square roots are looked for."""
         return np.zeros(len(self.labels), dtype=bool)
 
-    def margins(self, z: Complex, places: Places, *, assembly: bool = True) -> Floats:
+    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
         """Unknown, shape (labels, *z.shape): nothing but rays tells where labels change."""
         return np.broadcast_to(np.nan, (len(self.labels), *z.shape))
 
@@ -88,7 +87,7 @@ class Endings(Field):
 class RangedDesigns(Designs):
     """Rays through a region over a range: `field` is of `Endings`, and so are the labels of what rays meet."""
 
-    def inside(self, z: Complex, design: Ints) -> NDArray[np.bool_]:
+    def inside(self, z: Complexes, design: Ints) -> Flags:
         """As `Designs.inside`, by single values of the range."""
         field = self.field
         assert isinstance(field, Endings)

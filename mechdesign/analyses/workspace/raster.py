@@ -11,13 +11,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.workspace.rays import Designs, Floats, Intervals, Ints
+from mechdesign.analyses.workspace.rays import Designs, Intervals
 from mechdesign.analyses.workspace.reach import box
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
-Flags = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
 # Cells looked at at once.
 BLOCK = 1 << 17
 # Share of their area by which cells on the boundary may be miscounted, if they all err alike.
@@ -40,8 +38,8 @@ class Raster:
         Whether a cell's centre lies in the region.
     """
 
-    low: Complex
-    cell: Complex
+    low: Complexes
+    cell: Complexes
     inside: Flags
 
     @staticmethod
@@ -134,7 +132,7 @@ class Raster:
             angles.append(theta[cells[chosen], lanes[chosen]])
         return np.concatenate(owners), np.concatenate(angles)
 
-    def _centres(self, designs: Ints) -> Iterator[tuple[Ints, Complex]]:
+    def _centres(self, designs: Ints) -> Iterator[tuple[Ints, Complexes]]:
         """Some of the designs, and centres of their cells, shape (cells, designs), row by row."""
         size = self.inside.shape[1]
         place = np.arange(size) + 0.5
@@ -168,6 +166,6 @@ class _Held:
         return held
 
 
-def _within(way: Complex, scan: tuple[float, float]) -> Flags:
+def _within(way: Complexes, scan: tuple[float, float]) -> Flags:
     """Whether places seen from the centre of a scan lie between its first and last ray."""
     return np.asarray((np.angle(way) - scan[0]) % (2 * np.pi) <= scan[1] - scan[0])

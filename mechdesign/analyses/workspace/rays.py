@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.roots import bracketed_roots
 from mechdesign.analyses.workspace.dips import Brackets, hidden_places, rounded, sign_changes
 from mechdesign.analyses.workspace.field import Field, Places
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.roots import bracketed_roots
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.intp]
 # Rays traced at once, measured: fewer cost more in calls than their smaller arrays save.
 BLOCK = 8192
 ROUNDING = 1e-14
@@ -57,7 +55,7 @@ class Designs:
         """Dimensions of the designs `index`, in the shape of `index`."""
         return {name: np.asarray(value)[index] for name, value in self.places.items()}
 
-    def inside(self, z: NDArray[np.complex128], design: Ints) -> NDArray[np.bool_]:
+    def inside(self, z: Complexes, design: Ints) -> Flags:
         """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
         field, places = self.field, self.of(design)
         both = field.plan.iterative or not field.same_assembly
@@ -97,7 +95,7 @@ class Intervals:
     outer: Floats
     enters: Ints
     leaves: Ints
-    beyond: NDArray[np.bool_]
+    beyond: Flags
     crossings: tuple[Ints, Floats, Ints, Ints]
 
     @property
@@ -105,7 +103,7 @@ class Intervals:
         """Intervals of each ray."""
         return np.bincount(self.ray, minlength=len(self.beyond))
 
-    def kept(self, keep: NDArray[np.bool_]) -> Intervals:
+    def kept(self, keep: Flags) -> Intervals:
         """Some of the intervals, on the same rays."""
         if keep.all():
             return self
@@ -163,13 +161,13 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
     return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
 
 
-def curved(designs: Designs, design: Ints, theta: Floats, reach: Floats) -> NDArray[np.bool_]:
+def curved(designs: Designs, design: Ints, theta: Floats, reach: Floats) -> Flags:
     """Which margins (but those of the assembly) are not quadratic along which rays; shape (margins, rays)."""
     z = designs.about + FIVE[:, None] * reach * np.exp(1j * theta)
     return ~_parabolas(designs.field.margins(z, designs.of(design), assembly=False))[0]
 
 
-def _parabolas(values: Floats) -> tuple[NDArray[np.bool_], tuple[Floats, Floats, Floats]]:
+def _parabolas(values: Floats) -> tuple[Flags, tuple[Floats, Floats, Floats]]:
     """Coefficients of a + b x + c x^2 through margins at x = 0, 1/2, 1, and which margins are such on each ray.
 
     Differences of squared distances are quadratic along a ray; the samples at 1/4 and 3/4 tell.
@@ -199,9 +197,9 @@ def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints,
 def _others(
     designs: Designs,
     places: Places,
-    direction: NDArray[np.complex128],
+    direction: Complexes,
     found: Intervals,
-    quadratic: NDArray[np.bool_],
+    quadratic: Flags,
     samples: int,
     thin: Floats,
     reach: Floats,
@@ -253,9 +251,7 @@ def _others(
     return _replace(found, cut_of, part, NOTHING * reach)
 
 
-def _idle(
-    brackets: Brackets, x: Floats, positive: NDArray[np.bool_], dips: tuple[Ints, Ints, Floats, Floats]
-) -> NDArray[np.bool_]:
+def _idle(brackets: Brackets, x: Floats, positive: Flags, dips: tuple[Ints, Ints, Floats, Floats]) -> Flags:
     """Brackets over which another margin is negative, at the samples beside them and without a hidden place between."""
     negative = ~(positive[:, 1:] | positive[:, :-1])
     function, lane, place, _ = dips
@@ -348,7 +344,7 @@ def _first_named(owner: Ints, at: Floats, label: Ints, margin: Ints, ray: Ints, 
     return best
 
 
-def clearances(intervals: Intervals, reach: Floats, among: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def clearances(intervals: Intervals, reach: Floats, among: Flags) -> tuple[Floats, Floats]:
     """Distance from each interval's ends to the next root of a margin `among` some, below and above; inf where none."""
     rays, radii, margins, _ = intervals.crossings
     use = among[margins]

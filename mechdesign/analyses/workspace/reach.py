@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.workspace.rays import Designs, Floats
+from mechdesign.analyses.workspace.rays import Designs
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.model import Term
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
-Complex = NDArray[np.complex128]
 # A box is drawn wider by this share, so that rounding leaves nothing outside.
 ROOM = 1e-6
 
 
-def box(designs: Designs) -> tuple[Complex, Complex, NDArray[np.bool_]]:
+def box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
     """Corners of a box around the region of each design, shape (designs,), and whether it is known to hold all of it.
 
     Every point lies in a box. One pinned to another by a link is no farther from it than the link is long, and one that

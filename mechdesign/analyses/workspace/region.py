@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.jacobians import mixes
 from mechdesign.analyses.workspace.bounding import bounding_box
@@ -18,9 +17,10 @@ from mechdesign.analyses.workspace.panels import Effort, Panels, find_panels
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.pieces import Pieces
 from mechdesign.analyses.workspace.quadrature import Integral, integrate, simple_means
-from mechdesign.analyses.workspace.rays import Designs, Floats
+from mechdesign.analyses.workspace.rays import Designs
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.memory import keep_freed_memory
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 from mechdesign.study.workspace_models import Over, WorkspaceSection
 
@@ -288,7 +288,7 @@ def _peaks(question: Question, designs: Designs, panels: Panels, samples: int) -
     return find_peaks(designs, panels, question.indices, samples, PEAK_TOLERANCE, wanted)
 
 
-def _endless(question: Question, integrands: Sequence[Integrand], peaks: Peaks | None, count: int) -> NDArray[np.bool_]:
+def _endless(question: Question, integrands: Sequence[Integrand], peaks: Peaks | None, count: int) -> Flags:
     """Integrals that are infinite: the integrand grows at least as 1/distance towards a curve."""
     if peaks is None:
         return np.zeros((len(integrands), count), dtype=bool)

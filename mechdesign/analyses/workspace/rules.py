@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.rays import Floats
+from mechdesign.numerics.arrays import Floats
 
 # Share of an interval and its slope, over [0, 1/2], for a share of the variable.
 Map = Callable[[Floats], tuple[Floats, Floats]]

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.workspace.field import Field, Places
-from mechdesign.analyses.workspace.rays import Floats, Intervals, Ints
+from mechdesign.analyses.workspace.rays import Intervals
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
-Complex = NDArray[np.complex128]
 # The name among the dimensions by which a value of the range is given.
 VALUE = "value of the range"
 # A near miss may be a hit between two values where parabolas gain so many times what they seem to, or a little.
@@ -29,7 +28,7 @@ class Sliced(Field):
 
     which: int = 0
 
-    def margins(self, z: Complex, places: Places, *, assembly: bool = True) -> Floats:
+    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
         """All margins at points `z`, shape (margins, *z.shape); nan where unknown."""
         sizes = dict(places)
         held: list[object] = list(self.held)

@@ -11,8 +11,8 @@ from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.workspace.curves import Patch
 from mechdesign.analyses.workspace.inscribed import Circle, Rectangle
 from mechdesign.analyses.workspace.loci import around, causes, inside
-from mechdesign.analyses.workspace.rays import Floats
 from mechdesign.analyses.workspace.region import Question
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
@@ -160,9 +160,7 @@ def outlines(regions: Sequence[tuple[Study, Question, Sequence[Patch]]]) -> list
     ]  # fmt: skip
 
 
-def _drives(
-    question: Question, z: NDArray[np.complex128], within: NDArray[np.complex128], sides: NDArray[np.intp]
-) -> list[Floats]:
+def _drives(question: Question, z: Complexes, within: Complexes, sides: Ints) -> list[Floats]:
     """Drives on the boundary, or just inside where rounding opens the mechanism.
 
     Angles lie within the drive's limits; where it has none they are continuous along each side, in the turn that is

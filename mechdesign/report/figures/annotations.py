@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import shapes, style
 from mechdesign.report.figures.labels import Label, paper
 from mechdesign.report.figures.scene import GROUND, Scene, hull
@@ -127,13 +128,11 @@ def _link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
     return labels
 
 
-def obstacles(
-    axes: Axes, scene: Scene, arrows: Sequence[Arrow], travel: Mapping[str, tuple[float, float]]
-) -> NDArray[np.float64]:
+def obstacles(axes: Axes, scene: Scene, arrows: Sequence[Arrow], travel: Mapping[str, tuple[float, float]]) -> Floats:
     """Points on paper, shape (n, 2), that names should not cover: links, symbols, rails, arrows."""
     found = [_column(np.array([]))]
 
-    def at(place: complex) -> NDArray[np.float64]:
+    def at(place: complex) -> Floats:
         return paper(axes, np.array([place]))
 
     for name, link in scene.description.links.items():
@@ -169,12 +168,12 @@ def obstacles(
     return np.concatenate(found)
 
 
-def _column(places: NDArray[Any]) -> NDArray[np.float64]:
+def _column(places: NDArray[Any]) -> Floats:
     flat = np.ravel(places)
     return np.column_stack([flat.real, flat.imag])
 
 
-def _strip(ends: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+def _strip(ends: Floats, width: float) -> Floats:
     """Points over a straight strip of some width, about 4 points of paper apart."""
     run = ends[1] - ends[0]
     length = float(np.hypot(*run))

@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.sweep import ranks
 from mechdesign.results import Column, Result
@@ -33,8 +34,6 @@ _HIDDEN = 0.015  # part of its range by which a curve differs from one that cove
 _TAIL, _PEAK = 4, 6  # per cent of the poses left out at both ends, and how many times their range makes a peak
 _LIMITS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     return figure
 
 
-def _panels(study: Study, columns: list[Column], swept: str | None, x: Array) -> list[list[_Curve]]:
+def _panels(study: Study, columns: list[Column], swept: str | None, x: Floats) -> list[list[_Curve]]:
     """Columns by kind and unit, in the order of `_RANKS`, what tells most first."""
     section = study.kinematics
     asked = section.outputs if section is not None and section.outputs is not None else ()
@@ -118,12 +117,12 @@ def _panels(study: Study, columns: list[Column], swept: str | None, x: Array) ->
     return found
 
 
-def _still(values: Array, size: float) -> bool:
+def _still(values: Floats, size: float) -> bool:
     known = values[np.isfinite(values)]
     return not len(known) or float(np.ptp(known)) <= _STILL * max(float(np.abs(known).max()), size)
 
 
-def _coincide(one: Array, other: Array) -> bool:
+def _coincide(one: Floats, other: Floats) -> bool:
     known = np.isfinite(one) & np.isfinite(other)
     span = max(float(np.ptp(one[known])), float(np.ptp(other[known]))) if known.any() else 0.0
     return bool(np.all(np.abs(one[known] - other[known]) <= _HIDDEN * span))
@@ -136,7 +135,7 @@ def _limits(result: Result, swept: str) -> Iterator[tuple[float, str]]:
         yield from zip(table[swept].tolist(), table["kind"].tolist(), strict=True)
 
 
-def _runs(invalid: NDArray[np.bool_], x: Array, limits: Array) -> list[tuple[float, float]]:
+def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]]:
     """Ranges of x that are not valid, up to the limit of motion where one lies beside them."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], invalid, [False]]).astype(int)))
     found = []
@@ -164,8 +163,8 @@ def _stack(curves: list[_Curve], count: int, marked: bool) -> tuple[Figure, NDAr
     return figure, axes
 
 
-def _draw(axis: Axes, panel: list[_Curve], x: Array, units: Units, colors: dict[tuple[str, str], str]) -> None:
-    shown: list[Array] = []
+def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
+    shown: list[Floats] = []
     for curve in panel[:MOST_CURVES]:
         values = curve.column.values
         # A name keeps its colour from its position to its acceleration.

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words, solve_poses
 from mechdesign.analyses.stiffness.analysis import Asked, ask
@@ -16,14 +15,13 @@ from mechdesign.analyses.stiffness.beams import course_of
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.analyses.stiffness.network import Edge
 from mechdesign.mechanism import Configuration
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import equal_canvas
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
 from mechdesign.study import Study
-
-Complexes = NDArray[np.complex128]
 
 MOST_LOADS = 4
 _MOVED = 0.12  # largest drawn displacement over the size of the mechanism
@@ -106,7 +104,7 @@ def _shapes(asked: Asked, configuration: Configuration, scene: Scene) -> list[tu
 
 
 def _bent(
-    ways: Sequence[Edge], configuration: Configuration, moved: Mapping[str, NDArray[np.float64]],
+    ways: Sequence[Edge], configuration: Configuration, moved: Mapping[str, Floats],
     shift: Callable[[str, complex], Complexes],
 ) -> list[tuple[Complexes, Complexes]]:  # fmt: skip
     """The beams of an elastic link between the places where something sits, and its brackets."""
@@ -128,8 +126,8 @@ def _bent(
 
 
 def _beam(
-    tail: complex, head: complex, start: Complexes, end: Complexes, turn_start: NDArray[np.float64],
-    turn_end: NDArray[np.float64],
+    tail: complex, head: complex, start: Complexes, end: Complexes, turn_start: Floats,
+    turn_end: Floats,
 ) -> tuple[Complexes, Complexes]:  # fmt: skip
     """A beam at rest and its displacements: along itself linear, across itself cubic."""
     span = head - tail

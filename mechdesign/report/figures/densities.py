@@ -8,14 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.errors.panels import SUFFIXES, channels, error_limits, title
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-Floats = NDArray[np.float64]
 Bands = tuple[tuple[float, float], tuple[float, float]]
 # Two bands, or the radius of a circle.
 Limits = Bands | float | None
@@ -47,7 +46,7 @@ def density_figures(study: Study, table: Table, moments: Table, where: str, meth
     }
 
 
-def _first_pose(table: Table) -> NDArray[np.bool_]:
+def _first_pose(table: Table) -> Flags:
     """Rows of the first pose: those before the first cell comes again."""
     again = np.flatnonzero((table["x"] == table["x"][0]) & (table["y"] == table["y"][0]))
     end = again[1] if len(again) > 1 else len(table)

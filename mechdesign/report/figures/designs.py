@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.results import Result, Table
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +33,7 @@ class Designs:
     optimum: Table
     names: Sequence[str]
     goals: Mapping[str, bool]
-    feasible: NDArray[np.bool_]
+    feasible: Flags
 
     def __getitem__(self, name: str) -> Floats:
         """A column, of every design."""

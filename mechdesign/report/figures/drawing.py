@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import Turn, drive_arrows, name_labels, obstacles
 from mechdesign.report.figures.labels import paper, place_labels
@@ -40,7 +40,7 @@ def draw_mechanism(
     labels: bool = True,
     drives: bool = True,
     travel: Travel | None = None,
-    avoid: NDArray[np.complex128] | None = None,
+    avoid: Complexes | None = None,
     size: float = 1.0,
 ) -> None:
     """Draw a mechanism in one pose of a batch; a pose that cannot be assembled draws nothing.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 
 PAD = 0.5  # inches around what is drawn, for symbols and names
@@ -36,7 +36,7 @@ class Window:
         axes.set_aspect("equal")
 
 
-def extent(places: NDArray[np.complex128] | Iterable[complex]) -> tuple[complex, float, float]:
+def extent(places: Complexes | Iterable[complex]) -> tuple[complex, float, float]:
     """Middle, width and height of what lies at these places; nan are no places."""
     found = np.asarray(places if isinstance(places, np.ndarray) else list(places), dtype=complex).reshape(-1)
     found = found[np.isfinite(found)]
@@ -51,7 +51,7 @@ def scale_of(wide: float, tall: float, width: float, height: float, pad: float =
 
 
 def fit(
-    places: NDArray[np.complex128] | Iterable[complex], width: float, height: float, pad: float = PAD
+    places: Complexes | Iterable[complex], width: float, height: float, pad: float = PAD
 ) -> Window:  # fmt: skip
     """A window `width` inches wide and at most `height` inches high that shows all of the places."""
     middle, wide, tall = extent(places)
@@ -60,7 +60,7 @@ def fit(
 
 
 def framed(
-    places: NDArray[np.complex128] | Iterable[complex], unit: str, *, height: float, above: float = ABOVE
+    places: Complexes | Iterable[complex], unit: str, *, height: float, above: float = ABOVE
 ) -> tuple[Figure, Axes]:
     """A figure with one window as wide as the page, its axes labelled; `above` it, inches are left for a title."""
     window = fit(places, style.WIDTH - LEFT - RIGHT, height)

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
+
+from mechdesign.numerics.arrays import Complexes, Floats
 
 _LETTER = 0.62  # mean width of a letter in font sizes
 _DIRECTIONS = 16
@@ -42,7 +43,7 @@ class Label:
     optional: bool = False
 
 
-def place_labels(axes: Axes, labels: Sequence[Label], obstacles: NDArray[np.float64], order: float) -> None:
+def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: float) -> None:
     """Write labels, one after another, each at the place that costs least.
 
     The axes' limits must be final: what overlaps depends on the scale.
@@ -61,7 +62,7 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: NDArray[np.floa
         offsets, strains = _offsets(label, half)
         # Only what is within reach of some place can be covered.
         reach = np.abs(offsets).max(axis=0) + half + 2
-        best: tuple[float, complex, NDArray[np.float64], NDArray[np.float64]] | None = None
+        best: tuple[float, complex, Floats, Floats] | None = None
         for rank, anchor in enumerate(label.anchors):
             origin = paper(axes, np.array([anchor]))[0]
             first, last = np.searchsorted(obstacles[:, 0], origin[0] + reach[0] * np.array([-1, 1]))
@@ -86,7 +87,7 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: NDArray[np.floa
         )  # fmt: skip
 
 
-def paper(axes: Axes, places: NDArray[np.complex128]) -> NDArray[np.float64]:
+def paper(axes: Axes, places: Complexes) -> Floats:
     """Places of the drawing in points on paper, shape (n, 2)."""
     figure = axes.get_figure(root=True)
     assert figure is not None
@@ -94,7 +95,7 @@ def paper(axes: Axes, places: NDArray[np.complex128]) -> NDArray[np.float64]:
     return np.asarray(pixels, dtype=float) * 72 / figure.dpi
 
 
-def _offsets(label: Label, half: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _offsets(label: Label, half: Floats) -> tuple[Floats, Floats]:
     """Where the middle of the text may stand from its anchor (points), shape (n, 2), and how much each displeases."""
     places, strains = [], []
     preferred = math.pi / 4 if label.heading is None else label.heading
@@ -112,11 +113,11 @@ def _offsets(label: Label, half: NDArray[np.float64]) -> tuple[NDArray[np.float6
 
 
 def _costs(
-    boxes: NDArray[np.float64],
-    obstacles: NDArray[np.float64],
-    taken: NDArray[np.float64],
-    window: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    boxes: Floats,
+    obstacles: Floats,
+    taken: Floats,
+    window: Floats,
+) -> Floats:
     """What each of some boxes (left, low, right, high; a row each) would cover, and how far it leaves the window."""
     left, low, right, high = boxes.T[:, :, None]
     x, y = obstacles.T
@@ -126,5 +127,5 @@ def _costs(
     over = np.where((wide > 0) & (tall > 0), 20 + wide * tall, 0.0)
     (x0, y0), (x1, y1) = window
     outside = (left < x0) | (right > x1) | (low < y0) | (high > y1)
-    found: NDArray[np.float64] = 0.8 * inside.sum(axis=1) + over.sum(axis=1) + 40 * outside[:, 0]
+    found: Floats = 0.8 * inside.sum(axis=1) + over.sum(axis=1) + 40 * outside[:, 0]
     return found

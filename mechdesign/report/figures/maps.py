@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.regions import Floats, Grid, Region, keys, loci, outline, sheet
+from mechdesign.report.figures.regions import Grid, Region, keys, loci, outline, sheet
 from mechdesign.report.figures.rendering import Gallery
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def contours(
 
 
 def label_levels(
-    axes: Axes, drawn: Sequence[QuadContourSet], levels: Floats, norm: BoundaryNorm, blocked: NDArray[np.complex128]
+    axes: Axes, drawn: Sequence[QuadContourSet], levels: Floats, norm: BoundaryNorm, blocked: Complexes
 ) -> None:  # fmt: skip
     """Name each level once on one of its lines, far from other lines and names; or not at all."""
     lines = [[part for contour in drawn for part in _parts(axes, contour, k)] for k in range(len(levels) - 1)]
@@ -121,7 +121,7 @@ def label_levels(
         )  # fmt: skip
 
 
-def _parts(axes: Axes, contour: QuadContourSet, level: int) -> list[NDArray[np.complex128]]:
+def _parts(axes: Axes, contour: QuadContourSet, level: int) -> list[Complexes]:
     path = contour.get_paths()[level]
     if path.codes is None:
         return []
@@ -129,12 +129,12 @@ def _parts(axes: Axes, contour: QuadContourSet, level: int) -> list[NDArray[np.c
     return [_on_paper(axes, part @ np.array([1, 1j])) for part in corners]
 
 
-def _on_paper(axes: Axes, places: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _on_paper(axes: Axes, places: Complexes) -> Complexes:
     """Places in points on paper."""
     return np.asarray(paper(axes, places) @ np.array([1, 1j]))
 
 
-def _nearest(places: NDArray[np.complex128], others: NDArray[np.complex128]) -> Floats:
+def _nearest(places: Complexes, others: Complexes) -> Floats:
     if not len(others):
         return np.full(len(places), np.inf)
     return np.asarray(np.abs(places[:, None] - others[None, :]).min(axis=1))

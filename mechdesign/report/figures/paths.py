@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
 from mechdesign.report.figures.framing import ABOVE, framed
@@ -72,7 +72,7 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
         )  # fmt: skip
 
 
-def _wanted(sweep: Sweep) -> list[NDArray[np.complex128]]:
+def _wanted(sweep: Sweep) -> list[Complexes]:
     """Places that points should pass through, where the study says so by a table."""
     return [
         target.table[:, -2] + 1j * target.table[:, -1]
@@ -81,6 +81,6 @@ def _wanted(sweep: Sweep) -> list[NDArray[np.complex128]]:
     ]
 
 
-def _thinned(path: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _thinned(path: Complexes) -> Complexes:
     known = path[np.isfinite(path)]
     return known[np.unique(np.linspace(0, len(known) - 1, _MARKS).astype(int))] if len(known) else known

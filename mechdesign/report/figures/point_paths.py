@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.regions import ROOM, sheet
@@ -28,11 +28,11 @@ def path_figures(study: Study, result: Result) -> dict[str, Figure]:
     return {"path": _path(study, path), "speed_ratio": _speed(study, path)}
 
 
-def _pieces(path: Table) -> list[NDArray[np.intp]]:
+def _pieces(path: Table) -> list[Ints]:
     return [np.flatnonzero(path["piece"] == piece) for piece in np.unique(path["piece"])]
 
 
-def _ends(ratio: NDArray[np.float64]) -> tuple[float, bool]:
+def _ends(ratio: Floats) -> tuple[float, bool]:
     """The largest value to be told apart, and whether a tail lies beyond it."""
     finite = ratio[np.isfinite(ratio)]
     high, top = float(np.quantile(finite, _TAIL)), float(finite.max())

@@ -10,8 +10,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.regions import PALE, ROOM, curves, keys, outline_of, pick, sheet
@@ -21,7 +21,6 @@ from mechdesign.study.workspace_models import Over
 if TYPE_CHECKING:
     from mechdesign.study import Study
 
-Complex = NDArray[np.complex128]
 MOST = 6
 
 
@@ -46,7 +45,7 @@ def range_figures(study: Study, result: Result) -> dict[str, Figure]:
     }
 
 
-def _places(tables: Sequence[Table]) -> Complex:
+def _places(tables: Sequence[Table]) -> Complexes:
     return np.concatenate([table["x"] + 1j * table["y"] for table in tables])
 
 
@@ -94,7 +93,7 @@ def _area(table: Table) -> Path:
     return Path(np.concatenate(vertices), codes)
 
 
-def loops(pieces: Sequence[Complex]) -> list[Complex]:
+def loops(pieces: Sequence[Complexes]) -> list[Complexes]:
     """Curves joined where an end of one lies at an end of another, each loop closed.
 
     Parameters

@@ -11,15 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.results import Result, Table
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
 
-Floats = NDArray[np.float64]
 Grid = tuple[Floats, Floats, Floats]
 
 # How a piece of the boundary is drawn by what ends the region there: colour, dashes, words.
@@ -72,7 +71,7 @@ class Region:
         """x, y and a column of each patch, shape (rays, nodes)."""
         return _grids(self.local, column)
 
-    def places(self) -> NDArray[np.complex128]:
+    def places(self) -> Complexes:
         """Every place of the region's grid and outline, and of what is left out."""
         found = [table["x"] + 1j * table["y"] for table in (self.local, self.boundary, *(self.others or ()))]
         return np.concatenate(found)
@@ -118,12 +117,12 @@ def pick(table: Table, values: Mapping[str, float]) -> Table:
     return _rows(table, rows)
 
 
-def _rows(table: Table, rows: NDArray[np.bool_]) -> Table:
+def _rows(table: Table, rows: Flags) -> Table:
     columns = tuple(type(c)(c.name, np.asarray(c.values)[rows], c.unit, c.meaning) for c in table.columns)
     return Table(table.name, columns, table.meaning)
 
 
-def curves(table: Table) -> Iterator[NDArray[np.intp]]:
+def curves(table: Table) -> Iterator[Ints]:
     """Rows of each curve of a boundary or of a locus."""
     for curve in np.unique(table["curve"]):
         yield np.flatnonzero(table["curve"] == curve)
@@ -232,7 +231,7 @@ class Sheet:
 
 
 def sheet(
-    study: Study, places: NDArray[np.complex128], titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD
+    study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD
 ) -> Sheet:  # fmt: skip
     """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all."""
     number = len(titles)

@@ -9,10 +9,10 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.tri import Triangulation
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
-from mechdesign.report.figures.designs import Designs, Floats
+from mechdesign.report.figures.designs import Designs
 
 LEVELS = 14
 MARKERS = "osD^vP*X<>"
@@ -60,7 +60,7 @@ def score_curves(designs: Designs) -> Figure:
     return figure
 
 
-def _best_each(designs: Designs, name: str, values: Floats) -> NDArray[np.intp]:
+def _best_each(designs: Designs, name: str, values: Floats) -> Ints:
     """The best design for each value of a variable."""
     total = np.where(designs.feasible, designs.total(), -np.inf)
     rows = [np.flatnonzero(designs.feasible & (designs[name] == value)) for value in values]

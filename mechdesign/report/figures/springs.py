@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import Label, paper
 
@@ -40,7 +40,7 @@ class Coil:
     grounded: bool
 
     @property
-    def path(self) -> NDArray[np.complex128]:
+    def path(self) -> Complexes:
         """The drawn line."""
         span = self.anchor - self.place
         share = np.linspace(0, 1, 600)
@@ -91,13 +91,13 @@ def coil_labels(coils: Sequence[Coil]) -> list[Label]:
     return labels
 
 
-def coil_obstacles(axes: Axes, coils: Sequence[Coil]) -> NDArray[np.float64]:
+def coil_obstacles(axes: Axes, coils: Sequence[Coil]) -> Floats:
     """Points on paper that names should not cover."""
     runs = [coil.path for coil in coils] + [np.linspace(coil.tip, coil.place, 30) for coil in coils]
     return paper(axes, np.concatenate(runs)) if runs else np.empty((0, 2))
 
 
-def _line(axes: Axes, places: NDArray[np.complex128], width: float, lift: float, **look: object) -> None:
+def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: object) -> None:
     options: dict[str, object] = {
         "color": style.VERMILION,
         "solid_capstyle": "round",

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import radians
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures.framing import extent
 from mechdesign.report.figures.scene import link_points, pose, travels
 from mechdesign.study import Poses, Study
@@ -41,8 +41,8 @@ class Sweep:
     """
 
     study: Study
-    rows: NDArray[np.intp]
-    values: dict[str, NDArray[np.float64]]
+    rows: Ints
+    values: dict[str, Floats]
     configuration: Configuration
 
     @property
@@ -51,12 +51,12 @@ class Sweep:
         return self.study.mechanism
 
     @cached_property
-    def valid(self) -> NDArray[np.intp]:
+    def valid(self) -> Ints:
         """Indices of the valid poses."""
         return np.flatnonzero(self.configuration.valid)
 
     @cached_property
-    def places(self) -> dict[str, NDArray[np.complex128]]:
+    def places(self) -> dict[str, Complexes]:
         """Path of every moving point, nan where a pose is not valid."""
         still = link_points(self.mechanism.description.links[GROUND])
         valid = self.configuration.valid
@@ -74,7 +74,7 @@ class Sweep:
         return travels([scene for scene in scenes if scene is not None])
 
     @cached_property
-    def extent(self) -> NDArray[np.complex128]:
+    def extent(self) -> Complexes:
         """Everything the motion reaches: points, their paths and the ends of guides."""
         mechanism, configuration = self.mechanism, self.configuration
         ground = [configuration.point(point)[:1] for point in link_points(mechanism.description.links[GROUND])]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.inscribed import inscribed_figure
@@ -78,7 +78,7 @@ def workspace_figure(study: Study, region: Region, title: str = "") -> Figure:
     return page.figure
 
 
-def _places(boundary: Table) -> NDArray[np.complex128]:
+def _places(boundary: Table) -> Complexes:
     """Places a little inside the boundary, evenly along each of its sides."""
     found = []
     middle = complex(np.mean(boundary["x"]), np.mean(boundary["y"]))

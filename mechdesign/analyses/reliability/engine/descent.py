@@ -7,11 +7,9 @@ for reliability analysis, 1995, whose merit function makes the iteration converg
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.reliability.engine.problem import Floats, Problem
-
-Ints = NDArray[np.intp]
+from mechdesign.analyses.reliability.engine.problem import Problem
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 ITERATIONS = 30
 # Fractions of a step that are tried where the whole of it does not improve.
@@ -32,7 +30,7 @@ def sizes(problem: Problem) -> Floats:
 
 def descend(
     problem: Problem, limit: Ints, u: Floats, scale: Floats, *, together: bool = True
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Floats, Flags]:
     """Step all starts to the nearest point of their limits; directions stay as they are.
 
     Parameters

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.engine.descent import alike, sizes
 from mechdesign.analyses.reliability.engine.directions import worst
-from mechdesign.analyses.reliability.engine.problem import Floats, Problem, failed
-
-Ints = NDArray[np.intp]
+from mechdesign.analyses.reliability.engine.problem import Problem, failed
+from mechdesign.numerics.arrays import Floats, Ints
 
 # Standard deviations of the samples that starts are taken from, and how many of each.
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.descent import Ints, descend
-from mechdesign.analyses.reliability.engine.problem import Floats, Problem
+from mechdesign.analyses.reliability.engine.descent import descend
+from mechdesign.analyses.reliability.engine.problem import Problem
+from mechdesign.numerics.arrays import Floats, Ints
 
 # How often directions are turned to the worst, and what is no turn (distance on the circle).
 TURNS, STILL = 6, 0.02

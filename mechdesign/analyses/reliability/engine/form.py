@@ -17,8 +17,9 @@ from scipy.special import ndtr, ndtri
 from mechdesign.analyses.reliability.engine.descent import descend, sizes
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints
 from mechdesign.analyses.reliability.engine.mixture import Mixture
-from mechdesign.analyses.reliability.engine.problem import Estimate, Floats, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.probability import half_spaces
+from mechdesign.numerics.arrays import Floats
 
 # Directions that are drawn to learn which ones count, how often, and for the value; design points that each begins at.
 CHOICES, ROUNDS, VALUED, BEGUN = 96, 2, 384, 8

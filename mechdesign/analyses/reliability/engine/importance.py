@@ -15,7 +15,8 @@ from mechdesign.analyses.reliability.engine.design_points import EXPLORED, MOST,
 from mechdesign.analyses.reliability.engine.intervals import weighted
 from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.precision import Precision
-from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Floats, Problem, failed
+from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Problem, failed
+from mechdesign.numerics.arrays import Floats
 
 # Points farther than the nearest one by this many standard deviations bring nothing.
 FAR = 4.0

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import betaincinv, gammaincinv, stdtrit
 
 from mechdesign.analyses.reliability.engine.precision import CONFIDENCE
-
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats
 
 
 def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:

@@ -10,7 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.problem import Floats, Problem
+from mechdesign.analyses.reliability.engine.problem import Problem
+from mechdesign.numerics.arrays import Floats
 
 # A learned density is what it would be if so many samples a dimension of the law itself had been seen too.
 PRIOR = 0.25

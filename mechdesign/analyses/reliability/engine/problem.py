@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Flags, Floats
 
 # Step of a difference quotient of margins, in standard deviations: the third root of what rounding leaves in doubt.
 _STEP = 1e-4
@@ -81,7 +80,7 @@ class Problem:
         )
 
     @property
-    def straight(self) -> NDArray[np.bool_]:
+    def straight(self) -> Flags:
         """Which of the variables are normal."""
         return np.isin(np.arange(self.dimension), self.normals)
 
@@ -112,6 +111,6 @@ class Problem:
         return found[:, :n], (ahead - back) / (2 * _STEP)
 
 
-def failed(margins: Floats) -> NDArray[np.bool_]:
+def failed(margins: Floats) -> Flags:
     """Which points fail, shape (n,), from margins of shape (limits, n)."""
     return np.asarray(~np.all(margins >= 0, axis=0))

@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.intervals import binomial, replicated
-from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Floats, Problem, failed
+from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Problem, failed
+from mechdesign.numerics.arrays import Floats
 
 REPLICATES = 16
 # Beyond so few failures the means of the replicates are far from normal, and the interval is that of plain samples,

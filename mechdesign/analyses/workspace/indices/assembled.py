@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.analyses.workspace.indices.index import Evaluate
-from mechdesign.analyses.workspace.indices.local import Floats, Local
+from mechdesign.analyses.workspace.indices.local import Local
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.numerics.arrays import Floats
 
 BLOCK = 4096
 

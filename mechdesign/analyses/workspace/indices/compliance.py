@@ -10,9 +10,9 @@ import numpy as np
 
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate
-from mechdesign.analyses.workspace.indices.local import Floats
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.numerics.arrays import Floats
 
 if TYPE_CHECKING:
     from mechdesign.analyses.stiffness.analysis import Asked

@@ -8,8 +8,8 @@ import numpy as np
 
 from mechdesign.analyses.workspace.indices.compliance import of_compliance
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index
-from mechdesign.analyses.workspace.indices.local import Floats
 from mechdesign.errors import StudyError
+from mechdesign.numerics.arrays import Floats
 
 if TYPE_CHECKING:
     from mechdesign.study import Study

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses import jacobians
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.numerics.arrays import Floats
 
-Floats = NDArray[np.float64]
 Entries = Sequence[Sequence[Value]]
 
 

@@ -15,9 +15,9 @@ from mechdesign.analyses.reliability.probability import failure_probability
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index, number
-from mechdesign.analyses.workspace.indices.local import Floats
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.numerics.arrays import Floats
 
 if TYPE_CHECKING:
     from mechdesign.analyses.reliability.question import Question

@@ -13,8 +13,8 @@ from mechdesign.analyses.reliability.first_order import Rates, linear_errors
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index
-from mechdesign.analyses.workspace.indices.local import Floats
 from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.numerics.arrays import Floats
 
 if TYPE_CHECKING:
     from mechdesign.study import Study

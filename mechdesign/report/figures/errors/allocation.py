@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.panels import Floats, fitting, framed, title
+from mechdesign.report.figures.errors.panels import fitting, framed, title
 from mechdesign.results import Table
 from mechdesign.study import Study
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.errors.looks import select
-from mechdesign.report.figures.errors.panels import MOST_PANELS, Floats, framed, legend_below, title
+from mechdesign.report.figures.errors.panels import MOST_PANELS, framed, legend_below, title
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -97,7 +97,7 @@ def _shares(study: Study, axis: Axes, shares: Floats, names: list[str], poses: P
     _name(axis, [names[k] for k in ranked])
 
 
-def _indices(axis: Axes, table: Table, rows: NDArray[np.bool_], names: list[str], pose: int) -> None:
+def _indices(axis: Axes, table: Table, rows: Flags, names: list[str], pose: int) -> None:
     """First-order share, first and total index of each source, by the total one."""
     own = np.flatnonzero(rows)[pose * len(names) : (pose + 1) * len(names)]
     # Correlated sources have no indices of their own: they are ranked by their share.

@@ -8,20 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.report.figures.errors.looks import LOOKS, Look, methods, select
-from mechdesign.report.figures.errors.panels import (
-    Along,
-    Floats,
-    fitting,
-    framed,
-    legend_below,
-    number,
-    tick_abscissa,
-    title,
-)
+from mechdesign.report.figures.errors.panels import Along, fitting, framed, legend_below, number, tick_abscissa, title
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -124,13 +115,13 @@ def _scale(axes: Axes, table: Table) -> float:
     return 0.0
 
 
-def _unseen(table: Table) -> NDArray[np.bool_]:
+def _unseen(table: Table) -> Flags:
     """Rows of samples without a failure: only an upper end is known."""
     return np.asarray((table["failure_low"] == 0) & (table["failure_high"] > 0) & (table["samples"] > 0))
 
 
 def _dots(
-    axes: Axes, table: Table, rows: NDArray[np.intp], at: Floats, look: Look, floor: float, entries: Legend
+    axes: Axes, table: Table, rows: Ints, at: Floats, look: Look, floor: float, entries: Legend
 ) -> None:  # fmt: skip
     """Values with intervals, one marker for each method that they come from."""
     used = table["used"][rows]

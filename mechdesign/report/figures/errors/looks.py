@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mechdesign.numerics.arrays import Flags
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 
@@ -58,7 +58,7 @@ def best_moments(table: Table) -> str:
     return next(method for method in _MOMENTS if method in methods(table))
 
 
-def select(table: Table, **chosen: str) -> NDArray[np.bool_]:
+def select(table: Table, **chosen: str) -> Flags:
     """Rows in which columns have these values."""
     rows = np.ones(len(table), dtype=bool)
     for name, value in chosen.items():

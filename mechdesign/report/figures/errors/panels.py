@@ -10,16 +10,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from mechdesign.analyses.reliability.first_order import ORDERS
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.reliability_models import SUFFIXES as ORDER_SUFFIXES
-
-Floats = NDArray[np.float64]
 
 # More of them in one picture cannot be told apart.
 MOST_PANELS = 6

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats, Ints
+
 # Values of the functions `which` (indices of brackets) at `x`.
-Evaluate = Callable[[NDArray[np.intp], Floats], Floats]
+Evaluate = Callable[[Ints, Floats], Floats]
 STEPS = 80
 # Shares of the way to where a function seems to end that are left: less where the points it is judged by are near.
 SHORT = (1e-3, 0.1)

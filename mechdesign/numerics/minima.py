@@ -6,16 +6,15 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mechdesign.numerics.arrays import Floats
 
 GOLDEN = (math.sqrt(5) - 1) / 2
 # Sections that leave 1e-10 of a bracket: a value is exact then, as it is flat where it is smallest.
 SECTIONS = 50
 
 
-def lowest(function: Callable[[Array], Array], low: Array, high: Array) -> tuple[Array, Array]:
+def lowest(function: Callable[[Floats], Floats], low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """Places and smallest values between `low` and `high`.
 
     Parameters

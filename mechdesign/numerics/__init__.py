@@ -1,0 +1,1 @@
+"""Mathematics that knows no mechanism: types of arrays, roots, minima."""
