@@ -32,7 +32,7 @@ from mechdesign.study.stiffness_models import StiffnessSection
 
 # Of states of self-stress, those with less than this share of the largest one's energy are rounding: rigid.
 SELF_STRESS = 1e-13
-# All of them are, where the largest energy is below this share (squared rounding) of what wrenches of loops could store.
+# All of them are rounding below this share (squared rounding) of the energy that wrenches of the loops could store.
 STORED = 1e-26
 
 
