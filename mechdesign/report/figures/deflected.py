@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words, solve_poses, study_poses
-from mechdesign.analyses.stiffness.analysis import Asked, ask
+from mechdesign.analyses.stiffness.analysis import Body, ask
 from mechdesign.analyses.stiffness.beams import course_of
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.analyses.stiffness.network import Edge
@@ -71,12 +71,12 @@ def deflections(study: Study) -> Figure | None:
     return figure
 
 
-def _mark(axes: Axes, lines: Sequence[Complexes], asked: Asked, color: str) -> None:
+def _mark(axes: Axes, lines: Sequence[Complexes], asked: Body, color: str) -> None:
     """The asked point where the load moves it: it begins the first line."""
     axes.plot([lines[0][0].real], [lines[0][0].imag], "o", color=color, zorder=6)
 
 
-def _shapes(asked: Asked, configuration: Configuration, scene: Scene) -> list[tuple[Complexes, Complexes]]:
+def _shapes(asked: Body, configuration: Configuration, scene: Scene) -> list[tuple[Complexes, Complexes]]:
     """Lines of all links at rest, shape (n,), and their displacements for each unit load, shape (n, size).
 
     The first begins at the asked point.
