@@ -9,7 +9,7 @@ import pytest
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.study import schema, template, template_path, templates
-from mechdesign.study.document import read
+from mechdesign.study.text.document import read
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import Over, WorkspaceSection
+from mechdesign.study.schema.workspace import Over, WorkspaceSection
 
 # One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it, and
 # looked at more closely where limits of angles may leave thin parts.
