@@ -22,8 +22,8 @@ from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Study
-from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.poses import Poses, default, expand
+from mechdesign.study.schema.poses import PoseSection
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 CHUNK = 65536

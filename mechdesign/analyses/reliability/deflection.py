@@ -22,7 +22,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.reliability_models import LOADS
+from mechdesign.study.schema.reliability import LOADS
 
 
 @dataclass(frozen=True, eq=False)

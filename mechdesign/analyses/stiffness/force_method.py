@@ -28,7 +28,7 @@ from mechdesign.analyses.stiffness.screws import RANK, RIGID
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
 # Of states of self-stress, those with less than this share of the largest one's energy are rounding: rigid.
 SELF_STRESS = 1e-13

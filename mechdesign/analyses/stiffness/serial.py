@@ -19,7 +19,7 @@ from mechdesign.analyses.stiffness.screws import (
 from mechdesign.analyses.stiffness.tables import Springs
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Ints
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
 
 def hold_by_legs(

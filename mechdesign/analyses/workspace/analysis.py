@@ -31,7 +31,7 @@ from mechdesign.errors import AssemblyError
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import Over
+from mechdesign.study.schema.workspace import Over
 from mechdesign.threads import one_thread
 
 # An error of the area beyond this part of it is told.

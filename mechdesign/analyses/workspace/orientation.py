@@ -22,7 +22,7 @@ from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.progress import Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import Over
+from mechdesign.study.schema.workspace import Over
 
 EFFORT = Effort(48, 16, 96)
 # Rays of the table of the boundary, and the tolerance of means of which the area gets a tenth.

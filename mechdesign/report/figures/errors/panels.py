@@ -17,7 +17,7 @@ from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.reliability_models import SUFFIXES as ORDER_SUFFIXES
+from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
 
 # More of them in one picture cannot be told apart.
 MOST_PANELS = 6

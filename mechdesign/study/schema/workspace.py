@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from mechdesign.study.lists import Numbers, as_list
-from mechdesign.study.models import Model
-from mechdesign.study.numbers import (
+from mechdesign.study.build.section import Model
+from mechdesign.study.schema.lists import Numbers, as_list
+from mechdesign.study.text.numbers import (
     Angle,
     Choice,
     CoordinateName,

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from mechdesign.errors import Problem, StudyError
-from mechdesign.study.document import Document, Path, dotted, plain
-from mechdesign.study.numbers import LOST, nearest, shown, suggestion
+from mechdesign.study.text.document import Document, Path, dotted, plain
+from mechdesign.study.text.numbers import LOST, nearest, shown, suggestion
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}

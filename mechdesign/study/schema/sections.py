@@ -9,9 +9,15 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from mechdesign.study.lists import CoordinateNames
-from mechdesign.study.models import MechanismSection, Model, UnitsSection
-from mechdesign.study.numbers import (
+from mechdesign.study.build.section import MechanismSection, Model, UnitsSection
+from mechdesign.study.schema.lists import CoordinateNames
+from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.paths import Speed
+from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.stiffness import StiffnessSection
+from mechdesign.study.schema.workspace import WorkspaceSection
+from mechdesign.study.text.numbers import (
     CoordinateName,
     Force,
     LinkName,
@@ -22,12 +28,6 @@ from mechdesign.study.numbers import (
     Whole,
     failure,
 )
-from mechdesign.study.optimize_models import Condition, OptimizeSection
-from mechdesign.study.path_models import Speed
-from mechdesign.study.pose_models import PoseSection
-from mechdesign.study.reliability_models import ReliabilitySection
-from mechdesign.study.stiffness_models import StiffnessSection
-from mechdesign.study.workspace_models import WorkspaceSection
 
 
 class Load(Model):

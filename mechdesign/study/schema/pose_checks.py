@@ -10,15 +10,16 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study import poses, targets
-from mechdesign.study.checker import Checker
-from mechdesign.study.document import Path
-from mechdesign.study.pose_models import PoseSection
-from mechdesign.study.reliability_models import ReliabilitySection
-from mechdesign.study.reporter import Reporter
-from mechdesign.study.sections import KinematicsSection
-from mechdesign.study.targets import Target
-from mechdesign.study.workspace_models import WorkspaceSection
+from mechdesign.study import poses
+from mechdesign.study.schema import targets
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.sections import KinematicsSection
+from mechdesign.study.schema.targets import Target
+from mechdesign.study.schema.workspace import WorkspaceSection
+from mechdesign.study.text.document import Path
+from mechdesign.study.text.reporter import Reporter
 
 _RATE_KINDS: dict[Quantity, str] = {"length": "velocity", "angle": "angular_velocity"}
 _ACCELERATION_KINDS: dict[Quantity, str] = {"length": "acceleration", "angle": "angular_acceleration"}

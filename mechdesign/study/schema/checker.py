@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.document import Path
-from mechdesign.study.names import Names
-from mechdesign.study.parameters import Parameters
-from mechdesign.study.reporter import Reporter
-from mechdesign.study.units import KINDS, QUANTITY, QuantityError, describe, measure
+from mechdesign.study.build.names import Names
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.text.document import Path
+from mechdesign.study.text.reporter import Reporter
+from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, measure
 
 
 class Checker:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
-from mechdesign.study.numbers import (
+from mechdesign.study.text.numbers import (
     NAME_FORM,
     NUMBER_FORM,
     CoordinateName,

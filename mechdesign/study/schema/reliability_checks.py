@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study import pin_links
-from mechdesign.study.checker import Checker
-from mechdesign.study.document import Path
-from mechdesign.study.reliability_models import (
+from mechdesign.study.schema import pin_links
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.reliability import (
     LOADS,
     Clearance,
     Dimension,
@@ -14,6 +13,7 @@ from mechdesign.study.reliability_models import (
     ReliabilitySection,
     split_order,
 )
+from mechdesign.study.text.document import Path
 
 # Digits of a clearance beyond which its lowest value is zero.
 _ROUNDING = 1e-9

@@ -8,13 +8,13 @@ from collections.abc import Iterable, Mapping
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.model import Link, Place, Quantity, Term
-from mechdesign.study import models
-from mechdesign.study.document import Path
-from mechdesign.study.names import GROUND, Names
-from mechdesign.study.numbers import Value, suggestion
-from mechdesign.study.parameters import Parameters
-from mechdesign.study.reporter import Reporter
-from mechdesign.study.units import Units
+from mechdesign.study.build import section as models
+from mechdesign.study.text.document import Path
+from mechdesign.study.build.names import GROUND, Names
+from mechdesign.study.text.numbers import Value, suggestion
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.text.reporter import Reporter
+from mechdesign.study.text.units import Units
 
 ROOT: Path = ("mechanism",)
 

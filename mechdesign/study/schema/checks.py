@@ -8,20 +8,20 @@ from typing import Any
 
 from mechdesign.commands import COMMANDS
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study import pose_checks, reliability_checks, targets
-from mechdesign.study.checker import Checker
-from mechdesign.study.document import Path
-from mechdesign.study.names import GROUND, Names
-from mechdesign.study.numbers import suggestion
-from mechdesign.study.optimize_models import Condition, OptimizeSection
-from mechdesign.study.parameters import Parameters
-from mechdesign.study.pin_links import split_link
-from mechdesign.study.pose_models import PoseSection
-from mechdesign.study.reliability_models import ReliabilitySection
-from mechdesign.study.reporter import Reporter
-from mechdesign.study.sections import KinematicsSection
-from mechdesign.study.stiffness_models import StiffnessSection
-from mechdesign.study.workspace_models import INDEX_NAMES, NEEDED, Over, WorkspaceSection
+from mechdesign.study.build.names import GROUND, Names
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.schema import pose_checks, reliability_checks, targets
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.pin_links import split_link
+from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.sections import KinematicsSection
+from mechdesign.study.schema.stiffness import StiffnessSection
+from mechdesign.study.schema.workspace import INDEX_NAMES, NEEDED, Over, WorkspaceSection
+from mechdesign.study.text.document import Path
+from mechdesign.study.text.numbers import suggestion
+from mechdesign.study.text.reporter import Reporter
 
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
 _STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from mechdesign.mechanism.graph import Graph
-from mechdesign.study.checker import Checker
-from mechdesign.study.document import Path
-from mechdesign.study.names import Names
-from mechdesign.study.reliability_models import SUFFIXES, ReliabilitySection
+from mechdesign.study.build.names import Names
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.reliability import SUFFIXES, ReliabilitySection
+from mechdesign.study.text.document import Path
 
 
 def split_link(names: Names, name: str) -> tuple[str, str]:

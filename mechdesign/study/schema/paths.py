@@ -8,8 +8,8 @@ from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchema
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from mechdesign.study.models import Model
-from mechdesign.study.numbers import (
+from mechdesign.study.build.section import Model
+from mechdesign.study.text.numbers import (
     Angle,
     Context,
     Length,

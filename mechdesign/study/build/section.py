@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchem
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from mechdesign.study.numbers import (
+from mechdesign.study.text.numbers import (
     NAME_FORM,
     NAMES_FORM,
     NUMBER_FORM,
@@ -35,7 +35,7 @@ from mechdesign.study.numbers import (
     shown,
     suggestion,
 )
-from mechdesign.study.target_models import TargetValue
+from mechdesign.study.build.target_models import TargetValue
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
 

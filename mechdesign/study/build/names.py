@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.models import MechanismSection
+from mechdesign.study.build.section import MechanismSection
 
 GROUND = "ground"
 

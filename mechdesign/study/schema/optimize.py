@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
-from mechdesign.study.models import Model
-from mechdesign.study.numbers import (
+from mechdesign.study.build.section import Model
+from mechdesign.study.text.numbers import (
     NAME_FORM,
     NUMBER_FORM,
     Bound,

@@ -9,9 +9,11 @@ from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchema
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from mechdesign.study.lists import CoordinateNames, one_or_many
-from mechdesign.study.models import Model
-from mechdesign.study.numbers import (
+from mechdesign.study.build.section import Model
+from mechdesign.study.schema.lists import CoordinateNames, one_or_many
+from mechdesign.study.schema.paths import Speed
+from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.text.numbers import (
     NAME_FORM,
     NUMBER_FORM,
     Choice,
@@ -30,8 +32,6 @@ from mechdesign.study.numbers import (
     read_number,
     shown,
 )
-from mechdesign.study.path_models import Speed
-from mechdesign.study.pose_models import PoseSection
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
 PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")

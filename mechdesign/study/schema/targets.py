@@ -11,11 +11,11 @@ import numpy as np
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.checker import Checker
-from mechdesign.study.document import Path
+from mechdesign.study.build.target_models import Wanted
 from mechdesign.study.poses import Poses, read_table
-from mechdesign.study.reporter import Reporter
-from mechdesign.study.target_models import Wanted
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.text.document import Path
+from mechdesign.study.text.reporter import Reporter
 
 ROOT: Path = ("mechanism", "targets")
 

@@ -9,9 +9,10 @@ from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, Validati
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from mechdesign.study.lists import as_list
-from mechdesign.study.models import Model
-from mechdesign.study.numbers import (
+from mechdesign.study.build.section import Model
+from mechdesign.study.schema.lists import as_list
+from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.text.numbers import (
     NUMBER_FORM,
     Angle,
     AnyName,
@@ -29,7 +30,6 @@ from mechdesign.study.numbers import (
     or_short,
     read_number,
 )
-from mechdesign.study.pose_models import PoseSection
 
 _ELASTIC = (
     "The section of each link that bends; links not named are rigid. A link given by its ends is a beam from the first "

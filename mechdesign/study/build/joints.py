@@ -5,11 +5,11 @@ from __future__ import annotations
 from mechdesign.mechanism.model import Fixed, Line, Prismatic, Slot
 from mechdesign.mechanism.model import Joint as JointModel
 from mechdesign.mechanism.model import Link as LinkModel
-from mechdesign.study import models
-from mechdesign.study.builder import Builder
-from mechdesign.study.document import Path
-from mechdesign.study.names import GROUND
-from mechdesign.study.numbers import suggestion
+from mechdesign.study.build import section as models
+from mechdesign.study.build.builder import Builder
+from mechdesign.study.text.document import Path
+from mechdesign.study.build.names import GROUND
+from mechdesign.study.text.numbers import suggestion
 
 
 def build(builder: Builder) -> dict[str, JointModel]:

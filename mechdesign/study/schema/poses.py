@@ -8,8 +8,9 @@ from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validat
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from mechdesign.study.models import Model
-from mechdesign.study.numbers import (
+from mechdesign.study.build.section import Model
+from mechdesign.study.schema.paths import Path
+from mechdesign.study.text.numbers import (
     NUMBER_FORM,
     CoordinateName,
     Number,
@@ -18,7 +19,6 @@ from mechdesign.study.numbers import (
     failure,
     or_short,
 )
-from mechdesign.study.path_models import Path
 
 
 class Sweep(Model):

@@ -18,7 +18,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from mechdesign.expressions import RESERVED, Expression, ExpressionError
-from mechdesign.study.units import QUANTITY, Powers, QuantityError, Units, measure
+from mechdesign.study.text.units import QUANTITY, Powers, QuantityError, Units, measure
 
 NAME = re.compile(r"[^\W\d]\w*")
 LARGEST, SMALLEST = 1e60, 1e-60

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mechdesign.study.sections import StudyFile
+from mechdesign.study.schema.sections import StudyFile
 
 
 def schema() -> dict[str, Any]:

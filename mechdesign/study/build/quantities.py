@@ -8,12 +8,12 @@ import numpy as np
 
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.model import Drive, Limit, Measure, Quantity, Term
-from mechdesign.study import models
-from mechdesign.study.builder import Builder
-from mechdesign.study.document import Path
-from mechdesign.study.names import GROUND
-from mechdesign.study.numbers import Value
-from mechdesign.study.units import KINDS, describe
+from mechdesign.study.build import section as models
+from mechdesign.study.build.builder import Builder
+from mechdesign.study.text.document import Path
+from mechdesign.study.build.names import GROUND
+from mechdesign.study.text.numbers import Value
+from mechdesign.study.text.units import KINDS, describe
 
 
 def drives(builder: Builder) -> dict[str, Drive]:

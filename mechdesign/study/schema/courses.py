@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.study.path_models import ROUND, STRAIGHT, Arc, Circle
+from mechdesign.study.schema.paths import ROUND, STRAIGHT, Arc, Circle
 
 # Pieces of a spline between two of its points whose lengths are added up.
 PIECES = 64

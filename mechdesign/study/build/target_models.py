@@ -11,8 +11,8 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from mechdesign.expressions import Expression, ExpressionError
-from mechdesign.study.numbers import Context, failure, read_number, shown
-from mechdesign.study.units import QUANTITY
+from mechdesign.study.text.numbers import Context, failure, read_number, shown
+from mechdesign.study.text.units import QUANTITY
 
 FILES = (".csv", ".txt", ".dat")
 FORMS = "an expression, a number, {file: path.csv}, a list of numbers, of [x, y] or of [drive, x, y]"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 from mechdesign.mechanism.model import Description
-from mechdesign.study import joints as joint_rules
-from mechdesign.study import quantities
-from mechdesign.study.builder import Builder
+from mechdesign.study.build import joints as joint_rules
+from mechdesign.study.build import quantities
+from mechdesign.study.build.builder import Builder
 
 
 def build(builder: Builder) -> Description:
