@@ -10,14 +10,14 @@ from mechdesign.analyses.stiffness.analysis import ask, evaluate
 from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import name_labels, obstacles
-from mechdesign.report.figures.deflected import deflections, first_pose, free_motion
 from mechdesign.report.figures.drawing import draw_mechanism, link_colors
 from mechdesign.report.figures.framing import equal_canvas
 from mechdesign.report.figures.labels import place_labels
 from mechdesign.report.figures.planes import Plane, map_sheet, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, pose
-from mechdesign.report.figures.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
+from mechdesign.report.figures.stiffness.deflected import deflections, first_pose, free_motion
+from mechdesign.report.figures.stiffness.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
 from mechdesign.results import Result
 from mechdesign.study import Study
 

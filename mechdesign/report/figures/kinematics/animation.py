@@ -19,7 +19,7 @@ from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import framed
-from mechdesign.report.figures.paths import TALLEST, draw_paths
+from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
 from mechdesign.report.figures.sweep import Sweep, is_motion, solve_sweep
 from mechdesign.study import Study
 

@@ -11,7 +11,8 @@ from matplotlib.patches import Circle
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.panels import SUFFIXES, channels, error_limits, title
+from mechdesign.report.figures.panels import title
+from mechdesign.report.figures.reliability.looks import SUFFIXES, channels, error_limits
 from mechdesign.results import Table
 from mechdesign.study import Study
 

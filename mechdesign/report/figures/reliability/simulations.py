@@ -9,17 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.looks import LOOKS, methods, select
-from mechdesign.report.figures.errors.panels import (
-    MOST_PANELS,
-    channels,
-    error_limits,
-    framed,
-    legend_below,
-    number,
-    stack,
-    title,
-)
+from mechdesign.report.figures.panels import MOST_PANELS, framed, legend_below, number, stack, title
+from mechdesign.report.figures.reliability.looks import LOOKS, channels, error_limits, methods, select
 from mechdesign.results import Table
 from mechdesign.study import Study
 

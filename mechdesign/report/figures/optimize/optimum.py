@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.poses import study_poses
 from mechdesign.analyses.workspace.analysis import workspace
-from mechdesign.report.figures.designs import Designs
+from mechdesign.report.figures.kinematics.paths import paths_figure
 from mechdesign.report.figures.mechanism import mechanism_figure
-from mechdesign.report.figures.paths import paths_figure
-from mechdesign.report.figures.regions import regions
+from mechdesign.report.figures.optimize.designs import Designs
 from mechdesign.report.figures.sweep import is_motion, solve_sweep
 from mechdesign.report.figures.workspace import workspace_figure
+from mechdesign.report.figures.workspace.regions import regions
 from mechdesign.study.variants import variant
 
 if TYPE_CHECKING:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.analyses.poses import pose_in_words, study_poses
-from mechdesign.report.figures.densities import density_figures
-from mechdesign.report.figures.errors.allocation import allocation_figure
-from mechdesign.report.figures.errors.contributions import contributions_figure
-from mechdesign.report.figures.errors.estimates import MOST_LISTED, estimate_figure
-from mechdesign.report.figures.errors.looks import LOOKS
-from mechdesign.report.figures.errors.maps import map_figures
-from mechdesign.report.figures.errors.panels import along
-from mechdesign.report.figures.errors.simulations import convergence_figure, histogram_figure, trend_figure
-from mechdesign.report.figures.errors.sweeps import sweep_figures
+from mechdesign.report.figures.panels import along
 from mechdesign.report.figures.planes import plane
+from mechdesign.report.figures.reliability.allocation import allocation_figure
+from mechdesign.report.figures.reliability.contributions import contributions_figure
+from mechdesign.report.figures.reliability.densities import density_figures
+from mechdesign.report.figures.reliability.estimates import MOST_LISTED, estimate_figure
+from mechdesign.report.figures.reliability.looks import LOOKS
+from mechdesign.report.figures.reliability.maps import map_figures
+from mechdesign.report.figures.reliability.simulations import convergence_figure, histogram_figure, trend_figure
+from mechdesign.report.figures.reliability.sweeps import sweep_figures
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result, Table
 from mechdesign.study import Study

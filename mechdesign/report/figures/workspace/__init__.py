@@ -12,12 +12,12 @@ from matplotlib.ticker import MaxNLocator
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.inscribed import inscribed_figure
-from mechdesign.report.figures.maps import map_figures
-from mechdesign.report.figures.point_paths import path_figures
-from mechdesign.report.figures.ranges import range_figures
-from mechdesign.report.figures.regions import ROOM, Region, curves, fill, keys, loci, outline, regions, sheet
 from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.workspace.inscribed import inscribed_figure
+from mechdesign.report.figures.workspace.maps import map_figures
+from mechdesign.report.figures.workspace.point_paths import path_figures
+from mechdesign.report.figures.workspace.ranges import range_figures
+from mechdesign.report.figures.workspace.regions import ROOM, Region, curves, fill, keys, loci, outline, regions, sheet
 from mechdesign.results import Result, Table
 
 if TYPE_CHECKING:

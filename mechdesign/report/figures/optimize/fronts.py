@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.designs import Designs
+from mechdesign.report.figures.optimize.designs import Designs
 from mechdesign.results import Table
 
 

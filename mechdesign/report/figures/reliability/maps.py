@@ -5,9 +5,8 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.looks import LOOKS, best_moments, best_probability, select
-from mechdesign.report.figures.errors.panels import channels
 from mechdesign.report.figures.planes import Plane, map_sheet
+from mechdesign.report.figures.reliability.looks import LOOKS, best_moments, best_probability, channels, select
 from mechdesign.results import Result
 from mechdesign.study import Study
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.looks import select
-from mechdesign.report.figures.errors.panels import MOST_PANELS, framed, legend_below, title
+from mechdesign.report.figures.panels import MOST_PANELS, framed, legend_below, title
+from mechdesign.report.figures.reliability.looks import select
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses

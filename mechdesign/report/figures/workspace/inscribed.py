@@ -11,7 +11,7 @@ from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.regions import Region, fill, keys, loci, outline, sheet
+from mechdesign.report.figures.workspace.regions import Region, fill, keys, loci, outline, sheet
 from mechdesign.results import Result
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.designs import Designs
+from mechdesign.report.figures.optimize.designs import Designs
 
 # More lines than that are one blot: of more designs every so many are drawn, in the order of their score.
 MOST = 300

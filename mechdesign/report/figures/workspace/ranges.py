@@ -14,7 +14,7 @@ from matplotlib.path import Path
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.regions import PALE, ROOM, curves, keys, outline_of, pick, sheet
+from mechdesign.report.figures.workspace.regions import PALE, ROOM, curves, keys, outline_of, pick, sheet
 from mechdesign.results import Result, Table
 from mechdesign.study.schema.workspace import Over
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mechdesign.report.figures.designs import designs_of
-from mechdesign.report.figures.fronts import front_figure
-from mechdesign.report.figures.optimum import optimum_figure
-from mechdesign.report.figures.parallel import convergence, parallel_axes
+from mechdesign.report.figures.optimize.designs import designs_of
+from mechdesign.report.figures.optimize.fronts import front_figure
+from mechdesign.report.figures.optimize.optimum import optimum_figure
+from mechdesign.report.figures.optimize.parallel import convergence, parallel_axes
+from mechdesign.report.figures.optimize.scores import goal_maps, score_curves, score_surface
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.scores import goal_maps, score_curves, score_surface
 from mechdesign.results import Result
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, extent, fit, scale_of
-from mechdesign.report.figures.paths import draw_paths
+from mechdesign.report.figures.kinematics.paths import draw_paths
 from mechdesign.report.figures.sweep import Sweep, solve_sweep
 from mechdesign.study import Study
 

@@ -19,8 +19,8 @@ from matplotlib.ticker import MaxNLocator
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.regions import Grid, Region, keys, loci, outline, sheet
 from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.workspace.regions import Grid, Region, keys, loci, outline, sheet
 
 if TYPE_CHECKING:
     from mechdesign.study import Study

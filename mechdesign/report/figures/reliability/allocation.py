@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.panels import fitting, framed, title
+from mechdesign.report.figures.panels import fitting, framed, title
 from mechdesign.results import Table
 from mechdesign.study import Study
 

@@ -11,17 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mechdesign.analyses.reliability.first_order import ORDERS
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
 
 # More of them in one picture cannot be told apart.
 MOST_PANELS = 6
-SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
 _LEFT, _RIGHT, _TOP, _APART = 0.88, 0.3, 0.62, 0.42  # inches
 _TALL = 1.75
 # Below the lowest panel: its axis alone, and with a legend of one or two rows.
@@ -56,23 +52,6 @@ def moving_names(poses: Poses) -> list[str]:
 def coordinate_label(study: Study, name: str) -> str:
     """A coordinate's name and unit."""
     return style.axis_label(name, study.units.label(study.mechanism.quantity(name)))
-
-
-def channels(table: Table) -> list[tuple[str, str, str]]:
-    """Output, order and unit of each quantity of a table, positions first."""
-    found = dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), table["unit"].tolist(), strict=True))
-    return sorted(found, key=lambda channel: list(SUFFIXES).index(channel[1]))
-
-
-def error_limits(study: Study, output: str, order: str) -> tuple[float, float] | None:
-    """Lowest and highest error allowed, in study units, of a coordinate or by the circle about its point."""
-    section = study.reliability
-    assert section is not None
-    band = section.limits.get(f"{output}{SUFFIXES[order]}")
-    if band is not None:
-        return (-np.inf if band.min is None else band.min, np.inf if band.max is None else band.max)
-    circle = section.limits.get(f"{output.rpartition('.')[0]}{SUFFIXES[order]}")
-    return None if circle is None or circle.radius is None else (-circle.radius, circle.radius)
 
 
 def framed(

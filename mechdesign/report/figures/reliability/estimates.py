@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.report.figures.errors.looks import LOOKS, Look, methods, select
-from mechdesign.report.figures.errors.panels import Along, fitting, framed, legend_below, number, tick_abscissa, title
+from mechdesign.report.figures.panels import Along, fitting, framed, legend_below, number, tick_abscissa, title
+from mechdesign.report.figures.reliability.looks import LOOKS, Look, methods, select
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses

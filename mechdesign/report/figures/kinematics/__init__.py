@@ -5,9 +5,9 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import study_poses
-from mechdesign.report.figures.curves import curves_figure
-from mechdesign.report.figures.modes import modes_figure
-from mechdesign.report.figures.paths import paths_figure
+from mechdesign.report.figures.kinematics.curves import curves_figure
+from mechdesign.report.figures.kinematics.modes import modes_figure
+from mechdesign.report.figures.kinematics.paths import paths_figure
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.sweep import is_motion, solve_sweep
 from mechdesign.results import Result

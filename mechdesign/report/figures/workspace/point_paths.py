@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.regions import ROOM, sheet
+from mechdesign.report.figures.workspace.regions import ROOM, sheet
 from mechdesign.results import Result, Table
 
 if TYPE_CHECKING:

@@ -7,9 +7,14 @@ from typing import Literal
 
 import numpy as np
 
+from mechdesign.analyses.reliability.first_order import ORDERS
 from mechdesign.numerics.arrays import Flags
 from mechdesign.report.figures import style
 from mechdesign.results import Table
+from mechdesign.study import Study
+from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
+
+SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
 
 
 @dataclass(frozen=True)
@@ -64,3 +69,20 @@ def select(table: Table, **chosen: str) -> Flags:
     for name, value in chosen.items():
         rows &= table[name] == value
     return rows
+
+
+def channels(table: Table) -> list[tuple[str, str, str]]:
+    """Output, order and unit of each quantity of a table, positions first."""
+    found = dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), table["unit"].tolist(), strict=True))
+    return sorted(found, key=lambda channel: list(SUFFIXES).index(channel[1]))
+
+
+def error_limits(study: Study, output: str, order: str) -> tuple[float, float] | None:
+    """Lowest and highest error allowed, in study units, of a coordinate or by the circle about its point."""
+    section = study.reliability
+    assert section is not None
+    band = section.limits.get(f"{output}{SUFFIXES[order]}")
+    if band is not None:
+        return (-np.inf if band.min is None else band.min, np.inf if band.max is None else band.max)
+    circle = section.limits.get(f"{output.rpartition('.')[0]}{SUFFIXES[order]}")
+    return None if circle is None or circle.radius is None else (-circle.radius, circle.radius)

@@ -12,7 +12,7 @@ from matplotlib.tri import Triangulation
 
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
-from mechdesign.report.figures.designs import Designs
+from mechdesign.report.figures.optimize.designs import Designs
 
 LEVELS = 14
 MARKERS = "osD^vP*X<>"

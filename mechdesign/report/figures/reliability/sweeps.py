@@ -11,18 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.looks import LOOKS, best_moments, methods, select
-from mechdesign.report.figures.errors.panels import (
-    BARE,
-    MOST_PANELS,
-    WITH_LEGEND,
-    Along,
-    channels,
-    error_limits,
-    legend_below,
-    stack,
-    tick_abscissa,
-)
+from mechdesign.report.figures.panels import BARE, MOST_PANELS, WITH_LEGEND, Along, legend_below, stack, tick_abscissa
+from mechdesign.report.figures.reliability.looks import LOOKS, best_moments, channels, error_limits, methods, select
 from mechdesign.results import Table
 from mechdesign.study import Study
 
