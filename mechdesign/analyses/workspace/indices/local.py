@@ -90,14 +90,6 @@ class Local:
         values = np.linalg.svd(np.where(finite[..., None, None], matrix, 0.0), compute_uv=False)
         return np.where(finite, values[..., -1], np.nan), np.where(finite, values[..., 0], np.nan)
 
-    @cached_property
-    @quiet
-    def roundness(self) -> Value:
-        """w = ((sigma_max - sigma_min)/(sigma_max + sigma_min))^2, which is smooth where the two meet (w = 0)."""
-        if len(self.homogeneous) == 2:
-            return np.maximum(self.twice - 2, 0.0) / (self.twice + 2)
-        return ((1 - self.inverse_condition) / (1 + self.inverse_condition)) ** 2
-
 
 def _matrix(entries: Entries) -> Floats:
     shape = np.broadcast_shapes(*(np.shape(entry) for row in entries for entry in row))
