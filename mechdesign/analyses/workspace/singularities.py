@@ -12,9 +12,9 @@ from itertools import groupby
 
 import numpy as np
 
-from mechdesign.analyses.workspace.curves import GRID, Patch
+from mechdesign.analyses.region.curves import GRID, Patch
+from mechdesign.analyses.region.field import Field
 from mechdesign.analyses.workspace.degenerate import singular
-from mechdesign.analyses.workspace.field import Field
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.structure import Group
