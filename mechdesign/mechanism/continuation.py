@@ -64,6 +64,35 @@ def unknowns_of(
     return found
 
 
+def guess_of(structure: Structure, table: Floats) -> Guess:
+    """Rows of a table as angles and slides by group."""
+    found, row = {}, 0
+    for index, group in enumerate(structure.groups):
+        if group.form == "newton":
+            lengths = row + len(group.angles)
+            end = lengths + len(group.slides) + 2 * len(group.bases)
+            found[index] = (list(table[row:lengths]), list(table[lengths:end]))
+            row = end
+    return found
+
+
+def table_of(unknowns: Guess, shape: tuple[int, ...]) -> Floats:
+    """Unknowns of all groups, one a row."""
+    return np.stack([np.broadcast_to(v, shape) for parts in unknowns.values() for part in parts for v in part])
+
+
+def angle_rows(structure: Structure) -> Flags:
+    """Which rows of a table are angles, shape (rows, 1)."""
+    groups = [group for group in structure.groups if group.form == "newton"]
+    rows = [[True] * len(g.angles) + [False] * (len(g.slides) + 2 * len(g.bases)) for g in groups]
+    return np.concatenate(rows)[:, None]
+
+
+def scale_of(structure: Structure, size: float, table: Floats) -> Floats:
+    """What changes are measured by: radians, and the mechanism's size or a length beyond it."""
+    return np.where(angle_rows(structure), 1.0, np.maximum(size, np.abs(table)))
+
+
 class _Path:
     """Straight lines from a start to `count` poses, and the unknowns of the Newton groups as one table."""
 

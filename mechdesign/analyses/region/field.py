@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from mechdesign.analyses.workspace.atlas import Atlas, hidden
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import determinants
@@ -62,8 +62,7 @@ class Field:
         """
         given: list[Value] = [z.real, z.imag, *self.held]
         if self.plan.iterative:
-            found, grip = self._atlas.solve(z, places)
-            return found if (grip > 0).all() else hidden(found, ~(grip > 0))
+            return self._atlas.solve(z, places)[0]
         vectors = self.mechanism.geometry.vectors(places)
         state = self.plan.run(given, vectors, None)
         graph = self.mechanism.graph
@@ -94,21 +93,24 @@ class Field:
         """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             if self.plan.iterative:
-                configuration, grip = self._atlas.solve(z, places)
+                configuration, fold_distance = self._atlas.solve(z, places, beyond=True)
             else:
                 configuration = self.configuration(z, places)
             found = [*configuration.closures]
             found += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
             found += [margin for _, margin in self.mechanism.margins(configuration)]
             if self.plan.iterative:
-                found.append(grip)
+                found.append(fold_distance)
             if self.same_assembly and assembly:
                 signs = self._signs
                 found += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
         if self.plan.iterative:
             # Where nothing is reached one margin says so, and the others have no end of their own there.
-            lost = np.isnan(grip)
-            found = [margin if margin is grip else np.where(lost & np.isnan(margin), 1.0, margin) for margin in found]
+            lost = np.isnan(fold_distance)
+            found = [
+                margin if margin is fold_distance else np.where(lost & np.isnan(margin), 1.0, margin)
+                for margin in found
+            ]
         stacked = np.empty((len(found), *z.shape))
         for row, margin in zip(stacked, found, strict=True):
             row[...] = margin
