@@ -120,8 +120,7 @@ class Field:
     def labels(self) -> tuple[tuple[str, str], ...]:
         """Kind (``singularity`` or ``limit``) and name of each margin."""
         mechanism = self.mechanism
-        at = np.asarray(complex(*(float(mechanism.sketch_configuration.value(c)) for c in self.outputs[:2])))
-        configuration = self.configuration(at, {})
+        configuration = self.configuration(self.surroundings[0], {})
         found = [("singularity", name) for name in self._closure_names()]
         found += [("singularity", f"{mechanism.graph.slides[s]} length") for s in mechanism.graph.telescopic]
         found += [("limit", label) for label, _ in mechanism.margins(configuration)]
@@ -152,14 +151,17 @@ class Field:
         return names
 
     @cached_property
-    def closing(self) -> int:
-        """Number of leading margins that say whether the mechanism can be assembled at all."""
-        return sum(1 for kind, name in self.labels if kind == "singularity" and not name.startswith("assembly"))
-
-    @cached_property
     def _signs(self) -> list[float]:
         sketch = self.mechanism.sketch_configuration
         return [float(np.sign(d)) for d in self._determinants(sketch)]
+
+    @cached_property
+    def surroundings(self) -> Complexes:
+        """The point's place in the sketch, and places at some distances from it."""
+        turn, share = np.meshgrid(np.exp(1j * np.linspace(0, 2 * np.pi, 24, endpoint=False)), SHARES)
+        drawn = self.mechanism.sketch_configuration
+        at = complex(*(float(drawn.value(c)) for c in self.outputs[:2]))
+        return np.append(at, at + self.mechanism.size * (turn * share).ravel())
 
     @cached_property
     def rounding(self) -> Floats:
@@ -170,11 +172,7 @@ class Field:
         """
         found = np.zeros(len(self.labels))
         if self.same_assembly:
-            turn, share = np.meshgrid(np.exp(1j * np.linspace(0, 2 * np.pi, 24, endpoint=False)), SHARES)
-            drawn = self.mechanism.sketch_configuration
-            at = complex(*(float(drawn.value(c)) for c in self.outputs[:2]))
-            around = np.append(at, at + self.mechanism.size * (turn * share).ravel())
-            sizes = np.abs(Field.margins(self, around, {}))[-len(self._signs) :]
+            sizes = np.abs(Field.margins(self, self.surroundings, {}))[-len(self._signs) :]
             found[-len(self._signs) :] = ROUNDING * np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
         return found
 

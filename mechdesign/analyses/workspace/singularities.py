@@ -7,21 +7,22 @@ drives' structure vanishes. An `inverse` (serial) one is where a leg is stretche
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 
 from mechdesign.analyses.region.curves import GRID, Patch
 from mechdesign.analyses.region.field import Field
-from mechdesign.analyses.workspace.degenerate import singular
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.derivatives import determinants
+from mechdesign.mechanism.derivatives import determinants, regularity
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.numerics.zero_curves import joined, zero_curves
 
 FORWARD, INVERSE = "forward", "inverse"
+# Poses no more regular than this (0 at a singularity, at most 1) are singular but for rounding.
+REGULAR = 1e-10
 # Spacing of the grid on which curves are looked for, in rows and columns of a patch's grid; and the part of a ray's
 # interval that it leaves out at both ends.
 STEP = 0.25
@@ -104,10 +105,25 @@ def _in_words(mechanism: Mechanism, group: Group) -> str:
     return f"{named} not held"
 
 
+def singular_everywhere(field: Field) -> bool:
+    """Whether every pose is a forward singularity, so that determinants are nothing but rounding."""
+    field = replace(field, same_assembly=False)
+    z = field.surroundings
+    closures = [kind == "singularity" for kind, _ in field.labels]
+    reached = (field.margins(z, {})[closures] > 0).all(axis=0)
+    return bool(reached.any()) and _singular(field, z[reached])
+
+
+def _singular(field: Field, z: Complexes) -> bool:
+    """Whether the mechanism is in a forward singularity with its point at each of the places `z`."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        return bool((np.asarray(regularity(field.mechanism.linearize(field.configuration(z, {})))) <= REGULAR).all())
+
+
 def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus]:
     """Forward singularities inside a region: on the lines of a grid of its patches to rounding, in order as curves."""
     names = forward_names(field.mechanism)
-    if field.same_assembly or not names or all(singular(field, patch.grid(about)) for patch in patches):
+    if field.same_assembly or not names or all(_singular(field, patch.grid(about)) for patch in patches):
         return []
 
     def values(z: Complexes) -> Floats:
