@@ -173,9 +173,8 @@ class Atlas:
         scale = scale_of(self.plan.structure, self.plan.core.size, table)
         guess = table + np.where((np.abs(ahead) <= MAX_CHANGE * scale).all(axis=0), ahead, 0.0)
         state = self._run(z, sizes, guess, CORRECTIONS)
-        determinants = _determinants(state, z.shape)
-        fold_distance = np.prod(determinants**2, axis=0)
-        rows = np.flatnonzero(~(_converged(state, z.shape) & (np.sign(determinants) == self.signs).all(axis=0)))
+        fold_distance = np.prod(_determinants(state, z.shape) ** 2, axis=0)
+        rows = np.flatnonzero(~state.solved(z.shape, self.signs.tolist()))
         if not len(rows):
             return state, fold_distance
         found = table_of(state.unknowns, z.shape)
@@ -203,7 +202,7 @@ class Atlas:
             squares = before * (2 * now - before)
             crossed = np.sign(now) != self.signs
             beyond = crossed.any(axis=0)
-            solved = ~beyond & _converged(state, left.shape)
+            solved = ~beyond & state.solved(left.shape)
             found[:, left[solved]], fold_distance[left[solved]] = new[:, solved], np.prod(now**2, axis=0)[solved]
             # Of what lies beyond, the pose at the fold is told.
             share = np.where(crossed & led, before / (before - now), 1.0).min(axis=0)
@@ -365,8 +364,3 @@ def _pick(poses: _Poses, z: Complexes) -> tuple[Complexes, Floats, Floats]:
 def _determinants(state: State, shape: tuple[int, ...]) -> Floats:
     """Determinants of a state's groups without a closed form, one a row."""
     return np.stack([np.broadcast_to(determinant, shape) for determinant in state.determinants])
-
-
-def _converged(state: State, shape: tuple[int, ...]) -> Flags:
-    """Where all groups without a closed form are solved."""
-    return np.asarray(np.all([np.broadcast_to(converged, shape) for converged in state.converged], axis=0))

@@ -96,8 +96,8 @@ def scale_of(structure: Structure, size: float, table: Floats) -> Floats:
 def follow(
     structure: Structure, solver: Solver, start: Start, given: Sequence[Value], places: Mapping[str, Value],
     nominal: Mapping[str, float], size: float, count: int,
-) -> tuple[Guess, Flags]:  # fmt: skip
-    """Continue `count` poses from `start`; returns their unknowns and which poses were reached.
+) -> tuple[Floats, Flags]:  # fmt: skip
+    """Continue `count` poses from `start`; returns the table of their unknowns and which poses were reached.
 
     Parameters
     ----------
@@ -155,8 +155,7 @@ def follow(
         moved = change(new, old)
         with np.errstate(invalid="ignore"):
             good = (np.abs(moved) <= MAX_CHANGE * scale_of(structure, size, old)).all(axis=0)
-        for converged, determinant, sign in zip(state.converged, state.determinants, signs, strict=True):
-            good &= converged & (np.sign(determinant) == sign[moving])
+        good &= state.solved(moving.shape, [sign[moving] for sign in signs])
         reached = moving[good]
         table[:, reached] = old[:, good] + moved[:, good]
         slope[:, reached] = moved[:, good] / taken[good]
@@ -167,4 +166,4 @@ def follow(
         step[moving[~good]] = taken[~good] / 2
         steady[moving] = good
         moving = moving[(done[moving] < 1) & (step[moving] >= SMALLEST_STEP)]
-    return guess_of(structure, table), done >= 1
+    return table, done >= 1
