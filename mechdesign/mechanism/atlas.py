@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
-from mechdesign.mechanism.continuation import MAX_CHANGE, guess_of, scale_of, table_of, unknowns_of
+from mechdesign.mechanism.continuation import MAX_CHANGE, guess_of, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import State
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -95,11 +94,10 @@ class Atlas:
         origin = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
         given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, held)]
         first = plan.solve(given, limits=False)
-        guess = unknowns_of(plan.structure, plan.all_rotations(first, given), first.slides, first.nodes)
-        state = plan.run(given, first.vectors, guess)
-        atlas = Atlas(plan, held, np.sign(_determinants(state, (1,))), origin)
+        start = plan.start(first)
+        atlas = Atlas(plan, held, np.array(start.signs).reshape(-1, 1), origin)
         seeds = np.flatnonzero(first.valid)
-        table = table_of(state.unknowns, (1,))[:, seeds]
+        table = table_of(start.unknowns, (1,))[:, seeds]
         (atlas.known[b""],) = atlas._grown({}, seeds, np.zeros(len(seeds), complex), table)
         return atlas
 
@@ -107,11 +105,6 @@ class Atlas:
     def empty(self) -> bool:
         """Whether the held values cannot be had at the point's place in the sketch, where poses would grow from."""
         return not self.known[b""].tree.n
-
-    @cached_property
-    def _drawn(self) -> dict[str, float]:
-        """Angles of the sketch: others lie within half a turn of them."""
-        return self.plan.core.drawn_angles()
 
     @property
     def spacing(self) -> float:
@@ -245,12 +238,9 @@ class Atlas:
         order = np.argsort(which, kind="stable")
         for key, lanes in zip(keys, np.split(order, np.cumsum(np.bincount(which))[:-1]), strict=True):
             near[lanes], table[:, lanes], slopes[:, :, lanes] = _pick(self.known[key], z[lanes])
-        # Those found longest ago go first, never the nominal ones.
-        total = sum(poses.tree.n for poses in self.known.values())
-        for key in [key for key in self.known if key]:
-            if total <= KEPT_POSES:
-                break
-            total -= self.known.pop(key).tree.n
+        if sum(poses.tree.n for poses in self.known.values()) > KEPT_POSES:
+            for key in self.known.keys() - {b"", *keys}:
+                del self.known[key]
         return near, table, slopes
 
     def _designs(self, sizes: Mapping[str, Floats], count: int) -> list[_Poses]:
@@ -338,7 +328,7 @@ class Atlas:
             graph, self.plan.core.geometry.vectors(places), shape, shaped(state.nodes),
             shaped(state.rotations[: graph.classes]), shaped(state.slides), shaped(state.closures),
             np.where(lost, Reason.NOT_CLOSED, Reason.OK).astype(np.int8), places,
-            self._drawn | self.plan.turns([0.0, 0.0, *self.held], places),
+            self.plan.near_sketch([0.0, 0.0, *self.held], places),
         )  # fmt: skip
 
     def _open(self, state: State, shape: tuple[int, ...]) -> Flags:

@@ -80,7 +80,8 @@ class Plan:
         size = self.core.size if self.iterative else 1.0
         return run(state, self.modes if modes is None else modes, guess, given, size, steps, enough)
 
-    def _start(self, at: Configuration | None) -> Start:
+    def start(self, at: Configuration | None) -> Start:
+        """A solved pose to continue from; the sketch where left out."""
         at = self.core.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
         guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides, at.nodes)
@@ -153,7 +154,7 @@ class Plan:
         reached: Flags | None = None
         guess: Guess | None = None
         if self.iterative:
-            begin = self._start(start)
+            begin = self.start(start)
             guess, reached = self._follow(values, dims, shape, begin)
         state = self.run(values, vectors, guess, self.modes_at(values))
         if reached is not None:
@@ -165,6 +166,14 @@ class Plan:
         """What angles are told near where no motion says more: those given as given, drives within their limits."""
         near = self.core.turns(dims)
         return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+
+    @cached_property
+    def _drawn_angles(self) -> dict[str, float]:
+        return self.core.drawn_angles()
+
+    def near_sketch(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
+        """What angles are told near where no motion says more, the others near those of the sketch."""
+        return self._drawn_angles | self.turns(given, dims)
 
     @cached_property
     def counted(self) -> frozenset[str]:

@@ -69,13 +69,8 @@ class Field:
         return Configuration(
             graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros((), dtype=np.int8), places,
-            self._drawn | self.plan.turns(given, places),
+            self.plan.near_sketch(given, places),
         )  # fmt: skip
-
-    @cached_property
-    def _drawn(self) -> dict[str, float]:
-        """Angles of the sketch: others lie within half a turn of them."""
-        return self.mechanism.drawn_angles()
 
     @property
     def rootless(self) -> bool:
