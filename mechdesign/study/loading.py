@@ -25,12 +25,13 @@ from mechdesign.study.build.build import build
 from mechdesign.study.build.builder import Builder
 from mechdesign.study.build.parameters import Parameters
 from mechdesign.study.build.section import MechanismSection, UnitsSection
-from mechdesign.study.schema import checks, pose_checks
-from mechdesign.study.schema.optimize import OptimizeSection
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.kinematics import KinematicsSection
+from mechdesign.study.schema.optimize import Condition, OptimizeSection
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
-from mechdesign.study.schema.sections import KinematicsSection, Requirement, StudyFile
 from mechdesign.study.schema.stiffness import StiffnessSection
+from mechdesign.study.schema.study_file import StudyFile, check, check_poses
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text.document import Document, plain, read
@@ -66,7 +67,7 @@ class Study:
         Parameters and the places of the geometry that depend on them.
     kinematics, workspace, optimize, reliability, stiffness : section or None
         The questions; None where the study does not ask.
-    requirements : tuple of Requirement
+    requirements : tuple of Condition
         The gate.
     targets : mapping of str to Target
         What outputs should be, by the coordinate or point.
@@ -88,7 +89,7 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[Condition, ...]
     targets: Mapping[str, Target]
     warnings: tuple[Problem, ...] = ()
 
@@ -204,11 +205,11 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(context.parameters, formulas)
-    parts = checks.check(parts, builder.names, parameters, reporter, path.parent)
+    parts = check(Checker(builder, parameters, parts), path.parent)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
-    pose_checks.check_poses(parts, mechanism, reporter, path.parent, 2.0 * math.pi / context.units.angle_factor)
+    check_poses(parts, mechanism, reporter, path.parent, 2.0 * math.pi / context.units.angle_factor)
     reporter.done()
     name = parts.get("name") or path.stem
     seed = parts["seed"] if seed is None else seed

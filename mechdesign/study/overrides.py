@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from mechdesign.errors import Problem, StudyError
-from mechdesign.study.schema.sections import StudyFile
+from mechdesign.study.schema.study_file import StudyFile
 from mechdesign.study.text.document import Document, Mark, Path, dotted, parse_value
 from mechdesign.study.text.numbers import suggestion
 from mechdesign.study.text.reporter import LIST_FORM, schema_keys

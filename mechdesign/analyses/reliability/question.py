@@ -16,9 +16,9 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.study import Study
-from mechdesign.study.schema.lists import as_list
 from mechdesign.study.schema.pin_links import others
 from mechdesign.study.schema.reliability import ReliabilitySection, split_order
+from mechdesign.study.text.numbers import as_list
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,17 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
-from mechdesign.study.build.section import Model
+from mechdesign.commands import COMMANDS
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.workspace import INDEX_NAMES, NEEDED
+from mechdesign.study.text.document import Path
 from mechdesign.study.text.numbers import (
     NAME_FORM,
     NUMBER_FORM,
     Bound,
     Choice,
     CoordinateName,
+    Model,
     Number,
     OrShort,
     PositiveNumber,
@@ -22,6 +26,12 @@ from mechdesign.study.text.numbers import (
     failure,
     suggestion,
 )
+
+# Results of a workspace that a goal or condition may name without its command.
+INDICES = ("GII", "GRI", "SUI", "area", "box_area")
+_STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))
+# Commands whose section no default can replace.
+_UNASSUMED = ("reliability", "stiffness")
 
 
 class Variable(Model):
@@ -133,3 +143,53 @@ class OptimizeSection(Model):
         if twice:
             raise failure(f"{twice[0]!r} is named twice among the goals")
         return self
+
+
+def check(checker: Checker, section: OptimizeSection) -> None:
+    """Check the variables of an optimisation, its method, and the results that its goals name."""
+    root: Path = ("optimize",)
+    report = checker.reporter.report
+    if not section.variables:
+        report((*root, "variables"), "an optimisation needs at least one variable")
+    if not section.maximize and not section.minimize:
+        report(root, "say what to 'maximize' or 'minimize'", at_key=True)
+    above = [name for name in checker.parameters.nominal if name not in section.variables]
+    for name, variable in section.variables.items():
+        path: Path = (*root, "variables", name)
+        checker.known(name, checker.parameters.known(), "parameter or dimension", path, at_key=True)
+        if name in checker.parameters.formulas:
+            message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
+            report(path, message, at_key=True)
+        for key, bound in (("from", variable.from_), ("to", variable.to)):
+            for unknown in sorted(bound.names - set(above)):
+                below = " above it" if unknown in section.variables else ""
+                message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
+                report((*path, key), message)
+        if name in checker.places:
+            checker.kind(path, checker.places[name].quantity)
+        above.append(name)
+        if section.method == "grid" and variable.step is None and variable.number is None:
+            report(path, "a variable of a grid needs either 'step' or 'number'")
+    if section.method == "pareto" and len(section.maximize + section.minimize) == 1:
+        report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
+    if section.method == "grid" and section.evaluations is not None:
+        report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
+    for key, goals in (("maximize", section.maximize), ("minimize", section.minimize)):
+        for index, goal in enumerate(goals):
+            check_result(checker, goal.result, (*root, key, index))
+    for index, condition in enumerate(section.subject_to):
+        check_result(checker, condition.result, (*root, "subject_to", index, "result"))
+
+
+def check_result(checker: Checker, name: str, path: Path, *, required: bool = False) -> None:
+    """Check the name of a result: a statistic of the workspace, or ``command.column``, as it must be if `required`."""
+    command, _, rest = name.partition(".")
+    if rest:
+        checker.known(command, COMMANDS, "command", path)
+    elif required or name not in (*INDICES, *_STATISTICS):
+        hint = suggestion(name, (*INDICES, *_STATISTICS))
+        hint = hint or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+        checker.reporter.report(path, f"there is no result {name!r}{hint}")
+    if not required:
+        column = name.rpartition(".")[2]
+        checker.needs(command if command in _UNASSUMED else NEEDED.get(column.rpartition("_")[0]), repr(name), path)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from mechdesign.mechanism.model import Quantity
 from mechdesign.study.schema import pin_links
-from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.checker import ORDERS, Checker
 from mechdesign.study.schema.reliability import (
     LOADS,
     Clearance,
@@ -17,11 +16,6 @@ from mechdesign.study.text.document import Path
 
 # Digits of a clearance beyond which its lowest value is zero.
 _ROUNDING = 1e-9
-
-_KINDS: dict[Quantity, tuple[str, str, str]] = {
-    "length": ("length", "velocity", "acceleration"),
-    "angle": ("angle", "angular_velocity", "angular_acceleration"),
-}
 
 
 def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
@@ -125,7 +119,7 @@ def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | 
         if point not in (binary.from_, binary.to) or binary.telescopic:
             message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
             report((*path, "effect"), message)
-    _spread_kind(checker, (*path, "tolerance"), "length")
+    checker.kind((*path, "tolerance"), "length")
     spread = clearance.radius_spread
     if spread is not None and spread.tolerance is not None and clearance.radius + spread.tolerance[0] < -_ROUNDING:
         factor = 1.0 if clearance.radial is not None else 2.0
@@ -147,14 +141,13 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
         report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)
     if limit.radius is not None:
         if checker.known(base, names.owners, "point", path, at_key=True):
-            checker.kind((*path, "radius"), _KINDS["length"][order])
+            checker.kind(path, ORDERS["length"][order])
     elif base in names.owners:
         report(path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True)
     else:
         quantity = checker.coordinate(base, path, at_key=True)
-        if quantity in _KINDS:
-            for key in ("min", "max"):
-                checker.kind((*path, key), _KINDS[quantity][order])
+        if quantity in ORDERS:
+            checker.kind(path, ORDERS[quantity][order])
 
 
 def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dimension]:
@@ -191,16 +184,8 @@ def _dimension(checker: Checker, name: str, dimension: Dimension, path: Path) ->
         return
     if name in LOADS:
         kind = LOADS[name]
-    elif name in checker.parameters.factors:
-        kind = "angle" if checker.is_angle(name) else "length"
+    elif name in checker.places:
+        kind = checker.places[name].quantity
     else:
         kind = checker.names.drives[name]
-    _spread_kind(checker, (*path, "tolerance"), kind)
-    checker.kind((*path, "sigma"), kind)
-
-
-def _spread_kind(checker: Checker, path: Path, kind: str) -> None:
-    """Units of a half-width, or of two bounds."""
     checker.kind(path, kind)
-    for index in range(2):
-        checker.kind((*path, index), kind)

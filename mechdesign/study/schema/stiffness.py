@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo, model_validator
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, model_validator
 
-from mechdesign.study.build.section import Model
-from mechdesign.study.schema.lists import as_list
+from mechdesign.mechanism.model import Quantity
+from mechdesign.study.build.names import GROUND
+from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.text.document import Path
 from mechdesign.study.text.numbers import (
     NUMBER_FORM,
     Angle,
     AnyName,
     Context,
     LinkName,
+    Model,
     Number,
     PointName,
     Positive,
@@ -26,8 +27,9 @@ from mechdesign.study.text.numbers import (
     PositiveLength,
     PositiveNumber,
     PositiveStress,
+    Read,
+    as_list,
     failure,
-    or_short,
     read_number,
 )
 
@@ -39,6 +41,7 @@ _ELASTIC = (
 )
 # Keys of each kind of section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
+_STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
 class Profile(Model):
@@ -61,8 +64,7 @@ class Profile(Model):
 
     @model_validator(mode="after")
     def _one_form(self) -> Profile:
-        keys = dict.fromkeys(key for form in _FORMS for key in form)
-        if tuple(key for key in keys if getattr(self, key) is not None) not in _FORMS:
+        if tuple(self.given(*dict.fromkeys(key for form in _FORMS for key in form))) not in _FORMS:
             raise failure(
                 "a section is {E, width, height}, {E, diameter}, {E, diameter, inner_diameter} or {E, area, inertia}"
             )
@@ -92,44 +94,32 @@ class Profile(Model):
 class Bearing(Model):
     """Stiffness of a joint itself: across, and of a slide also against turning; what is not given is rigid."""
 
+    bare, short = "radial", (NUMBER_FORM,)
     radial: PositiveNumber | None = None
     moment: PositiveNumber | None = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, raw: Any) -> Any:
-        return {"radial": raw} if isinstance(raw, int | float | str) and not isinstance(raw, bool) else raw
-
     @model_validator(mode="after")
     def _some(self) -> Bearing:
-        if self.radial is None and self.moment is None:
+        if not self.given("radial", "moment"):
             raise failure("a bearing has a 'radial' stiffness, and that of a slide a 'moment' stiffness too")
         return self
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return or_short(schema, handler, NUMBER_FORM)
+
+def _series(raw: Any, context: Context) -> float:
+    """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
+    parts = [read_number(each, context).nominal for each in as_list(raw)]
+    if not parts:
+        raise failure("expected a stiffness, or a list of those in series")
+    for part in parts:
+        if part <= 0:
+            raise failure(f"must be positive, not {part:g}")
+    return 1.0 / sum(1.0 / part for part in parts)
 
 
-class _Series:
-    """Annotation of a stiffness: a number, or a list of those in series, such as motor, gear and belt."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [NUMBER_FORM, {"type": "array", "items": NUMBER_FORM, "minItems": 1}],
-                "description": "a stiffness, or those of what is in series"}  # fmt: skip
-
-    @staticmethod
-    def _validate(raw: Any, info: ValidationInfo) -> float:
-        parts = [read_number(each, info.context or Context()).nominal for each in as_list(raw)]
-        if not parts:
-            raise failure("expected a stiffness, or a list of those in series")
-        for part in parts:
-            if part <= 0:
-                raise failure(f"must be positive, not {part:g}")
-        return 1.0 / sum(1.0 / part for part in parts)
+_SERIES = {
+    "anyOf": [NUMBER_FORM, {"type": "array", "items": NUMBER_FORM, "minItems": 1}],
+    "description": "a stiffness, or those of what is in series",
+}
 
 
 class StiffnessSection(PoseSection):
@@ -139,8 +129,57 @@ class StiffnessSection(PoseSection):
     at: PointName = Field(description="the point whose stiffness is asked")
     sections: dict[str, Profile] = Field(default_factory=dict)
     elastic: dict[LinkName, str] = Field(default_factory=dict, description=_ELASTIC)
-    actuators: dict[AnyName, Annotated[float, _Series()]] = Field(default_factory=dict)
+    actuators: dict[AnyName, Annotated[float, Read(_series, _SERIES)]] = Field(default_factory=dict)
     bearings: dict[AnyName, Bearing] = Field(default_factory=dict)
     direction: Angle | None = None
     loads: tuple[tuple[Number, ...], ...] = ()
     characteristic_length: PositiveLength | None = None
+
+
+def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
+    """Check what is named, the units of stiffnesses, and the loads; returns the section with loads of three numbers."""
+    root: Path = ("stiffness",)
+    right = checker.known(section.at, checker.names.owners, "point", (*root, "at"))
+    if right and section.link is None and GROUND in checker.names.owners[section.at]:
+        checker.reporter.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
+    if section.link is not None and checker.known(section.link, checker.names.moving, "moving link", (*root, "link")):
+        points = checker.names.points_of(section.link)
+        if right and section.at not in points:
+            message = f"link {section.link!r} has no point {section.at!r}; it has {', '.join(points)}"
+            checker.reporter.report((*root, "at"), message)
+    for link, profile in section.elastic.items():
+        path: Path = (*root, "elastic", link)
+        checker.known(link, checker.names.moving, "moving link", path, at_key=True)
+        checker.known(profile, section.sections, "section", path)
+    for profile in section.sections:
+        if profile not in section.elastic.values():
+            others = [other for other in section.sections if other != profile]
+            checker.reporter.unused((*root, "sections", profile), "section", others)
+    for drive in section.actuators:
+        path = (*root, "actuators", drive)
+        if checker.known(drive, checker.names.drives, "drive", path, at_key=True):
+            checker.kind(path, _STIFFNESS_KINDS[checker.names.drives[drive]])
+    for joint, bearing in section.bearings.items():
+        path = (*root, "bearings", joint)
+        slides = [*checker.names.slides, *checker.names.legs]
+        clamped = [set(other.fixed) for other in checker.names.section.joints.values() if other.fixed is not None]
+        pins = [p for p, owners in checker.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
+        if checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
+            if bearing.radial is not None:
+                checker.kind((*path, "radial"), "stiffness")
+            if bearing.moment is not None:
+                checker.kind((*path, "moment"), "rotational_stiffness")
+            if bearing.moment is not None and joint not in slides:
+                checker.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
+    loads = []
+    for index, load in enumerate(section.loads):
+        path = (*root, "loads", index)
+        if len(load) not in ((3,) if section.link is not None else (2, 3)):
+            checker.reporter.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
+            continue
+        for place, kind in enumerate(("force", "force", "moment")[: len(load)]):
+            checker.kind((*path, place), kind)
+        if section.link is None and len(load) == 3 and load[2] != 0.0:
+            checker.reporter.report((*path, 2), "a pin carries no moment; name the 'link' that is loaded")
+        loads.append((*load, 0.0)[:3])
+    return section.model_copy(update={"loads": tuple(loads)})

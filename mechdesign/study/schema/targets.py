@@ -11,9 +11,10 @@ import numpy as np
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.build.target_models import Wanted
-from mechdesign.study.poses import Poses, read_table
+from mechdesign.study.build.section import Wanted
+from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.paths import read_table
 from mechdesign.study.text.document import Path
 from mechdesign.study.text.reporter import Reporter
 

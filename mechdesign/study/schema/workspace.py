@@ -7,19 +7,22 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from mechdesign.study.build.section import Model
-from mechdesign.study.schema.lists import Numbers, as_list
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.text.document import Path
 from mechdesign.study.text.numbers import (
     Angle,
     Choice,
     CoordinateName,
     Length,
+    Model,
     NonNegativeAngle,
     Number,
+    Numbers,
     PointName,
     Positive,
     PositiveLength,
     Whole,
+    as_list,
     failure,
 )
 
@@ -100,3 +103,24 @@ class WorkspaceSection(Model):
     assembly: Annotated[str, Choice(("same", "any"))] = "same"
     characteristic_length: PositiveLength | None = None
     indices: Annotated[tuple[Annotated[str, Choice(INDEX_NAMES)], ...], BeforeValidator(as_list)] | None = None
+
+
+def check(checker: Checker, section: WorkspaceSection) -> None:
+    """Check the names, units and ranges of a workspace."""
+    root: Path = ("workspace",)
+    checker.known(section.point, checker.names.owners, "point", (*root, "point"))
+    checker.coordinates(section.at, (*root, "at"))
+    ranges = [name for name, values in section.at.items() if isinstance(values, Over)]
+    if len(ranges) > 1:
+        checker.reporter.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
+    for name, values in section.at.items():
+        if isinstance(values, Over):
+            checker.range(values.from_, values.to, (*root, "at", name))
+        elif not values:
+            checker.reporter.report((*root, "at", name), "an empty list of values")
+    for index, name in enumerate(section.indices or ()):
+        checker.needs(NEEDED.get(name), f"the index {name!r}", (*root, "indices", index))
+    scan = section.scan
+    if (scan.from_ is None) != (scan.to is None):
+        checker.reporter.report((*root, "scan"), "'from' and 'to' belong together")
+    checker.range(scan.from_, scan.to, (*root, "scan"))

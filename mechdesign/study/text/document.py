@@ -262,3 +262,12 @@ def plain(data: Any) -> Any:
     if isinstance(data, Mapping):
         return {key: plain(value) for key, value in data.items()}
     return [plain(item) for item in data] if isinstance(data, list) else data
+
+
+def leaves(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """Every value of data that is neither a mapping nor a list, with its path."""
+    if isinstance(data, Mapping | list):
+        for key, value in data.items() if isinstance(data, Mapping) else enumerate(data):
+            yield from leaves(value, (*path, key))
+    else:
+        yield path, data

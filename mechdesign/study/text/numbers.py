@@ -1,4 +1,4 @@
-"""Types of the study's schema that are not plain: numbers, names, choices.
+"""Numbers, names, choices and lists of the study's schema, and the base of its models.
 
 Each is a pydantic annotation. Its validator gets a `Context` and raises with a message for a designer; its JSON Schema
 says what an editor should accept.
@@ -9,11 +9,11 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -25,7 +25,16 @@ LARGEST, SMALLEST = 1e60, 1e-60
 """Magnitudes beyond which a number is a slip of writing: its square or reciprocal would soon overflow."""
 LONGEST, SHORTEST = 1e15, 1e-15
 """The same for lengths, which are multiplied with one another more often."""
+FILES = (".csv", ".txt", ".dat")
+"""Endings of the names of files with a table."""
 COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
+
+Form = dict[str, Any]
+"""JSON Schema of a part of the study."""
+NAME_FORM: Form = {"type": "string"}
+NAMES_FORM: Form = {"type": "array", "items": NAME_FORM}
+NUMBER_FORM: Form = {"type": ["number", "string"]}
+PAIR_FORM: Form = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
 
 
 @dataclass(frozen=True)
@@ -159,6 +168,37 @@ def _read_text(text: str, context: Context, kind: str | None) -> Value:
         raise failure(str(error)) from None
 
 
+def read_expression(raw: object, context: Context) -> Expression:
+    """Read an expression whose names are looked up later; a number is one without names."""
+    if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
+        number = read_number(raw, context).nominal
+        # A number that is lost has been told already.
+        return Expression.parse(repr(0.0 if math.isnan(number) else number))
+    try:
+        expression = context.expression(raw)
+        if not expression.names:
+            expression.evaluate({})
+    except ExpressionError as error:
+        raise failure(str(error)) from None
+    return expression
+
+
+def read_rows(raw: list[Any], context: Context, most: int, rule: str, empty: str) -> tuple[tuple[float, ...], ...]:
+    """Read a list of rows of equal length, from one number, which may stand alone, to `most`."""
+    rows: list[tuple[float, ...]] = []
+    for index, item in enumerate(raw):
+        try:
+            row = tuple(read_number(part, context).nominal for part in (item if isinstance(item, list) else [item]))
+        except PydanticCustomError as error:
+            raise failure(f"entry {index}: {error.message()}") from None
+        if not 1 <= len(row) <= most or (rows and len(row) != len(rows[0])):
+            raise failure(f"entry {index}: {rule}, not {shown(item)}")
+        rows.append(row)
+    if not rows:
+        raise failure(empty)
+    return tuple(rows)
+
+
 def _known_names(name: str, context: Context) -> str:
     if name in context.below:
         return f"; a parameter may use those above it, and {name!r} is below"
@@ -166,8 +206,58 @@ def _known_names(name: str, context: Context) -> str:
     return suggestion(name, context.parameters) or (f"; the parameters are {known}" if known else "")
 
 
+def as_list(raw: Any) -> list[Any]:
+    """One thing instead of a list of one; nothing is an empty list."""
+    return raw if isinstance(raw, list) else [] if raw is None else [raw]
+
+
+def pair_of(what: str) -> BeforeValidator:
+    """Annotation of a list of two, which are described for the message."""
+
+    def check(raw: Any) -> Any:
+        if not isinstance(raw, list) or len(raw) != 2:
+            raise failure(f"expected {what}, not {shown(raw)}")
+        return raw
+
+    return BeforeValidator(check)
+
+
+class Annotation:
+    """Base of the annotations: how a raw value is read, and what an editor should accept."""
+
+    def read(self, raw: Any, context: Context) -> Any:
+        """The value, or a `failure`."""
+        raise NotImplementedError
+
+    def form(self) -> Form:
+        """JSON Schema of the raw value."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(
+            lambda raw, info: self.read(raw, info.context or Context())
+        )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return self.form()
+
+
+@dataclass(frozen=True, eq=False)
+class Read(Annotation):
+    """Annotation of a value that a function reads."""
+
+    function: Callable[[Any, Context], Any]
+    accepted: Form
+
+    def read(self, raw: Any, context: Context) -> Any:
+        return self.function(raw, context)
+
+    def form(self) -> Form:
+        return dict(self.accepted)
+
+
 @dataclass(frozen=True)
-class Reader:
+class Reader(Annotation):
     """Annotation of a number of the study.
 
     Parameters
@@ -185,27 +275,15 @@ class Reader:
     exclusive: bool = False
     keep: Literal["", "value", "expression"] = ""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validate)
+    def form(self) -> Form:
+        return {**NUMBER_FORM, "description": "a number, a quantity or an expression"}
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"type": ["number", "string"], "description": "a number, a quantity or an expression"}
-
-    def _validate(self, raw: Any, info: ValidationInfo) -> float | Value | Expression:
-        context: Context = info.context or Context()
+    def read(self, raw: Any, context: Context) -> float | Value | Expression:
         if self.keep == "expression":
-            return self._deferred(raw, context)
+            return read_expression(raw, context)
         value = read_number(raw, context, self.kind)
         self._check_minimum(value.nominal)
         return value if self.keep else value.nominal
-
-    def _deferred(self, raw: Any, context: Context) -> Expression:
-        try:
-            if isinstance(raw, str) and not QUANTITY.fullmatch(raw):
-                return context.expression(raw)
-        except ExpressionError as error:
-            raise failure(str(error)) from None
-        return Expression.parse(repr(read_number(raw, context, self.kind).nominal))
 
     def _check_minimum(self, number: float) -> None:
         if self.minimum is None or math.isnan(number):
@@ -219,23 +297,20 @@ class Reader:
 
 
 @dataclass(frozen=True)
-class Whole:
+class Whole(Annotation):
     """Annotation of a whole number not below a minimum (and not above a maximum)."""
 
     minimum: int = 0
     maximum: int | None = None
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+    def form(self) -> Form:
         return {"type": ["integer", "number", "string"], "minimum": self.minimum}
 
-    def _validate(self, raw: Any, info: ValidationInfo) -> int:
+    def read(self, raw: Any, context: Context) -> int:
         if isinstance(raw, int) and not isinstance(raw, bool):
             whole = raw
         else:
-            number = read_number(raw, info.context or Context(), "none").nominal
+            number = read_number(raw, context, "none").nominal
             if math.isnan(number):
                 return self.minimum
             if number != int(number):
@@ -249,60 +324,93 @@ class Whole:
 
 
 @dataclass(frozen=True)
-class NameOf:
+class NameOf(Annotation):
     """Annotation of a name, or (dotted) of a coordinate; `what` is for the message: "a point"."""
 
     what: str
     dotted: bool = False
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._validate)
+    def form(self) -> Form:
+        return {**NAME_FORM, "description": f"the name of {self.what}"}
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"type": "string", "description": f"the name of {self.what}"}
+    def read(self, raw: Any, context: Context) -> str:
+        if isinstance(raw, str) and (COORDINATE if self.dotted else NAME).fullmatch(raw):
+            return raw
+        rule = "; a name is letters, digits and underscores, with a letter first" if isinstance(raw, str) else ""
+        raise failure(f"expected the name of {self.what}, not {shown(raw)}{rule}")
 
-    def _validate(self, raw: Any) -> str:
-        if not isinstance(raw, str):
-            raise failure(f"expected the name of {self.what}, not {shown(raw)}")
-        if not (COORDINATE if self.dotted else NAME).fullmatch(raw):
-            rule = "letters, digits and underscores, with a letter first"
-            raise failure(f"expected the name of {self.what}, not {shown(raw)}; a name is {rule}")
-        return raw
+
+@dataclass(frozen=True, eq=False)
+class Choice(Annotation):
+    """Annotation of a word out of a list."""
+
+    words: Collection[str]
+
+    def form(self) -> Form:
+        return {"enum": list(self.words)}
+
+    def read(self, raw: Any, context: Context) -> str:
+        if isinstance(raw, str) and raw in self.words:
+            return raw
+        hint = suggestion(raw, self.words) if isinstance(raw, str) else ""
+        raise failure(f"expected one of {', '.join(self.words)}, not {shown(raw)}{hint}")
 
 
 @dataclass(frozen=True, eq=False)
 class OrShort:
     """Annotation that adds short forms, which a validator brings to the long one, to the JSON Schema."""
 
-    forms: tuple[dict[str, Any], ...]
+    forms: tuple[Form, ...]
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         return {"anyOf": [handler(schema), *self.forms]}
 
 
-def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *forms: dict[str, Any]) -> JsonSchemaValue:
-    """JSON Schema of a model that may also be written in short forms."""
-    return {"anyOf": [dict(handler.resolve_ref_schema(handler(schema))), *forms]}
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Annotation of a word out of a list."""
-
-    words: tuple[str, ...]
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._validate)
+class OrOne:
+    """Annotation that adds one entry, which a validator makes a list of, to a list's JSON Schema."""
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"enum": list(self.words)}
+        many = handler(schema)
+        return {"anyOf": [many, many["items"]]}
 
-    def _validate(self, raw: Any) -> str:
-        if isinstance(raw, str) and raw in self.words:
-            return raw
-        known = ", ".join(self.words)
-        hint = suggestion(raw, self.words) if isinstance(raw, str) else ""
-        raise failure(f"expected one of {known}, not {shown(raw)}{hint}")
+
+class Model(BaseModel):
+    """Base of all sections: frozen, unknown keys are errors, values come in study units.
+
+    Attributes
+    ----------
+    bare : str
+        Key that a value stands for which is written alone, instead of a mapping.
+    short : tuple of dict
+        JSON Schema of the short forms.
+    one_of : tuple of str
+        Keys of which exactly one is given, after the message where they are none or several.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+    bare: ClassVar[str] = ""
+    short: ClassVar[tuple[Form, ...]] = ()
+    one_of: ClassVar[tuple[str, ...]] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _long_form(cls, raw: Any) -> Any:
+        return raw if not cls.bare or raw is None or isinstance(raw, dict | Model) else {cls.bare: raw}
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> Self:
+        if self.one_of and len(self.given(*self.one_of[1:])) != 1:
+            raise failure(self.one_of[0])
+        return self
+
+    def given(self, *keys: str) -> list[str]:
+        """Those of the keys that are not None."""
+        return [key for key in keys if getattr(self, key) is not None]
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        found = handler(schema)
+        return {"anyOf": [dict(handler.resolve_ref_schema(found)), *cls.short]} if cls.short else found
 
 
 def check_parameter_name(name: str) -> str | None:
@@ -311,10 +419,6 @@ def check_parameter_name(name: str) -> str | None:
         return "a parameter's name is letters, digits and underscores, with a letter first"
     return f"{name!r} is a word of the expression language; choose another name" if name in RESERVED else None
 
-
-NAME_FORM: dict[str, Any] = {"type": "string"}
-NAMES_FORM: dict[str, Any] = {"type": "array", "items": NAME_FORM}
-NUMBER_FORM: dict[str, Any] = {"type": ["number", "string"]}
 
 Number = Annotated[float, Reader()]
 Pure = Annotated[float, Reader("none")]
@@ -344,4 +448,7 @@ JointName = Annotated[str, NameOf("a joint")]
 DriveName = Annotated[str, NameOf("a drive")]
 MeasureName = Annotated[str, NameOf("a measure")]
 AnyName = Annotated[str, NameOf("a link, leg or joint")]
-CoordinateName = Annotated[str, NameOf("a coordinate, such as C.x or rod.angle,", dotted=True)]
+CoordinateName = Annotated[str, NameOf("a coordinate (such as C.x or rod.angle)", dotted=True)]
+
+CoordinateNames = Annotated[tuple[CoordinateName, ...], BeforeValidator(as_list), OrOne()]
+Numbers = Annotated[tuple[Number, ...], BeforeValidator(as_list), OrOne()]

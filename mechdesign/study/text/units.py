@@ -144,11 +144,7 @@ class Units:
             Where the unit is unknown or of another kind.
         """
         number, powers, factor = measure(text)
-        if (
-            kind is not None
-            and powers != KINDS[kind]
-            and not (kind == "rotational_stiffness" and powers == (1, 0, 0, 1))
-        ):
+        if kind is not None and not fits(powers, kind):
             raise QuantityError(f"{text.strip()!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected")
         if powers[0] and self.length == "dimensionless":
             raise QuantityError(f"{text.strip()!r} has a length in it, and this study's lengths are dimensionless")
@@ -254,6 +250,11 @@ def _registry() -> Any:
     registry: Any = pint.UnitRegistry(None, on_redefinition="ignore")
     registry.load_definitions(_DEFINITIONS.strip().splitlines())
     return registry
+
+
+def fits(powers: Powers, kind: str) -> bool:
+    """Whether a unit is one of a kind of quantity; a rotational stiffness may leave its radian out."""
+    return powers == KINDS[kind] or (kind == "rotational_stiffness" and powers == KINDS["moment"])
 
 
 def describe(powers: Powers) -> str:
