@@ -20,7 +20,7 @@ from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study import overrides, poses
+from mechdesign.study import overrides
 from mechdesign.study.build.build import build
 from mechdesign.study.build.builder import Builder
 from mechdesign.study.build.parameters import Parameters
@@ -28,7 +28,6 @@ from mechdesign.study.build.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.optimize import Condition, OptimizeSection
-from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, check, check_poses
@@ -98,13 +97,6 @@ class Study:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
 
-    @cached_property
-    def _nodes(self) -> poses.Poses:
-        # Here, for these poses are themselves the answer to a question.
-        from mechdesign.analyses.workspace.nodes import workspace_nodes
-
-        return workspace_nodes(self)
-
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text as long as the file is what was read."""
         content = self.path.read_bytes() if self.path is not None and self.path.is_file() else b""
@@ -115,28 +107,6 @@ class Study:
         reporter = Reporter(document)
         reporter.report(keys, message)
         return reporter.problems[-1]
-
-    def poses(self, section: str) -> poses.Poses:
-        """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
-
-        A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.
-
-        Raises
-        ------
-        StudyError
-            Where nothing sensible can be assumed.
-        """
-        turn = 2.0 * math.pi / self.units.angle_factor
-        for name in dict.fromkeys((section, "kinematics")):
-            asked: PoseSection | None = getattr(self, name)
-            if asked is not None and asked.at_nodes:
-                return self._nodes
-            if asked is not None:
-                folder = self.path.parent if self.path else pathlib.Path()
-                found = poses.expand(asked, folder, turn)
-                if found is not None:
-                    return found
-        return poses.default(self.mechanism.description, turn)
 
 
 def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:
