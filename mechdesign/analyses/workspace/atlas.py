@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mechdesign.analyses.workspace.approach import Approach, unknowns
 from mechdesign.mechanism.algebra import Value
@@ -19,6 +19,9 @@ from mechdesign.mechanism.continuation import unknowns_of
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import State
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 # Distance of neighbouring poses, as a share of the mechanism's size.
 SPACING = 0.03
@@ -250,6 +253,9 @@ class Atlas:
         for k in range(count):
             lanes = np.flatnonzero(design == k)
             z = self.origin + self.spacing * lattice[lanes]
+            # Here, for a mechanism is drawn without SciPy.
+            from scipy.spatial import cKDTree
+
             tree = cKDTree(np.stack([z.real, z.imag], axis=-1))
             found.append(_Poses(tree, table[:, lanes], slopes[:, :, lanes], lattice[lanes], grip[lanes]))
         return found
