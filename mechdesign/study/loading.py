@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import hashlib
 import math
 import pathlib
@@ -36,7 +37,7 @@ from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text.document import Document, plain, read
 from mechdesign.study.text.numbers import LOST, Context, check_parameter_name, read_number, shown
 from mechdesign.study.text.reporter import Reporter, unknown_key
-from mechdesign.study.text.units import Units, units_from
+from mechdesign.study.text.units import Units
 from mechdesign.threads import one_thread
 
 
@@ -187,7 +188,7 @@ def load_document(
     resolved = plain(document.data) | {
         "name": name,
         "seed": seed,
-        "units": {"length": units.length, "angle": units.angle, "time": units.time, "force": units.force},
+        "units": dataclasses.asdict(units),
     }
     return Study(
         name=name,
@@ -222,13 +223,9 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
 def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
     """Units and parameters, which all other numbers are read with."""
     units = Units()
-    try:
-        given = UnitsSection.model_validate(data.get("units") or {})
-    except ValidationError:
-        given = UnitsSection()
-    units, wrong = units_from(given.length, given.angle, given.time, given.force)
-    for kind, message in wrong.items():
-        reporter.report(("units", kind), message)
+    # A wrong unit is told with the mistakes of the other sections.
+    with contextlib.suppress(ValidationError):
+        units = Units(**UnitsSection.model_validate(data.get("units") or {}).model_dump())
     mechanism = data.get("mechanism")
     raw = mechanism.get("parameters") if isinstance(mechanism, dict) else None
     raw = raw if isinstance(raw, dict) else {}

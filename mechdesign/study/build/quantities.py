@@ -9,11 +9,9 @@ import numpy as np
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.model import Drive, Limit, Measure, Quantity, Term
 from mechdesign.study.build import section as models
-from mechdesign.study.build.builder import Builder
+from mechdesign.study.build.builder import ROOT, Builder
 from mechdesign.study.text.document import Path
 from mechdesign.study.build.names import GROUND
-from mechdesign.study.text.numbers import Value
-from mechdesign.study.text.units import KINDS, describe
 
 
 def drives(builder: Builder) -> dict[str, Drive]:
@@ -97,17 +95,13 @@ def limits(builder: Builder) -> tuple[Limit, ...]:
             quantity = builder.names.measures.get(items[0], "none")
         bounds: list[Term | None] = []
         for end, value in (("min", section.min), ("max", section.max)):
-            _check_kind(builder, value, quantity, (*path, end))
+            if quantity != "none":
+                builder.reporter.kind((*ROOT, *path, end), quantity)
             bounds.append(None if value is None else builder.place(f"limits.{index}.{end}", value, quantity))
         _check_bounds(builder, section, kind, quantity, path)
         if right:
             found.append(Limit(kind, items, bounds[0], bounds[1], f"limits.{index}"))
     return tuple(found)
-
-
-def _check_kind(builder: Builder, value: Value | None, quantity: Quantity, path: Path) -> None:
-    if value is not None and value.powers is not None and quantity != "none" and value.powers != KINDS[quantity]:
-        builder.report(path, f"is {describe(value.powers)}, where {describe(KINDS[quantity])} is expected")
 
 
 def _check_bounds(builder: Builder, section: models.Limit, kind: str, quantity: Quantity, path: Path) -> None:

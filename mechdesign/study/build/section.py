@@ -42,6 +42,7 @@ from mechdesign.study.text.numbers import (
     shown,
     suggestion,
 )
+from mechdesign.study.text.units import QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
 TARGET_FORMS = "an expression, a number, {file: path.csv}, a list of numbers, of [x, y] or of [drive, x, y]"
@@ -258,10 +259,23 @@ class MechanismSection(Model):
     targets: dict[CoordinateName, TargetValue] = {}
 
 
+def _unit_of(kind: str) -> Read:
+    def read(raw: Any, context: Context) -> str:
+        if not isinstance(raw, str):
+            raise failure(f"expected a text, not {shown(raw)}")
+        try:
+            check_unit(kind, raw)
+        except QuantityError as error:
+            raise failure(str(error)) from None
+        return raw
+
+    return Read(read, NAME_FORM)
+
+
 class UnitsSection(Model):
     """Units that bare numbers mean."""
 
-    length: str = "mm"
-    angle: str = "deg"
-    time: str = "s"
-    force: str = "N"
+    length: Annotated[str, _unit_of("length")] = "mm"
+    angle: Annotated[str, _unit_of("angle")] = "deg"
+    time: Annotated[str, _unit_of("time")] = "s"
+    force: Annotated[str, _unit_of("force")] = "N"

@@ -8,8 +8,7 @@ from typing import Any
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.build.builder import Builder
 from mechdesign.study.build.parameters import Parameters
-from mechdesign.study.text.document import Path, leaves
-from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, fits, measure
+from mechdesign.study.text.document import Path
 
 # Kinds of a coordinate, its rate and its acceleration.
 ORDERS: dict[Quantity | None, tuple[str, str, str]] = {
@@ -25,20 +24,7 @@ class Checker:
         self.names, self.places, self.reporter = builder.names, builder.places, builder.reporter
         self.parameters = parameters
         self.parts = parts
-        self.known = builder.reporter.known
-
-    def kind(self, path: Path, kind: str) -> None:
-        """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
-        for keys, raw in leaves(self.reporter.raw(path)):
-            if not isinstance(raw, str) or not QUANTITY.fullmatch(raw):
-                continue
-            try:
-                powers = measure(raw)[1]
-            except QuantityError:
-                continue
-            if not fits(powers, kind):
-                message = f"{raw!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected"
-                self.reporter.report((*path, *keys), message)
+        self.known, self.kind = builder.reporter.known, builder.reporter.kind
 
     def coordinate(self, name: str, path: Path, *, at_key: bool = False, others: Iterable[str] = ()) -> Quantity | None:
         """Kind of a coordinate; None, and noted, where there is none of that name.

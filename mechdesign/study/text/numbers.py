@@ -18,7 +18,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from mechdesign.expressions import RESERVED, Expression, ExpressionError
-from mechdesign.study.text.units import QUANTITY, Powers, QuantityError, Units, measure
+from mechdesign.study.text.units import QUANTITY, QuantityError, Units
 
 NAME = re.compile(r"[^\W\d]\w*")
 LARGEST, SMALLEST = 1e60, 1e-60
@@ -75,13 +75,10 @@ class Value:
         In the study's units.
     expression : Expression or None
         Where it depends on parameters.
-    powers : powers or None
-        Kind of quantity, where it was given with a unit.
     """
 
     nominal: float
     expression: Expression | None = None
-    powers: Powers | None = None
 
 
 LOST = Value(math.nan)
@@ -158,7 +155,7 @@ def _read_text(text: str, context: Context, kind: str | None) -> Value:
             number = context.units.convert(text, kind)
             if not math.isfinite(number):
                 raise failure(f"{text!r} is too large a number")
-            return Value(number, None, measure(text)[1])
+            return Value(number)
         expression = context.expression(text)
         for name in sorted(expression.names - set(context.parameters)):
             raise failure(f"unknown name {name!r} in {shown(text)}{_known_names(name, context)}")

@@ -9,8 +9,9 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from mechdesign.errors import Problem, StudyError
-from mechdesign.study.text.document import Document, Path, dotted, plain
+from mechdesign.study.text.document import Document, Path, dotted, leaves, plain
 from mechdesign.study.text.numbers import LOST, nearest, shown, suggestion
+from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, fits, measure
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
@@ -50,6 +51,19 @@ class Reporter:
         problem = self._placed(found, message, at_key)
         if problem not in self.problems:
             self.problems.append(problem)
+
+    def kind(self, path: Path, kind: str) -> None:
+        """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
+        for keys, raw in leaves(self.raw(path)):
+            if not isinstance(raw, str) or not QUANTITY.fullmatch(raw):
+                continue
+            try:
+                powers = measure(raw)[1]
+            except QuantityError:
+                continue
+            if not fits(powers, kind):
+                message = f"{raw!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected"
+                self.report((*path, *keys), message)
 
     def warn(self, path: Sequence[str | int], message: str) -> None:
         """Note what is likely a mistake, though the study can be answered, at a key of the data."""
