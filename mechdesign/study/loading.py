@@ -22,8 +22,8 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
 from mechdesign.study import overrides
-from mechdesign.study.build.build import build
 from mechdesign.study.build.builder import Builder
+from mechdesign.study.build.description import build
 from mechdesign.study.build.parameters import Parameters
 from mechdesign.study.build.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.checker import Checker

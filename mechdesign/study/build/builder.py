@@ -62,11 +62,15 @@ class Builder:
         """Whether a name is known; if not, note it with the nearest one."""
         return self.reporter.known(name, known, what, (*ROOT, *path))
 
-    def check_names(self, names: Iterable[str], known: Iterable[str], what: str, path: Path) -> bool:
-        """Whether all names of a list are known; each that is not is noted."""
-        candidates = list(known)
+    def check_named(self, what: str, names: Iterable[str], path: Path) -> bool:
+        """Whether all names of a list are known links, points, drives or measures; each that is not is noted.
+
+        `what` may be the quantity that they give: an angle is that of links, a distance that of points.
+        """
+        what = {"angle": "link", "distance": "point"}.get(what, what)
+        known: Iterable[str] = self.names.owners if what == "point" else getattr(self.section, f"{what}s")
         # All of them are looked up, so that every mistake is told.
-        found = [self.check_name(name, candidates, what, (*path, k)) for k, name in enumerate(names)]
+        found = [self.check_name(name, known, what, (*path, k)) for k, name in enumerate(names)]
         return all(found)
 
     def check_distinct(self) -> None:

@@ -29,7 +29,7 @@ def build(builder: Builder) -> dict[str, JointModel]:
 
 
 def _pair(builder: Builder, path: Path, pair: tuple[str, str]) -> bool:
-    if not builder.check_names(pair, builder.section.links, "link", path):
+    if not builder.check_named("link", pair, path):
         return False
     if pair[0] == pair[1]:
         builder.report(path, f"a joint of link {pair[0]!r} with itself")

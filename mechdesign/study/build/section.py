@@ -145,9 +145,9 @@ class Joint(Model):
 
     @model_validator(mode="after")
     def _fitting(self) -> Joint:
-        kind = "slot" if self.slot is not None else "fixed"
-        for key in self.given("angle") if kind == "slot" else self.given("through", "direction") if self.fixed else ():
-            raise failure(f"a {kind} joint has no {key!r}")
+        foreign = {"prismatic": (), "slot": ("angle",), "fixed": ("through", "direction")}
+        for key in self.given(*foreign[self.kind]):
+            raise failure(f"a {self.kind} joint has no {key!r}")
         if self.through is not None and len(self.through) == 2 and self.direction is not None:
             raise failure("'through' two points gives the direction; leave 'direction' out")
         return self

@@ -15,6 +15,7 @@ ORDERS: dict[Quantity | None, tuple[str, str, str]] = {
     "length": ("length", "velocity", "acceleration"),
     "angle": ("angle", "angular_velocity", "angular_acceleration"),
 }
+NO_MOMENT = "a pin carries no moment; name the 'link' of the stiffness section that is loaded"
 
 
 class Checker:
@@ -61,6 +62,17 @@ class Checker:
             if seen.intersection(parts):
                 self.reporter.report((*path, index), f"{name!r} is listed twice")
             seen.update(parts)
+
+    def load(self, load: tuple[float, ...], path: Path, *, on_pin: bool) -> tuple[float, ...]:
+        """A load of the stiffness section's point or link as fx, fy, mz."""
+        if len(load) not in ((2, 3) if on_pin else (3,)):
+            self.reporter.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
+            return 0.0, 0.0, 0.0
+        for place, kind in enumerate(("force", "force", "moment")[: len(load)]):
+            self.kind((*path, place), kind)
+        if on_pin and any(load[2:]):
+            self.reporter.report((*path, 2), NO_MOMENT)
+        return (*load, 0.0)[:3]
 
     def range(self, low: float | None, high: float | None, path: Path) -> None:
         """Check that the end of a range is beyond its beginning."""

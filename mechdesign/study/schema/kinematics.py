@@ -35,7 +35,8 @@ class KinematicsSection(MotionSection):
 
 
 def check(checker: Checker, section: KinematicsSection) -> None:
-    """Check what loads act on."""
+    """Check the outputs, and what loads act on."""
+    checker.outputs(section.outputs, ("kinematics", "outputs"))
     for index, load in enumerate(section.loads):
         path: Path = ("kinematics", "loads", index)
         if load.at is not None:

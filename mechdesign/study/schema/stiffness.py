@@ -171,15 +171,8 @@ def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
                 checker.kind((*path, "moment"), "rotational_stiffness")
             if bearing.moment is not None and joint not in slides:
                 checker.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
-    loads = []
-    for index, load in enumerate(section.loads):
-        path = (*root, "loads", index)
-        if len(load) not in ((3,) if section.link is not None else (2, 3)):
-            checker.reporter.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
-            continue
-        for place, kind in enumerate(("force", "force", "moment")[: len(load)]):
-            checker.kind((*path, place), kind)
-        if section.link is None and len(load) == 3 and load[2] != 0.0:
-            checker.reporter.report((*path, 2), "a pin carries no moment; name the 'link' that is loaded")
-        loads.append((*load, 0.0)[:3])
+    loads = [
+        checker.load(load, (*root, "loads", index), on_pin=section.link is None)
+        for index, load in enumerate(section.loads)
+    ]
     return section.model_copy(update={"loads": tuple(loads)})

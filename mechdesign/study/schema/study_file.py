@@ -18,7 +18,6 @@ from mechdesign.study.schema import poses as pose_checks
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.optimize import Condition, OptimizeSection
-from mechdesign.study.schema.pin_links import split_link
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -58,15 +57,12 @@ def check(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
         if isinstance(section, PoseSection):
             pose_checks.check(checker, command, section)
         if isinstance(section, KinematicsSection):
-            checker.outputs(section.outputs, (command, "outputs"))
             kinematics.check(checker, section)
         elif isinstance(section, WorkspaceSection):
             workspace.check(checker, section)
         elif isinstance(section, OptimizeSection):
             optimize.check(checker, section)
         elif isinstance(section, ReliabilitySection):
-            names = [split_link(checker.names, name)[1] for name in section.outputs or ()]
-            checker.outputs(names, (command, "outputs"))
             found[command] = reliability_checks.check(checker, section)
         elif isinstance(section, StiffnessSection):
             found[command] = stiffness.check(checker, section)

@@ -404,6 +404,11 @@ class Model(BaseModel):
         """Those of the keys that are not None."""
         return [key for key in keys if getattr(self, key) is not None]
 
+    @property
+    def kind(self) -> Any:
+        """Which of the keys of `one_of` is given."""
+        return self.given(*self.one_of[1:])[0]
+
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         found = handler(schema)
