@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.errors import nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 
@@ -126,9 +126,8 @@ def _locate(result: Result, path: str) -> tuple[Table, str, Flags]:
 
 def _unknown(where: str, name: str, known: Iterable[str]) -> str:
     names = list(dict.fromkeys(known))
-    close = get_close_matches(name, names, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(names)}"
-    return f"{where}: no column {name!r}; {hint}"
+    hint = suggestion(name, names) or f"; it has {', '.join(names)}"
+    return f"{where}: no column {name!r}{hint}"
 
 
 def _missing(table: Table, rows: Flags, where: Mapping[str, Any]) -> str:
@@ -148,11 +147,11 @@ def _present(values: NDArray[Any], wanted: object) -> str:
     """The values of a column in words: all of few, the ends and the nearest of many numbers."""
     number = values.dtype.kind in "fiub"
     known = list(dict.fromkeys((values[np.isfinite(values)] if number else values).tolist()))
-    if not number and (close := get_close_matches(str(wanted), known, n=1)):
-        return f"did you mean {close[0]!r}?"
+    if not number and (close := nearest(str(wanted), known)):
+        return f"did you mean {close!r}?"
     if number and len(known) > MOST_VALUES and isinstance(wanted, (int, float)):
-        nearest = min(known, key=lambda value: abs(value - wanted))
-        return f"there are {min(known):.12g} to {max(known):.12g}, {nearest:.12g} the nearest"
+        beside = min(known, key=lambda value: abs(value - wanted))
+        return f"there are {min(known):.12g} to {max(known):.12g}, {beside:.12g} the nearest"
     shown = [f"{value:.12g}" if isinstance(value, float) else str(value) for value in known[:MOST_VALUES]]
     rest = ", ..." * (len(known) > MOST_VALUES)
     return f"there {'is' if len(known) == 1 else 'are'} {', '.join(shown) or 'none'}{rest}"

@@ -184,27 +184,18 @@ def load_document(
     reporter.done()
     name = parts.get("name") or path.stem
     seed = parts["seed"] if seed is None else seed
-    units = context.units
-    resolved = plain(document.data) | {
-        "name": name,
-        "seed": seed,
-        "units": dataclasses.asdict(units),
-    }
+    named = {"name": name, "seed": seed, "units": dataclasses.asdict(context.units)}
     return Study(
         name=name,
         path=path,
         text_sha256=text_sha256,
         seed=seed,
         overrides=changes,
-        units=units,
-        resolved=resolved,
+        units=context.units,
+        resolved=plain(document.data) | named,
         mechanism=mechanism,
         parameters=parameters,
-        kinematics=parts.get("kinematics"),
-        workspace=parts.get("workspace"),
-        optimize=parts.get("optimize"),
-        reliability=parts.get("reliability"),
-        stiffness=parts.get("stiffness"),
+        **{command: parts.get(command) for command in COMMANDS},
         requirements=parts["requirements"],
         targets=parts["targets"],
         warnings=tuple(reporter.warnings),

@@ -6,10 +6,9 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import Problem, StudyError, suggestion
 from mechdesign.study.schema.study_file import StudyFile
 from mechdesign.study.text.document import Document, Mark, Path, dotted, parse_value
-from mechdesign.study.text.numbers import suggestion
 from mechdesign.study.text.reporter import LIST_FORM, schema_keys
 
 MAX_LENGTH = 1000

@@ -11,7 +11,8 @@ from mechdesign.mechanism.model import Link, Place, Quantity, Term
 from mechdesign.study.build import section as models
 from mechdesign.study.text.document import Path
 from mechdesign.study.build.names import GROUND, Names
-from mechdesign.study.text.numbers import Value, suggestion
+from mechdesign.study.text.numbers import Value
+from mechdesign.errors import suggestion
 from mechdesign.study.build.parameters import Parameters
 from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Units

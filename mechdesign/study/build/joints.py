@@ -9,7 +9,7 @@ from mechdesign.study.build import section as models
 from mechdesign.study.build.builder import Builder
 from mechdesign.study.text.document import Path
 from mechdesign.study.build.names import GROUND
-from mechdesign.study.text.numbers import suggestion
+from mechdesign.errors import suggestion
 
 
 def build(builder: Builder) -> dict[str, JointModel]:

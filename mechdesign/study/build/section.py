@@ -12,36 +12,9 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.expressions import Expression
-from mechdesign.study.text.numbers import (
-    FILES,
-    NAME_FORM,
-    NAMES_FORM,
-    NUMBER_FORM,
-    PAIR_FORM,
-    AngleValue,
-    AnyName,
-    AnyValue,
-    Choice,
-    Context,
-    CoordinateName,
-    DriveName,
-    JointName,
-    LengthValue,
-    LinkName,
-    MeasureName,
-    Model,
-    OrShort,
-    PointName,
-    PositiveLengthValue,
-    Read,
-    Value,
-    failure,
-    pair_of,
-    read_expression,
-    read_rows,
-    shown,
-    suggestion,
-)
+from mechdesign.study.text import fields
+from mechdesign.study.text.numbers import FILES, Context, Value, failure, read_expression, read_rows, shown
+from mechdesign.errors import suggestion
 from mechdesign.study.text.units import QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
@@ -60,28 +33,28 @@ def names_to_mapping(raw: Any) -> Any:
     return dict.fromkeys(raw)
 
 
-Point = Annotated[tuple[LengthValue, LengthValue], pair_of("[x, y]")]
+Point = Annotated[tuple[fields.LengthValue, fields.LengthValue], fields.pair_of("[x, y]")]
 PointValues = tuple[Value, Value]
-TwoLinks = Annotated[tuple[LinkName, LinkName], pair_of("a list of two names")]
-TwoPoints = Annotated[tuple[PointName, PointName], pair_of("a list of two names")]
+TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
+TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of("a list of two names")]
 
 
-class Link(Model):
+class Link(fields.Model):
     """A link: binary, telescopic, or its points in its own frame; what is None is measured from the sketch."""
 
     short = (
-        {"type": "array", "prefixItems": [NAME_FORM, NAME_FORM, NUMBER_FORM], "minItems": 2, "maxItems": 3},
+        {"type": "array", "prefixItems": [fields.NAME_FORM, fields.NAME_FORM, fields.NUMBER_FORM], "minItems": 2, "maxItems": 3},
         {
             "type": "object",
-            "additionalProperties": {"anyOf": [PAIR_FORM, {"type": "null"}]},
+            "additionalProperties": {"anyOf": [fields.PAIR_FORM, {"type": "null"}]},
             "not": {"anyOf": [{"required": [key]} for key in LINK_KEYS]},
         },
     )
-    from_: PointName | None = Field(None, alias="from")
-    to: PointName | None = None
-    length: PositiveLengthValue | None = None
+    from_: fields.PointName | None = Field(None, alias="from")
+    to: fields.PointName | None = None
+    length: fields.PositiveLengthValue | None = None
     telescopic: bool = False
-    points: Annotated[dict[PointName, Point | None], BeforeValidator(names_to_mapping), OrShort((NAMES_FORM,))] = {}
+    points: Annotated[dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))] = {}
 
     @model_validator(mode="before")
     @classmethod
@@ -131,17 +104,17 @@ def _through(raw: Any) -> Any:
     return raw
 
 
-class Joint(Model):
+class Joint(fields.Model):
     """A joint that is not a revolute: exactly one of prismatic, slot and fixed."""
 
     one_of = ("a joint is one of prismatic: [a, b], slot: a, fixed: [a, b]", "prismatic", "slot", "fixed")
     prismatic: TwoLinks | None = None
-    slot: LinkName | None = None
+    slot: fields.LinkName | None = None
     fixed: TwoLinks | None = None
-    through: Annotated[tuple[PointName, ...], BeforeValidator(_through), OrShort((NAME_FORM,))] | None = None
-    direction: AngleValue | None = None
-    point: PointName | None = None
-    angle: AngleValue | None = None
+    through: Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort((fields.NAME_FORM,))] | None = None
+    direction: fields.AngleValue | None = None
+    point: fields.PointName | None = None
+    angle: fields.AngleValue | None = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Joint:
@@ -153,14 +126,14 @@ class Joint(Model):
         return self
 
 
-class Drive(Model):
+class Drive(fields.Model):
     """A driven coordinate: exactly one of angle, length and slide."""
 
     one_of = ("a drive is one of angle: link, length: leg, slide: joint", "angle", "length", "slide")
-    angle: LinkName | None = None
-    from_: LinkName | None = Field(None, alias="from")
-    length: LinkName | None = None
-    slide: JointName | None = None
+    angle: fields.LinkName | None = None
+    from_: fields.LinkName | None = Field(None, alias="from")
+    length: fields.LinkName | None = None
+    slide: fields.JointName | None = None
 
     @model_validator(mode="after")
     def _of_an_angle(self) -> Drive:
@@ -169,10 +142,10 @@ class Drive(Model):
         return self
 
 
-class Measure(Model):
+class Measure(fields.Model):
     """A named quantity: exactly one of angle, distance and expression."""
 
-    bare, short = "expression", (NAME_FORM,)
+    bare, short = "expression", (fields.NAME_FORM,)
     one_of = (
         "a measure is one of {angle: [a, b]}, {distance: [P, Q]} or an expression over coordinates",
         "angle",
@@ -184,7 +157,7 @@ class Measure(Model):
     expression: str | None = None
 
 
-class Limit(Model):
+class Limit(fields.Model):
     """Bounds of a distance, a drive, an angle or a measure."""
 
     one_of = (
@@ -195,11 +168,11 @@ class Limit(Model):
         "measure",
     )
     distance: TwoPoints | None = None
-    drive: DriveName | None = None
+    drive: fields.DriveName | None = None
     angle: TwoLinks | None = None
-    measure: MeasureName | None = None
-    min: AnyValue | None = None
-    max: AnyValue | None = None
+    measure: fields.MeasureName | None = None
+    min: fields.AnyValue | None = None
+    max: fields.AnyValue | None = None
 
     @model_validator(mode="after")
     def _bounded(self) -> Limit:
@@ -210,17 +183,7 @@ class Limit(Model):
 
 @dataclass(frozen=True)
 class Wanted:
-    """One target as it was written: exactly one of the three.
-
-    Parameters
-    ----------
-    expression : Expression or None
-        Over coordinates and parameters; a number is one without names.
-    rows : tuple of tuple of float or None
-        Rows of equal length, in the study's units.
-    file : str or None
-        Name of a CSV file.
-    """
+    """One target as it was written: an expression (a number is one without names), rows, or the name of a file."""
 
     expression: Expression | None = None
     rows: tuple[tuple[float, ...], ...] | None = None
@@ -241,25 +204,25 @@ def _target(raw: Any, context: Context) -> Wanted:
 
 
 TargetValue = Annotated[
-    Wanted, Read(_target, {"type": ["number", "string", "array", "object"], "description": TARGET_FORMS})
+    Wanted, fields.Read(_target, {"type": ["number", "string", "array", "object"], "description": TARGET_FORMS})
 ]
 
 
-class MechanismSection(Model):
+class MechanismSection(fields.Model):
     """What the study says about the mechanism."""
 
-    parameters: dict[str, AnyValue] = {}
-    links: dict[LinkName, Link]
-    joints: dict[JointName, Joint] = {}
-    drives: Annotated[dict[AnyName, Drive | None], BeforeValidator(names_to_mapping), OrShort((NAMES_FORM,))] = {}
-    branch: Annotated[str, Choice(("side", "follow"))] = "side"
-    sketch: dict[PointName, Point] = {}
-    measures: dict[MeasureName, Measure] = {}
+    parameters: dict[str, fields.AnyValue] = {}
+    links: dict[fields.LinkName, Link]
+    joints: dict[fields.JointName, Joint] = {}
+    drives: Annotated[dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))] = {}
+    branch: Annotated[str, fields.Choice(("side", "follow"))] = "side"
+    sketch: dict[fields.PointName, Point] = {}
+    measures: dict[fields.MeasureName, Measure] = {}
     limits: tuple[Limit, ...] = ()
-    targets: dict[CoordinateName, TargetValue] = {}
+    targets: dict[fields.CoordinateName, TargetValue] = {}
 
 
-def _unit_of(kind: str) -> Read:
+def _unit_of(kind: str) -> fields.Read:
     def read(raw: Any, context: Context) -> str:
         if not isinstance(raw, str):
             raise failure(f"expected a text, not {shown(raw)}")
@@ -269,10 +232,10 @@ def _unit_of(kind: str) -> Read:
             raise failure(str(error)) from None
         return raw
 
-    return Read(read, NAME_FORM)
+    return fields.Read(read, fields.NAME_FORM)
 
 
-class UnitsSection(Model):
+class UnitsSection(fields.Model):
     """Units that bare numbers mean."""
 
     length: Annotated[str, _unit_of("length")] = "mm"

@@ -6,17 +6,18 @@ from pydantic import model_validator
 
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.text import fields
 from mechdesign.study.text.document import Path
-from mechdesign.study.text.numbers import Force, LinkName, Model, Moment, PointName, PositiveLength, failure
+from mechdesign.study.text.numbers import failure
 
 
-class Load(Model):
+class Load(fields.Model):
     """A force at a point, or a moment on a link."""
 
-    at: PointName | None = None
-    force: tuple[Force, Force] | None = None
-    link: LinkName | None = None
-    moment: Moment | None = None
+    at: fields.PointName | None = None
+    force: tuple[fields.Force, fields.Force] | None = None
+    link: fields.LinkName | None = None
+    moment: fields.Moment | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> Load:
@@ -31,7 +32,7 @@ class KinematicsSection(MotionSection):
     """How does it move?"""
 
     loads: tuple[Load, ...] = ()
-    characteristic_length: PositiveLength | None = None
+    characteristic_length: fields.PositiveLength | None = None
 
 
 def check(checker: Checker, section: KinematicsSection) -> None:

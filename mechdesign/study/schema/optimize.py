@@ -8,24 +8,12 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
 from mechdesign.commands import COMMANDS
+from mechdesign.errors import suggestion
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.workspace import INDEX_NAMES, NEEDED
+from mechdesign.study.text import fields
 from mechdesign.study.text.document import Path
-from mechdesign.study.text.numbers import (
-    NAME_FORM,
-    NUMBER_FORM,
-    Bound,
-    Choice,
-    CoordinateName,
-    Model,
-    Number,
-    OrShort,
-    PositiveNumber,
-    Pure,
-    Whole,
-    failure,
-    suggestion,
-)
+from mechdesign.study.text.numbers import failure
 
 # Results of a workspace that a goal or condition may name without its command.
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
@@ -34,16 +22,16 @@ _STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean"
 _UNASSUMED = ("reliability", "stiffness")
 
 
-class Variable(Model):
+class Variable(fields.Model):
     """A design variable; its bounds are expressions over parameters and the variables above it.
 
     The step is that of a grid, and of the sensitivities told with an optimum.
     """
 
-    from_: Bound = Field(alias="from")
-    to: Bound
-    step: PositiveNumber | None = None
-    number: Annotated[int, Whole(1, 10_000_000)] | None = None
+    from_: fields.Bound = Field(alias="from")
+    to: fields.Bound
+    step: fields.PositiveNumber | None = None
+    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _spacing(self) -> Variable:
@@ -52,10 +40,10 @@ class Variable(Model):
         return self
 
 
-class Judged(Model):
+class Judged(fields.Model):
     """A result, and the rows of it that count."""
 
-    result: CoordinateName
+    result: fields.CoordinateName
     where: dict[str, str | float | int] = Field(default_factory=dict)
 
     @property
@@ -69,8 +57,8 @@ class Condition(Judged):
     """A result and its bounds."""
 
     abs: bool = False
-    at_least: Number | None = None
-    at_most: Number | None = None
+    at_least: fields.Number | None = None
+    at_most: fields.Number | None = None
 
     @model_validator(mode="after")
     def _bounded(self) -> Condition:
@@ -106,10 +94,10 @@ def _weights_that_choose(row: tuple[float, ...]) -> tuple[float, ...]:
 
 
 WeightRow = Annotated[
-    tuple[Pure, ...],
+    tuple[fields.Pure, ...],
     BeforeValidator(_weight_row),
     AfterValidator(_weights_that_choose),
-    OrShort(({"type": "object", "additionalProperties": NUMBER_FORM},)),
+    fields.OrShort(({"type": "object", "additionalProperties": fields.NUMBER_FORM},)),
 ]
 
 
@@ -119,22 +107,22 @@ def _goal(raw: Any) -> Any:
 
 # Names of results, or with `where` which of their rows count.
 Goals = Annotated[
-    tuple[Annotated[Judged, BeforeValidator(_goal), OrShort((NAME_FORM,))], ...],
+    tuple[Annotated[Judged, BeforeValidator(_goal), fields.OrShort((fields.NAME_FORM,))], ...],
     BeforeValidator(lambda raw: [raw] if isinstance(raw, str | Mapping) else raw),
-    OrShort((NAME_FORM,)),
+    fields.OrShort((fields.NAME_FORM,)),
 ]
 
 
-class OptimizeSection(Model):
+class OptimizeSection(fields.Model):
     """Which dimensions are best?"""
 
-    method: Annotated[str, Choice(("grid", "search", "pareto"))] = "grid"
-    variables: dict[CoordinateName, Variable]
+    method: Annotated[str, fields.Choice(("grid", "search", "pareto"))] = "grid"
+    variables: dict[fields.CoordinateName, Variable]
     maximize: Goals = ()
     minimize: Goals = ()
     weights: tuple[WeightRow, ...] | None = None
     subject_to: tuple[Condition, ...] = ()
-    evaluations: Annotated[int, Whole(10, 10_000_000)] | None = None
+    evaluations: Annotated[int, fields.Whole(10, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _goals(self) -> OptimizeSection:

@@ -17,20 +17,8 @@ from pydantic import Field, model_validator
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.study.text.numbers import (
-    FILES,
-    Angle,
-    Context,
-    Length,
-    Model,
-    PositiveLength,
-    Read,
-    Reader,
-    Whole,
-    failure,
-    pair_of,
-    read_rows,
-)
+from mechdesign.study.text import fields
+from mechdesign.study.text.numbers import FILES, Context, failure, read_rows
 
 # Number of poses where a study does not say it: a circle in steps of 5 deg, and both ends of a line or an arc.
 ROUND, STRAIGHT = 72, 51
@@ -40,7 +28,7 @@ _ROWS = {"type": ["array", "string", "number"]}
 
 Speed = Annotated[
     float,
-    Reader("velocity", 0.0, True),
+    fields.Reader("velocity", 0.0, True),
     Field(
         description="speed of the path's point along it, constant: velocities and accelerations of drives and outputs "
         "follow from the path's direction and curvature. On a polyline each segment is passed at this speed without "
@@ -48,25 +36,25 @@ Speed = Annotated[
         "that of the segment that ends there"
     ),
 ]
-Point = Annotated[tuple[Length, Length], pair_of("[x, y]")]
+Point = Annotated[tuple[fields.Length, fields.Length], fields.pair_of("[x, y]")]
 
 
-class Circle(Model):
+class Circle(fields.Model):
     """A whole circle, counter-clockwise unless it says otherwise; it ends one step before it closes."""
 
     center: Point
-    radius: PositiveLength
-    from_: Angle = Field(0.0, alias="from")
+    radius: fields.PositiveLength
+    from_: fields.Angle = Field(0.0, alias="from")
     clockwise: bool = False
 
 
-class Arc(Model):
+class Arc(fields.Model):
     """Part of a circle between two angles from the x axis, both ends included; clockwise where they fall."""
 
     center: Point
-    radius: PositiveLength
-    from_: Angle = Field(alias="from")
-    to: Angle
+    radius: fields.PositiveLength
+    from_: fields.Angle = Field(alias="from")
+    to: fields.Angle
 
     @model_validator(mode="after")
     def _some(self) -> Arc:
@@ -83,16 +71,18 @@ def _through(raw: Any, context: Context) -> tuple[tuple[float, ...], ...]:
     return read_rows(raw, context, 2, rule, "an empty path")
 
 
-class Path(Model):
+class Path(fields.Model):
     """What one coordinate or point passes; a list, a CSV file's name or a number alone are short forms."""
 
     short = (_ROWS,)
-    through: Annotated[tuple[tuple[float, ...], ...], Read(_through, _ROWS)] | None = None
+    through: Annotated[tuple[tuple[float, ...], ...], fields.Read(_through, _ROWS)] | None = None
     file: str | None = None
     circle: Circle | None = None
     arc: Arc | None = None
-    line: Annotated[tuple[Point, Point], pair_of("a line from [x, y] to [x, y], as a list of the two")] | None = None
-    points: Annotated[int, Whole(2, 10_000_000)] | None = Field(
+    line: (
+        Annotated[tuple[Point, Point], fields.pair_of("a line from [x, y] to [x, y], as a list of the two")] | None
+    ) = None
+    points: Annotated[int, fields.Whole(2, 10_000_000)] | None = Field(
         None, description=f"number of poses, evenly spaced: {ROUND} on a circle, else {STRAIGHT}, where left out"
     )
     spline: bool = Field(

@@ -10,27 +10,19 @@ from pydantic import BeforeValidator, Field, model_validator
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import Path as PathModel
 from mechdesign.study.schema.paths import Speed
+from mechdesign.study.text import fields
 from mechdesign.study.text.document import Path
-from mechdesign.study.text.numbers import (
-    NUMBER_FORM,
-    CoordinateName,
-    CoordinateNames,
-    Model,
-    Number,
-    OrShort,
-    Whole,
-    failure,
-)
+from mechdesign.study.text.numbers import failure
 
 
-class Sweep(Model):
+class Sweep(fields.Model):
     """Values of one coordinate, both ends included; a bare number is held (``number`` 1)."""
 
-    short = (NUMBER_FORM,)
-    from_: Number = Field(alias="from")
-    to: Number
-    step: Number | None = None
-    number: Annotated[int, Whole(1, 10_000_000)] | None = None
+    short = (fields.NUMBER_FORM,)
+    from_: fields.Number = Field(alias="from")
+    to: fields.Number
+    step: fields.Number | None = None
+    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -54,18 +46,18 @@ def _poses(raw: Any) -> Any:
     return raw
 
 
-class PoseSection(Model):
+Pose = dict[fields.CoordinateName, fields.Number]
+
+
+class PoseSection(fields.Model):
     """Where a question is asked: listed poses, a sweep, a path, or the nodes of the workspace section.
 
     The list is empty where the study says ``poses: workspace``.
     """
 
-    poses: (
-        Annotated[tuple[dict[CoordinateName, Number], ...], BeforeValidator(_poses), OrShort(({"const": "workspace"},))]
-        | None
-    ) = None
-    sweep: dict[CoordinateName, Sweep] | None = None
-    path: dict[CoordinateName, PathModel] | None = None
+    poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort(({"const": "workspace"},))] | None = None
+    sweep: dict[fields.CoordinateName, Sweep] | None = None
+    path: dict[fields.CoordinateName, PathModel] | None = None
 
     @property
     def at_nodes(self) -> bool:
@@ -88,9 +80,9 @@ class PoseSection(Model):
 class MotionSection(PoseSection):
     """Poses, how the mechanism moves through them, and the coordinates that are asked for."""
 
-    outputs: CoordinateNames | None = None
-    rates: dict[CoordinateName, Number] = Field(default_factory=dict)
-    accelerations: dict[CoordinateName, Number] = Field(default_factory=dict)
+    outputs: fields.CoordinateNames | None = None
+    rates: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
+    accelerations: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
     speed: Speed | None = None
 
 

@@ -8,27 +8,8 @@ from typing import Annotated, Any, NamedTuple, Protocol
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from mechdesign.study.schema.poses import MotionSection
-from mechdesign.study.text.numbers import (
-    NAME_FORM,
-    NUMBER_FORM,
-    PAIR_FORM,
-    Choice,
-    Context,
-    CoordinateName,
-    LinkName,
-    Model,
-    NonNegative,
-    NonNegativeLength,
-    Number,
-    OrOne,
-    Positive,
-    Read,
-    Whole,
-    as_list,
-    failure,
-    read_number,
-    shown,
-)
+from mechdesign.study.text import fields
+from mechdesign.study.text.numbers import Context, failure, read_number, shown
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
 PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")
@@ -73,8 +54,11 @@ def _tolerance(raw: Any, context: Context) -> tuple[float, float]:
     return low, high
 
 
-_TOLERANCE = {"anyOf": [NUMBER_FORM, PAIR_FORM], "description": "a half-width, or the lowest and highest deviation"}
-Tolerance = Annotated[tuple[float, float], Read(_tolerance, _TOLERANCE)]
+_TOLERANCE = {
+    "anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM],
+    "description": "a half-width, or the lowest and highest deviation",
+}
+Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
 
 
 class Spread(Protocol):
@@ -93,26 +77,26 @@ class Spread(Protocol):
         """One of `DISTRIBUTIONS`."""
 
 
-class Dimension(Model):
+class Dimension(fields.Model):
     """A dimension's variation: nominal +- tolerance, or its standard deviation.
 
     Of a tolerance ``normal`` makes three standard deviations, ``truncated_normal`` the same and cuts there; ``uniform``
     fills it, ``triangular`` peaks at the nominal value, ``lognormal`` has the mean and the deviation of ``normal``.
     """
 
-    bare, short = "tolerance", (NUMBER_FORM, PAIR_FORM)
+    bare, short = "tolerance", (fields.NUMBER_FORM, fields.PAIR_FORM)
     one_of = ("a dimension needs either 'tolerance' or 'sigma'", "tolerance", "sigma")
     tolerance: Tolerance | None = None
-    sigma: NonNegative | None = None
-    distribution: Annotated[str, Choice(DISTRIBUTIONS)] = "normal"
+    sigma: fields.NonNegative | None = None
+    distribution: Annotated[str, fields.Choice(DISTRIBUTIONS)] = "normal"
 
 
-class PinModel(Model):
+class PinModel(fields.Model):
     """How a pin lies in its hole, for each method."""
 
     short = ({"enum": list(PIN_MODELS)},)
-    analytic: Annotated[str, Choice(PIN_MODELS)] = "normal"
-    monte_carlo: Annotated[str, Choice(PIN_MODELS)] = "normal"
+    analytic: Annotated[str, fields.Choice(PIN_MODELS)] = "normal"
+    monte_carlo: Annotated[str, fields.Choice(PIN_MODELS)] = "normal"
 
     @model_validator(mode="before")
     @classmethod
@@ -120,7 +104,7 @@ class PinModel(Model):
         return {"analytic": raw, "monte_carlo": raw} if isinstance(raw, str) else raw
 
 
-class Clearance(Model):
+class Clearance(fields.Model):
     """The clearance of a pin joint; exactly one of radial and diametral, to which the tolerance belongs.
 
     The pin moves in `link` (left out, the last link of the joint that no output is said to be of); the coordinates of
@@ -128,13 +112,13 @@ class Clearance(Model):
     """
 
     one_of = ("a clearance needs either 'radial' or 'diametral'", "radial", "diametral")
-    radial: NonNegativeLength | None = None
-    diametral: NonNegativeLength | None = None
+    radial: fields.NonNegativeLength | None = None
+    diametral: fields.NonNegativeLength | None = None
     tolerance: Tolerance = (0.0, 0.0)
-    distribution: Annotated[str, Choice(DISTRIBUTIONS)] = "normal"
+    distribution: Annotated[str, fields.Choice(DISTRIBUTIONS)] = "normal"
     pin: PinModel = PinModel()
-    link: LinkName | None = None
-    effect: Annotated[str, Choice(("offset", "length"))] = "offset"
+    link: fields.LinkName | None = None
+    effect: Annotated[str, fields.Choice(("offset", "length"))] = "offset"
 
     @property
     def radius(self) -> float:
@@ -151,13 +135,13 @@ class Clearance(Model):
         return Dimension.model_construct(tolerance=(low, high), sigma=None, distribution=self.distribution)
 
 
-class ErrorLimit(Model):
+class ErrorLimit(fields.Model):
     """What an error may be: within [min, max], or (of a point) within a radius."""
 
-    short = (NUMBER_FORM,)
-    min: Number | None = None
-    max: Number | None = None
-    radius: NonNegative | None = None
+    short = (fields.NUMBER_FORM,)
+    min: fields.Number | None = None
+    max: fields.Number | None = None
+    radius: fields.NonNegative | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -180,42 +164,42 @@ class ErrorLimit(Model):
         return self
 
 
-class Precision(Model):
+class Precision(fields.Model):
     """How precise a failure probability is wanted.
 
     ``relative`` is its coefficient of variation, standard error over value: half of its 99.7 % interval is about three
     times that. ``half_width`` is half the interval itself.
     """
 
-    bare, short = "relative", (NUMBER_FORM,)
+    bare, short = "relative", (fields.NUMBER_FORM,)
     one_of = (
         "give either 'relative', a coefficient of variation, or 'half_width', half the 99.7 % interval",
         "relative",
         "half_width",
     )
-    relative: Positive | None = None
-    half_width: Positive | None = None
+    relative: fields.Positive | None = None
+    half_width: fields.Positive | None = None
 
 
-class Cost(Model):
+class Cost(fields.Model):
     """What a tolerance T costs: a/T^exponent.
 
     T is as the study gives it, in its units: half the width of the tolerance, sigma, or the mean radial clearance.
     """
 
-    bare, short = "a", (NUMBER_FORM,)
-    a: Positive = 1.0
-    exponent: Positive = 1.0
+    bare, short = "a", (fields.NUMBER_FORM,)
+    a: fields.Positive = 1.0
+    exponent: fields.Positive = 1.0
 
 
-class Allocate(Model):
+class Allocate(fields.Model):
     """The cheapest tolerances that reach a reliability at every pose, each by itself (not over a cycle).
 
     All dimensions are allocated, random loads and clearances (radius and its tolerance together) where `cost` names
     them; what it does not name costs 1/T.
     """
 
-    reliability: Positive
+    reliability: fields.Positive
     cost: dict[str, Cost] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -244,7 +228,12 @@ def _correlation(raw: Any, context: Context) -> Correlated:
     return Correlated(raw[0], raw[1], coefficient)
 
 
-_CORRELATION = {"type": "array", "prefixItems": [NAME_FORM, NAME_FORM, NUMBER_FORM], "minItems": 3, "maxItems": 3}
+_CORRELATION = {
+    "type": "array",
+    "prefixItems": [fields.NAME_FORM, fields.NAME_FORM, fields.NUMBER_FORM],
+    "minItems": 3,
+    "maxItems": 3,
+}
 
 
 class ReliabilitySection(MotionSection):
@@ -252,15 +241,15 @@ class ReliabilitySection(MotionSection):
 
     dimensions: dict[str, Dimension] = Field(default_factory=dict)
     clearances: dict[str, Clearance] = Field(default_factory=dict)
-    correlation: tuple[Annotated[Correlated, Read(_correlation, _CORRELATION)], ...] = ()
-    limits: dict[CoordinateName, ErrorLimit] = Field(default_factory=dict)
-    load: tuple[Number, ...] | None = None
+    correlation: tuple[Annotated[Correlated, fields.Read(_correlation, _CORRELATION)], ...] = ()
+    limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
+    load: tuple[fields.Number, ...] | None = None
     methods: Annotated[
-        tuple[Annotated[str, Choice(METHODS)], ...],
-        BeforeValidator(as_list),
-        OrOne(),
+        tuple[Annotated[str, fields.Choice(METHODS)], ...],
+        BeforeValidator(fields.as_list),
+        fields.OrOne(),
     ] = DEFAULT_METHODS
-    samples: Annotated[int, Whole(2, 10**15)] = 40_000
+    samples: Annotated[int, fields.Whole(2, 10**15)] = 40_000
     precision: Precision | None = None
-    sobol: Annotated[int, Whole(0, 10**9)] | None = None
+    sobol: Annotated[int, fields.Whole(0, 10**9)] | None = None
     allocate: Allocate | None = None

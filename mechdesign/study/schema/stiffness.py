@@ -11,27 +11,9 @@ from mechdesign.mechanism.model import Quantity
 from mechdesign.study.build.names import GROUND
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.text import fields
 from mechdesign.study.text.document import Path
-from mechdesign.study.text.numbers import (
-    NUMBER_FORM,
-    Angle,
-    AnyName,
-    Context,
-    LinkName,
-    Model,
-    Number,
-    PointName,
-    Positive,
-    PositiveArea,
-    PositiveInertia,
-    PositiveLength,
-    PositiveNumber,
-    PositiveStress,
-    Read,
-    as_list,
-    failure,
-    read_number,
-)
+from mechdesign.study.text.numbers import Context, failure, read_number
 
 _ELASTIC = (
     "The section of each link that bends; links not named are rigid. A link given by its ends is a beam from the first "
@@ -44,23 +26,23 @@ _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
-class Profile(Model):
+class Profile(fields.Model):
     """A cross-section: a rectangle (its height lies in the plane), a bar or a tube, or its area and inertia.
 
     ``shear: true`` adds the compliance of shear by Timoshenko's theory, with the factor of the section's form (Cowper
     1966, with Poisson's ratio 0: 5/6 of a rectangle, 6/7 of a round bar, 1/2 of a thin tube), or a given one.
     """
 
-    E: PositiveStress
-    G: PositiveStress | None = None
-    width: PositiveLength | None = None
-    height: PositiveLength | None = None
-    diameter: PositiveLength | None = None
-    inner_diameter: PositiveLength | None = None
-    area: PositiveArea | None = None
-    inertia: PositiveInertia | None = None
+    E: fields.PositiveStress
+    G: fields.PositiveStress | None = None
+    width: fields.PositiveLength | None = None
+    height: fields.PositiveLength | None = None
+    diameter: fields.PositiveLength | None = None
+    inner_diameter: fields.PositiveLength | None = None
+    area: fields.PositiveArea | None = None
+    inertia: fields.PositiveInertia | None = None
     shear: bool = False
-    shear_factor: Positive | None = None
+    shear_factor: fields.Positive | None = None
 
     @model_validator(mode="after")
     def _one_form(self) -> Profile:
@@ -91,12 +73,12 @@ class Profile(Model):
         return area, inertia, self.shear_factor or factor
 
 
-class Bearing(Model):
+class Bearing(fields.Model):
     """Stiffness of a joint itself: across, and of a slide also against turning; what is not given is rigid."""
 
-    bare, short = "radial", (NUMBER_FORM,)
-    radial: PositiveNumber | None = None
-    moment: PositiveNumber | None = None
+    bare, short = "radial", (fields.NUMBER_FORM,)
+    radial: fields.PositiveNumber | None = None
+    moment: fields.PositiveNumber | None = None
 
     @model_validator(mode="after")
     def _some(self) -> Bearing:
@@ -107,7 +89,7 @@ class Bearing(Model):
 
 def _series(raw: Any, context: Context) -> float:
     """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
-    parts = [read_number(each, context).nominal for each in as_list(raw)]
+    parts = [read_number(each, context).nominal for each in fields.as_list(raw)]
     if not parts:
         raise failure("expected a stiffness, or a list of those in series")
     for part in parts:
@@ -117,7 +99,7 @@ def _series(raw: Any, context: Context) -> float:
 
 
 _SERIES = {
-    "anyOf": [NUMBER_FORM, {"type": "array", "items": NUMBER_FORM, "minItems": 1}],
+    "anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}],
     "description": "a stiffness, or those of what is in series",
 }
 
@@ -125,15 +107,15 @@ _SERIES = {
 class StiffnessSection(PoseSection):
     """How stiff is it?"""
 
-    link: LinkName | None = None
-    at: PointName = Field(description="the point whose stiffness is asked")
+    link: fields.LinkName | None = None
+    at: fields.PointName = Field(description="the point whose stiffness is asked")
     sections: dict[str, Profile] = Field(default_factory=dict)
-    elastic: dict[LinkName, str] = Field(default_factory=dict, description=_ELASTIC)
-    actuators: dict[AnyName, Annotated[float, Read(_series, _SERIES)]] = Field(default_factory=dict)
-    bearings: dict[AnyName, Bearing] = Field(default_factory=dict)
-    direction: Angle | None = None
-    loads: tuple[tuple[Number, ...], ...] = ()
-    characteristic_length: PositiveLength | None = None
+    elastic: dict[fields.LinkName, str] = Field(default_factory=dict, description=_ELASTIC)
+    actuators: dict[fields.AnyName, Annotated[float, fields.Read(_series, _SERIES)]] = Field(default_factory=dict)
+    bearings: dict[fields.AnyName, Bearing] = Field(default_factory=dict)
+    direction: fields.Angle | None = None
+    loads: tuple[tuple[fields.Number, ...], ...] = ()
+    characteristic_length: fields.PositiveLength | None = None
 
 
 def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:

@@ -22,17 +22,17 @@ from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.workspace import WorkspaceSection
+from mechdesign.study.text import fields
 from mechdesign.study.text.document import Path
-from mechdesign.study.text.numbers import Model, Whole
 from mechdesign.study.text.reporter import Reporter
 
 
-class StudyFile(Model):
+class StudyFile(fields.Model):
     """The whole study file."""
 
     name: str | None = None
     units: UnitsSection = UnitsSection()
-    seed: Annotated[int, Whole(0)] = 0
+    seed: Annotated[int, fields.Whole(0)] = 0
     mechanism: MechanismSection
     kinematics: KinematicsSection | None = None
     workspace: WorkspaceSection | None = None

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import Problem, StudyError, nearest, suggestion
 from mechdesign.study.text.document import Document, Path, dotted, leaves, plain
-from mechdesign.study.text.numbers import LOST, nearest, shown, suggestion
+from mechdesign.study.text.numbers import LOST, shown
 from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, fits, measure
 
 # A link written as a list has its keys at these places.
