@@ -271,6 +271,13 @@ def plain(data: Any) -> Any:
     return [plain(item) for item in data] if isinstance(data, list) else data
 
 
+def has(data: Any, key: Any) -> bool:
+    """Whether a mapping has a key, or a list an index."""
+    if isinstance(data, list):
+        return isinstance(key, int) and 0 <= key < len(data)
+    return isinstance(data, Mapping) and key in data
+
+
 def leaves(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     """Every value of data that is neither a mapping nor a list, with its path."""
     if isinstance(data, Mapping | list):
