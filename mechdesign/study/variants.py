@@ -176,7 +176,8 @@ def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
     mechanism = data["mechanism"]
     for name, value in changed.items():
         owner, _, last = name.rpartition(".")
-        holder, key = mechanism, last
+        holder: Any = mechanism
+        key: str | int = last
         if name in study.parameters.nominal:
             holder, key = mechanism["parameters"], name
         elif owner.startswith("limits."):
