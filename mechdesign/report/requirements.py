@@ -153,7 +153,7 @@ def _place(table: Table, row: int, judged: str, freedom: int) -> str:
     """The row in words: its leading columns, which are the pose and words such as the method."""
     parts: list[str] = []
     for column in table.columns:
-        if column.values.dtype.kind in "fiub":
+        if column.numeric:
             freedom -= 1
             if freedom < 0 or column.name == judged:
                 break
