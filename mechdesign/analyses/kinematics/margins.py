@@ -12,7 +12,7 @@ from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value, cross
 from mechdesign.mechanism.change_points import closing_groups
 from mechdesign.mechanism.structure import Group
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup
 
@@ -117,15 +117,21 @@ class Margins:
         """Poses that groups without a closed form may be continued from; None where every group has one."""
         return self.solve(place, limits=False) if self.plan.iterative else None
 
-    def evaluate(self, place: Floats, start: Configuration | None = None) -> Floats:
-        """Margins at values of the swept coordinate, shape (margins, n); nan where the pose to start from is none."""
+    def look(self, place: Floats, start: Configuration | None = None) -> tuple[Floats, Flags]:
+        """Margins at values of the swept coordinate, shape (margins, n), and whether the mechanism is valid there.
+
+        nan, and not valid, where the pose to start from is none.
+        """
         if start is None or start.valid.all():
-            return self.of(self.solve(place, start, limits=False), place)
-        found = np.full((len(self.causes), *place.shape), np.nan)
+            pose = self.solve(place, start, limits=False)
+            values = self.of(pose, place)
+            self.plan.judge(pose)
+            return values, pose.valid
+        values, valid = np.full((len(self.causes), len(place)), np.nan), np.zeros(len(place), dtype=bool)
         live = np.flatnonzero(start.valid)
         if len(live):
-            found[:, live] = self.evaluate(place[live], start.take(live))
-        return found
+            values[:, live], valid[live] = self.look(place[live], start.take(live))
+        return values, valid
 
     def of(self, configuration: Configuration, place: Floats) -> Floats:
         """Margins of poses solved without the limits, shape (margins, n)."""

@@ -24,6 +24,9 @@ from mechdesign.results import Column
 from mechdesign.study import Poses, Study
 from mechdesign.study.sections import KinematicsSection
 
+# A place this near to a pose or to zero, as a part of the sweep, is there.
+AT_POSE = 1e-12
+
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
     """Every moving point, link and slide."""
@@ -246,6 +249,24 @@ class Motion:
         far = error.output in study.mechanism.points
         meaning = f"distance of {error.output} from its target" if far else f"{error.output} less its target"
         return Column(error.name, error.values, study.units.label(error.quantity), meaning)
+
+
+def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> Floats:
+    """Places on a sweep in the study's unit; those at a pose as the study gives it, not there and back through radians.
+
+    Parameters
+    ----------
+    places : ndarray
+        In the core's units.
+    positions : ndarray
+        Where they are along the sweep, in rows.
+    """
+    (group,), study = motion.asked.poses.groups, motion.asked.study
+    given = group.values[swept]
+    values = in_study_units(study, study.mechanism.coordinate(swept), places)
+    beside, near = given[np.round(positions).astype(int)], AT_POSE * np.ptp(given)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(beside - values) <= near, beside, np.where(np.abs(values) <= near, 0.0, values))
 
 
 _RATES: Mapping[tuple[Quantity, str], str] = {
