@@ -7,18 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, Margins, joints_of
 from mechdesign.analyses.poses import CHUNK
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
+from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins, joints_of
 from mechdesign.mechanism.turning import turning_point
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.minima import lowest
 from mechdesign.numerics.roots import bracketed_roots
 
-# Poses of a design's sweep that its motion is looked at in, about: of a finer sweep some are left out, but no step
-# becomes longer than so many radians, or so much of the mechanism's size.
-ENOUGH, LONGEST = 4096, 0.02
 # Step, as a part of that between two poses, that tells whether a margin rises or falls at a pose.
 SLOPE = 1e-4
 # Steps that may hold something are divided into so many parts, so often: until what ends the motion is alone in one,
@@ -92,37 +89,7 @@ class _Parts:
         return _Parts(*(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names))
 
 
-def thinned(at: Floats, valid: Flags, designs: int, steps: Sequence[int], unit: float) -> Ints:
-    """Valid poses of a sweep that tell the motion: its ends, those beside poses that fail, and some between.
-
-    Parameters
-    ----------
-    at : ndarray, shape (poses,)
-        The swept coordinate.
-    steps : sequence of int
-        Steps whose poses are taken.
-    unit : float
-        1 of an angle, the mechanism's size of a length.
-    """
-    taken = _some(at, valid, designs, unit)
-    for step in steps:
-        taken[step : step + 2] = True
-    return np.flatnonzero(taken & valid)
-
-
-def _some(at: Floats, valid: Flags, designs: int, unit: float) -> Flags:
-    each = len(at) // designs
-    longest = np.abs(np.diff(at[:each])).max(initial=0.0)
-    stride = min(-(-each // ENOUGH), int(LONGEST * unit / longest) if longest > 0 else each)
-    taken: Flags = np.arange(len(at)) % each % max(stride, 1) == 0
-    taken[each - 1 :: each] = True
-    change = valid[1:] != valid[:-1]
-    taken[1:] |= change
-    taken[:-1] |= change
-    return taken
-
-
-def boundaries(margins: Margins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint]]:
+def boundaries(margins: SweepMargins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint]]:
     """All ends of the motion in the order of the sweep, and all change points.
 
     Between two poses a margin is looked for that changes its sign, or whose slopes at the poses admit that it does so
@@ -141,18 +108,15 @@ def boundaries(margins: Margins, valid: Flags) -> tuple[list[Boundary], list[Cha
 class _Search:
     """The steps of a sweep, one before its first pose and one after its last, where the motion may end at those."""
 
-    def __init__(self, margins: Margins, valid: Flags) -> None:
+    def __init__(self, margins: SweepMargins, valid: Flags) -> None:
         self.margins = margins
-        unit = 1.0 if margins.coordinate.quantity == "angle" else margins.mechanism.size
-        rows = np.flatnonzero(_some(margins.at, valid, 1, unit))
-        at, known = margins.at[rows], valid[rows]
-        beyond = at[[0, -1]] + AT_END * np.maximum(1.0, np.abs(at[[0, -1]])) * np.sign([at[0] - at[1], at[-1] - at[-2]])
+        at, ends = margins.at, margins.at[[0, -1]]
+        beyond = ends + AT_END * np.maximum(1.0, np.abs(ends)) * np.sign([at[0] - at[1], at[-1] - at[-2]])
         self.at = np.concatenate([beyond[:1], at, beyond[1:]])
-        self.rows = np.concatenate([rows[:1], rows, rows[-1:]])
         self.length = np.abs(np.diff(self.at))
         self.length[[0, -1]] = self.length[[1, -2]]
         # The pose that each step is continued from: one of its ends that is valid.
-        first = np.concatenate([[False], known])
+        first = np.append(False, valid)
         self.start = margins.start(np.where(first, self.at[:-1], np.append(at, at[-1])))
         self.scale = np.zeros(len(margins.causes))
 
@@ -222,7 +186,7 @@ class _Search:
 
     def _position(self, step: Ints, place: Floats) -> Floats:
         part = (place - self.at[step]) / (self.at[step + 1] - self.at[step])
-        return np.asarray(self.rows[step] + part * (self.rows[step + 1] - self.rows[step]))
+        return np.asarray(np.clip(step - 1 + part, 0, len(self.at) - 3))
 
     def _located(self, parts: _Parts) -> list[Boundary]:
         """Ends of the motion within parts of which one end is valid and the other is not."""
@@ -290,8 +254,9 @@ class _Search:
         if cause.role == "reached":
             mechanism = self.margins.mechanism
             for slide in self.margins.legs:
+                leg = mechanism.graph.slides[slide]
                 if abs(float(pose.slides[slide])) <= AT_END * mechanism.size:
-                    return place, pose, Cause(ZERO_LENGTH, mechanism.graph.slides[slide], -1, "leg")
+                    return place, pose, Cause(ZERO_LENGTH, leg, leg, -1, "leg")
             cause = replace(cause, kind=Reason.OTHER_ASSEMBLY.text)
         return place, pose, cause
 
@@ -302,7 +267,7 @@ class _Search:
         lowest_of = values.argmin(axis=0)
         texts = [Reason(int(reason)).text for reason in self.solve(step, bad).reason]
         return lowest_of, [
-            self.margins.causes[j] if values[j, k] < 0 else Cause(texts[k] or DEAD_CENTRE, "", -1, "")
+            self.margins.causes[j] if values[j, k] < 0 else Cause(texts[k] or DEAD_CENTRE, "", "", -1, "")
             for k, j in enumerate(lowest_of.tolist())
         ]
 

@@ -54,17 +54,16 @@ def extremes(motion: Motion, swept: str | None, line: Line | None, names: Collec
     found, row = np.full((2, 2, shape[0], len(curves)), np.nan), np.zeros((2, shape[0], len(curves)), dtype=np.intp)
     still, first_row = np.zeros((shape[0], len(curves))), np.arange(shape[0]) * shape[1]
     for k, (quantity, curve) in enumerate(curves.values()):
-        values = np.where(motion.valid & np.isfinite(curve), curve, np.nan).reshape(shape)
-        some = ~np.isnan(values).all(axis=1)
-        both = [values[some], -values[some]]
-        best = [np.where(np.isnan(part), np.inf, part).argmin(axis=1) for part in both]
-        for end in (0, 1):
-            row[end, some, k] = first_row[some] + best[end]
+        values, known = curve.reshape(shape), (motion.valid & np.isfinite(curve)).reshape(shape)
+        some = known.any(axis=1)
+        every = known.all()
+        row[0, :, k] = first_row + (values if every else np.where(known, values, np.inf)).argmin(axis=1)
+        row[1, :, k] = first_row + (values if every else np.where(known, values, -np.inf)).argmax(axis=1)
         low, high = (values.ravel()[row[end, :, k]] for end in (0, 1))
         still[:, k] = STILL * np.fmax(np.fmax(np.abs(low), np.abs(high)), sizes.get(quantity, 0.0))
         # What stands still does so from its first pose on.
         stands = some & ~(high - low > still[:, k])
-        row[:, stands, k] = (first_row + (~np.isnan(values)).argmax(axis=1))[stands]
+        row[:, stands, k] = (first_row + known.argmax(axis=1))[stands]
         found[:, 0, some, k], found[:, 1, some, k] = values.ravel()[row[:, some, k]], at[row[:, some, k]]
     moving = np.asarray(found[1, 0] - found[0, 0] > still)
     if line is not None:

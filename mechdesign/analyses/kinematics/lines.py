@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.boundaries import Boundary, thinned
+from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.kinematics.rates import drive_velocities
 from mechdesign.analyses.kinematics.smoothing import NEAR
@@ -31,6 +31,9 @@ ROUNDS = 14
 # Where a pose has no slopes (a dead centre, from which functions start as a root does), looks beside it: parts of the
 # step to the next pose.
 GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
+# Poses of a design's sweep that a line begins with, about: of a finer sweep some are left out, but no step becomes
+# longer than so many radians, or so much of the mechanism's size.
+ENOUGH, LONGEST = 4096, 0.02
 # A limit this near to a pose of the sweep, in rows, is that pose.
 AT_ROW = 1e-9
 
@@ -66,6 +69,22 @@ def function_of(study: Study, coordinate: Coordinate) -> Function:
 def _frame(k: int) -> Function:
     """The angle of a class of bodies that turn together."""
     return Function(lambda configuration: np.angle(configuration.rotations[k]), lambda _, v: v.angles[k], 1.0)
+
+
+def thinned(motion: Motion, swept: str) -> Flags:
+    """Poses of a sweep that tell the motion: its ends, those where it ceases to be valid, and enough between."""
+    study, poses = motion.asked.study, motion.asked.poses
+    coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
+    steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
+    longest = LONGEST * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
+    stride = min(-(-each // ENOUGH), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
+    taken: Flags = np.arange(each) % max(stride, 1) == 0
+    taken[-1] = True
+    taken = np.tile(taken, poses.designs)
+    change = valid[1:] != valid[:-1]
+    taken[1:] |= change
+    taken[:-1] |= change
+    return taken
 
 
 class Line:
@@ -125,11 +144,11 @@ class Line:
         self.rows = {name: k for k, name in enumerate(functions)}
         self._functions = [*functions.values(), *map(_frame, range(1, study.mechanism.graph.classes))]
         self._radians = np.array([function.radian or np.nan for function in self._functions])
-        inside = [end for end in ends if abs(end.position - round(end.position)) > AT_ROW]
-        self._rows = some = thinned(
-            self.given[self.which], motion.valid, poses.designs, [int(end.position) for end in inside],
-            1.0 if self.plan.structure.given[self.which].quantity == "angle" else study.mechanism.size,
-        )  # fmt: skip
+        self._rows = some = np.flatnonzero(thinned(motion, swept) & motion.valid)
+        beside = np.searchsorted(some, [round(end.position) for end in ends])
+        at_pose = np.isin([round(end.position) for end in ends], some)
+        at_pose &= np.array([abs(end.position % 1 - 0.5) >= 0.5 - AT_ROW for end in ends], dtype=bool)
+        inside = [end for end, here in zip(ends, at_pose, strict=True) if not here]
         self._start: Configuration | None = None
         if self.plan.iterative and len(some):
             own = [values[some] for values in self.given]
@@ -138,7 +157,7 @@ class Line:
         self.row, self.position, self.place = some, some.astype(float), self.given[self.which][some]
         near = np.array([motion.arrays[name][some] for name in self._angles]).reshape(len(self._angles), len(some))
         self.values, self.slopes, _ = self._in_chunks(self.row, self.place, near)
-        self.limits = [int(np.searchsorted(some, round(end.position))) for end in ends if end not in inside]
+        self.limits: list[int] = beside[at_pose].tolist()
         for end in inside:
             self._add_end(end, motion.valid)
         self.begin, self.end = self._segments(motion.valid, inside)

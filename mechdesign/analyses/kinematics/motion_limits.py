@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mechdesign.analyses.kinematics.boundaries import Boundary, ChangePoint, boundaries
-from mechdesign.analyses.kinematics.margins import Margins
+from mechdesign.analyses.kinematics.lines import thinned
 from mechdesign.analyses.kinematics.motion import Motion, as_given
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.margins import SweepMargins
 from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Table
@@ -45,9 +46,12 @@ def motion_limits(motion: Motion, swept: str) -> Limits:
     (group,) = motion.asked.poses.groups
     mechanism = study.mechanism
     angles = angles_of([*outputs, *mechanism.counting])
-    near = {name: radians(study, c, motion.arrays[name]) for name, c in angles.items()}
-    margins = Margins(study, group, swept, near)
-    ends, changes = boundaries(margins, motion.valid)
+    rows = np.flatnonzero(thinned(motion, swept))
+    near = {name: radians(study, c, motion.arrays[name][rows]) for name, c in angles.items()}
+    given = {name: radians(study, mechanism.coordinate(name), group.values[name][rows]) for name in group.names}
+    margins = SweepMargins(mechanism, given, swept, near)
+    found, changes = boundaries(margins, motion.valid[rows])
+    ends = [replace(end, position=float(np.interp(end.position, np.arange(len(rows)), rows))) for end in found]
     unit = study.units.label(mechanism.quantity(swept))
     places = as_given(motion, swept, np.array([e.place for e in ends]), np.array([e.position for e in ends]))
     columns = [
@@ -89,7 +93,7 @@ def _hidden(swept: str, unit: str, places: Floats, ends: list[Boundary], valid: 
     return [f"the motion ends between poses that are both valid, at {', '.join(hidden[:4])}{more}: see the limits"]
 
 
-def _warnings(study: Study, margins: Margins, swept: str, changes: list[ChangePoint]) -> list[str]:
+def _warnings(study: Study, margins: SweepMargins, swept: str, changes: list[ChangePoint]) -> list[str]:
     unit = study.units.label(study.mechanism.quantity(swept))
     places: dict[str, dict[str, None]] = {}
     for change in sorted(changes, key=lambda change: change.place):
