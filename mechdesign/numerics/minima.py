@@ -15,7 +15,7 @@ SECTIONS = 50
 # Successive parabolas at most, the part of a place or of its bracket to which the lowest place is found, and how many
 # times as far as a convex function one may fall.
 PARABOLAS = 24
-BOTTOM = 1e-6
+BOTTOM = 1e-9
 STEEP = 2.0
 
 

@@ -20,6 +20,8 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 DOUBLINGS = 16
 # Rounds in which rays are put where the raster shows what others pass by.
 LOOKS = 4
+# A ray inside a panel, not at half of it: by symmetry a single point may divide the ray there.
+MIDDLE = 0.4871
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class Panels:
     closes : ndarray of bool, shape (designs,)
         Whether any ray met the region.
     intervals : ndarray of int, shape (panels,)
-        Intervals of a ray inside each panel; 0 where none has been traced there.
+        Intervals of a ray inside each panel.
     seen : ndarray, shape (designs,)
         Area that the raster is sure of: that of its cells inside, less what it is not known to.
     """
@@ -111,26 +113,13 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     owner, place = owner[~drop], place[~drop]
     keep = owner[1:] == owner[:-1]
     owner, low, high = owner[:-1][keep], place[:-1][keep], place[1:][keep]
-    # A panel is empty where every ray that was traced inside it met nothing.
-    counts = intervals.counts
-    met = np.concatenate([[0], np.cumsum(counts > 0)])
-    first, last = _between(design, angle, owner, low, high)
-    full = (last <= first) | (met[np.maximum(last, first)] > met[first])
-    first, last = _between(design, angle, owner, low + TOGETHER, high - TOGETHER)
-    # Not at half of the panel: by symmetry a single point may divide the ray there.
-    usual = np.where(last > first, counts[np.minimum(first + (last - first) // 4, len(angle) - 1)], 0)
-    closes = np.bincount(design, counts, count) > 0
+    # A panel is empty where a ray inside it meets nothing.
+    middle = low + MIDDLE * (high - low)
+    counts = trace(designs, owner, middle, reach[owner], samples).counts
+    full = counts > 0
+    closes = np.bincount(design, intervals.counts, count) > 0
     area, doubt = raster.area
-    return Panels(owner[full], low[full], high[full], reach, closes, usual[full], area - doubt)
-
-
-def _between(design: Ints, angle: Floats, owner: Ints, low: Floats, high: Floats) -> tuple[Ints, Ints]:
-    """The first ray of each range of angle, and the first after it; NumPy orders complex numbers by both parts."""
-    rays = design + 1j * angle
-    return (
-        np.searchsorted(rays, owner + 1j * low, side="right"),
-        np.searchsorted(rays, owner + 1j * high, side="left"),
-    )
+    return Panels(owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
 
 
 def _first_guess(designs: Designs) -> Floats:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.panels import MIDDLE, Panels
 from mechdesign.analyses.region.rays import SAME, Designs, Intervals, trace
 from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.mechanism.variant import drawn, elsewhere
@@ -24,8 +24,6 @@ BESIDE = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 PART = 0.125
 # Pieces that only touch in a point overlap twice as much twice as far from it: of others there is less than so much.
 TOUCHES = 1.75
-# Not at half of a panel: by symmetry a single point may divide the ray there.
-MIDDLE = 0.4871
 # Nodes of the area by which pieces are put in order.
 NODES = 8
 # Areas as near as this, as parts of the whole, are equal; smaller ones than the second are slits that rounding leaves.
@@ -79,7 +77,7 @@ class Pieces:
         panel = np.flatnonzero(_doubtful(panels, scan, designs.count)[panels.design])
         if not panel.size:
             return found
-        counts[panel] = found._traced(panel, MIDDLE, samples).counts
+        counts[panel] = panels.intervals[panel]
         label = found._joined(samples)
         owner = np.full(label.max(initial=-1) + 1, -1)
         owner[label[label >= 0]] = np.repeat(panels.design, counts)
@@ -107,7 +105,7 @@ class Pieces:
         """Each piece of a single design, as `only`."""
         return (self.only(piece) for piece in range(int(self.number[0])))
 
-    def _traced(self, panel: Ints, place: float | Floats, samples: int) -> Intervals:
+    def _traced(self, panel: Ints, place: Floats, samples: int) -> Intervals:
         """Rays of panels, at a part of their width."""
         panels = self.panels
         theta = panels.low[panel] + place * (panels.high - panels.low)[panel]

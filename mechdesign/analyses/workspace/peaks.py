@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import Designs, trace
@@ -53,27 +55,13 @@ class Peaks:
     order: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class _Places:
-    """Places of regions: design, panel, interval of the ray, and share of the panel's and of the interval's map."""
-
-    design: Ints
-    panel: Ints
-    slot: Ints
-    u: Floats
-    v: Floats
-
-    def pick(self, index: Ints | Flags) -> _Places:
-        return _Places(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
+# Places of regions: design, panel, interval of the ray, and shares u of the panel's map and v of the interval's.
+PLACE = np.dtype([("design", np.intp), ("panel", np.intp), ("slot", np.intp), ("u", float), ("v", float)])
+Places = NDArray[Any]
 
 
 def find_peaks(
-    designs: Designs,
-    panels: Panels,
-    indices: Sequence[Prepared],
-    samples: int,
-    tolerance: float,
-    wanted: Flags,
+    designs: Designs, panels: Panels, indices: Sequence[Prepared], samples: int, tolerance: float, wanted: Flags
 ) -> Peaks:
     """Extremes of indices over the regions.
 
@@ -88,17 +76,17 @@ def find_peaks(
     value, order = np.stack([np.full(shape, np.inf), np.full(shape, -np.inf)]), np.zeros(shape)
     _at_ends(designs, panels, indices, samples, value, order)
     places, local = _grid(designs, panels, samples)
-    _at_crossings(designs, indices, places.design, local, value, order)
+    _at_crossings(designs, indices, places["design"], local, value, order)
     error = np.zeros(value.shape)
     lanes = []
     for sense, k in np.argwhere(wanted):
-        start = _best(places.design, (2 * sense - 1) * np.asarray(indices[k].values(local)), designs.count)
+        start = _best(places["design"], (2 * sense - 1) * np.asarray(indices[k].values(local)), designs.count)
         # What lies at the bound of the index already needs no search.
         design = np.flatnonzero((start >= 0) & (value[sense, k] != indices[k].index.bounds[sense]))
         lanes.append((np.full(len(design), sense), np.full(len(design), k), design, start[design]))
     if lanes:
         sense, k, design, start = (np.concatenate(column) for column in zip(*lanes, strict=True))
-        peak, doubt = _climb(designs, panels, indices, 2.0 * sense - 1, k, samples, tolerance, places.pick(start))
+        peak, doubt = _climb(designs, panels, indices, 2.0 * sense - 1, k, samples, tolerance, places[start])
         sign = 2.0 * sense - 1
         value[sense, k, design] = sign * np.fmax(sign * value[sense, k, design], sign * peak)
         error[sense, k, design] = doubt
@@ -150,20 +138,20 @@ def _at_crossings(
             order[k, crossed] = np.maximum(order[k, crossed], float(sense))
 
 
-def _grid(designs: Designs, panels: Panels, samples: int) -> tuple[_Places, Local]:
+def _grid(designs: Designs, panels: Panels, samples: int) -> tuple[Places, Local]:
     """The first nodes of all regions."""
     u = np.tile(ANGLES[:, None], len(panels.low))
     panel = np.tile(np.arange(len(panels.low)), len(ANGLES))
     theta = spread(panels.low, panels.high, u, cubic)[0].ravel()
     design = panels.design[panel]
     traced = trace(designs, design, theta, panels.reach[design], samples)
-    slot = np.arange(len(traced.ray)) - np.searchsorted(traced.ray, traced.ray)
     radius = spread(traced.inner, traced.outer, RADII[:, None], cosine)[0].ravel()
     ray = np.tile(traced.ray, len(RADII))
-    v = np.repeat(RADII, len(traced.ray))
-    places = _Places(design[ray], panel[ray], np.tile(slot, len(RADII)), u.ravel()[ray], v)
+    places = np.zeros(len(ray), dtype=PLACE)
+    places["design"], places["panel"], places["u"] = design[ray], panel[ray], u.ravel()[ray]
+    places["slot"], places["v"] = np.tile(traced.slot, len(RADII)), np.repeat(RADII, len(traced.ray))
     z = designs.about + radius * np.exp(1j * theta[ray])
-    return places, Local.at(designs.field, z, designs.of(places.design))
+    return places, Local.at(designs.field, z, designs.of(design[ray]))
 
 
 def _best(design: Ints, height: Floats, count: int) -> Ints:
@@ -183,15 +171,15 @@ def _climb(
     which: Ints,
     samples: int,
     tolerance: float,
-    at: _Places,
+    at: Places,
 ) -> tuple[Floats, Floats]:
     """Largest value of `sign` times the index `which` near each place, by shrinking grids, and its error."""
-    u, v = at.u.copy(), at.v.copy()
+    u, v = at["u"].copy(), at["v"].copy()
     wide, deep = np.full(len(u), 2 / len(ANGLES)), np.full(len(u), 2 / len(RADII))
     best, doubt = np.full(len(u), -np.inf), np.full(len(u), np.inf)
 
     def look(lanes: Ints, us: Floats, vs: Floats) -> Floats:
-        found = sign[lanes] * _values(designs, panels, indices, which[lanes], samples, at.pick(lanes), us, vs)
+        found = sign[lanes] * _values(designs, panels, indices, which[lanes], samples, at[lanes], us, vs)
         return np.where(np.isfinite(found), found, -np.inf).reshape(-1, len(lanes))
 
     left = np.arange(len(u))
@@ -231,20 +219,20 @@ def _values(
     indices: Sequence[Prepared],
     which: Ints,
     samples: int,
-    at: _Places,
+    at: Places,
     us: Floats,
     vs: Floats,
 ) -> Floats:
     """Indices `which` on grids, shape (angles, radii, places); nan where the interval is not met."""
-    theta = spread(panels.low[at.panel], panels.high[at.panel], us, cubic)[0].ravel()
-    design, slot = np.tile(at.design, len(us)), np.tile(at.slot, len(us))
+    theta = spread(panels.low[at["panel"]], panels.high[at["panel"]], us, cubic)[0].ravel()
+    design, slot = np.tile(at["design"], len(us)), np.tile(at["slot"], len(us))
     traced = trace(designs, design, theta, panels.reach[design], samples)
     met = slot < traced.counts
     place = np.where(met, np.searchsorted(traced.ray, np.arange(len(theta))) + slot, len(traced.ray))
-    shape = (len(us), 1, len(at.design))
+    shape = (len(us), 1, len(at))
     inner, outer = (np.append(end, np.nan)[place].reshape(shape) for end in (traced.inner, traced.outer))
     z = designs.about + spread(inner, outer, vs, cosine)[0] * np.exp(1j * theta.reshape(shape))
-    local = Local.at(designs.field, z, designs.of(at.design))
+    local = Local.at(designs.field, z, designs.of(at["design"]))
     found = np.full(z.shape, np.nan)
     for k in np.unique(which):
         found = np.where(which == k, indices[k].values(local), found)

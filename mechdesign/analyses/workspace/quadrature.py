@@ -28,7 +28,7 @@ from mechdesign.analyses.workspace.indices import Local, Prepared
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 ANGLES = Rule.of(20, 4, 6.0)
-RADII = Rule.of(11, 2, 0.5)
+RADII = Rule.of(11, 2, 2.0)
 MOST_PASSES = 24
 # Cells and segments are not halved more often than this.
 MOST_HALVINGS = 12
@@ -39,8 +39,8 @@ AREA = 0.1
 FINEST_AREA = 1e-6
 # A piece smaller than this part of the whole region is measured by the whole: its boundary may be rough all over.
 SLIVER = 1e-3
-# Places at which the integrals of one design may look; what is in doubt then stays so, and its error tells.
-BUDGET = 2_000_000
+# Cells of one design at most; what is in doubt then stays so, and its error tells.
+MOST_CELLS = 1000
 # Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
 SINGLE_RAY = 0.01
 # Segments evaluated at once (11 nodes each).
@@ -136,13 +136,9 @@ def integrate(
     of_area = min(AREA * tolerance, FINEST_AREA)
     allowed: Floats | None = None
     boundary: tuple[Ints, Floats, Floats] | None = None
-    spent = np.zeros(count)
     for _ in range(MOST_PASSES):
-        value, error, allowed, met, looked = _evaluate(
-            designs, integrands, fresh, panels.reach, samples, each, allowed, span
-        )
+        value, error, allowed, met = _evaluate(designs, integrands, fresh, panels.reach, samples, each, allowed, span)
         boundary = met if boundary is None else boundary
-        spent += looked
         done = np.concatenate([done, fresh])
         values, errors = np.concatenate([values, value], axis=1), np.concatenate([errors, error], axis=1)
         owner = done["design"]
@@ -150,7 +146,8 @@ def integrate(
         with np.errstate(invalid="ignore"):
             area_wanted = np.maximum(of_area * total[:2], of_area * SLIVER * whole)
             wanted = np.concatenate([area_wanted, np.where(endless, np.inf, np.fmax(each * total[2:], 0.0))])
-        late = (doubt > wanted).any(axis=0) & (spent < BUDGET)
+        cells = np.bincount(owner, minlength=count)
+        late = (doubt > wanted).any(axis=0) & (cells < MOST_CELLS)
         if not late.any():
             break
         # What is left of errors along rays looks like roughness in the angle: they get smaller with the cells.
@@ -160,7 +157,7 @@ def integrate(
         for row in range(len(wanted)):
             np.maximum.at(worst[row], owner, share[row])
         # The worst cell, and those that exceed their equal share of the tolerance.
-        equal = 1 / np.maximum(np.bincount(owner, minlength=count), 1)
+        equal = 1 / np.maximum(cells, 1)
         over = (share >= np.minimum(worst, equal)[:, owner]) & (doubt > wanted)[:, owner]
         split = over.any(axis=0) & (done["stop"] - done["start"] > 2.0**-MOST_HALVINGS) & late[owner]
         if not split.any():
@@ -184,10 +181,10 @@ def _evaluate(
     tolerance: Floats,
     allowed: Floats | None,
     span: Floats,
-) -> tuple[Floats, Floats, Floats, tuple[Ints, Floats, Floats], Floats]:
+) -> tuple[Floats, Floats, Floats, tuple[Ints, Floats, Floats]]:
     """Values and errors (rows, cells) of new cells, the error allowed along rays (integrands, designs), the boundary.
 
-    And how many places of each design were looked at. `tolerance` is of each integrand and design.
+    `tolerance` is of each integrand and design.
     """
     nodes, count = len(ANGLES.nodes), len(cells)
     middle, half = 0.5 * (cells["start"] + cells["stop"]), 0.5 * (cells["stop"] - cells["start"])
@@ -198,7 +195,6 @@ def _evaluate(
     ray, inner, outer = intervals.ray, intervals.inner, intervals.outer
     area = np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta))
     value = error = np.zeros((len(integrands), len(theta)))
-    looked: Floats = samples * np.bincount(design, minlength=designs.count).astype(float)
     if integrands:
         first = _segments(designs, integrands, design, theta, _whole(intervals))
         if allowed is None:
@@ -206,8 +202,7 @@ def _evaluate(
             sums = [np.bincount(design[ray], row * share[ray], designs.count) for row in first[0]]
             allowed = np.asarray(ALONG * tolerance * np.maximum(sums, np.finfo(float).tiny), dtype=float)
         each = allowed[:, design] * np.maximum(1 / span[design], SINGLE_RAY / weight)
-        value, error, places = _along(designs, integrands, design, theta, _whole(intervals), first, each)
-        looked += np.bincount(design, places, designs.count)
+        value, error = _along(designs, integrands, design, theta, _whole(intervals), first, each)
     rows = (area, area * counted, *(value * counted))
     total, doubt = np.empty((2, len(rows), count))
     for k, row in enumerate(rows):
@@ -215,7 +210,7 @@ def _evaluate(
     for k in range(len(integrands)):
         doubt[2 + k] += ANGLES.weights @ (error[k] * weight * counted).reshape(nodes, -1)
     met = (np.tile(design[ray], 2), np.tile(theta[ray], 2), np.concatenate([inner, outer]))
-    return total, doubt, np.zeros_like(tolerance) if allowed is None else allowed, met, looked
+    return total, doubt, np.zeros_like(tolerance) if allowed is None else allowed, met
 
 
 def _whole(intervals: Intervals) -> Parts:
@@ -234,8 +229,8 @@ def _along(
     segments: Parts,
     evaluated: tuple[Floats, Floats, Floats],
     allowed: Floats,
-) -> tuple[Floats, Floats, Ints]:
-    """Integrals along rays and their estimated errors, shape (integrands, rays), and how many places were looked at.
+) -> tuple[Floats, Floats]:
+    """Integrals along rays and their estimated errors, both of shape (integrands, rays).
 
     Parameters
     ----------
@@ -246,7 +241,6 @@ def _along(
     """
     value, error = np.zeros((2, len(integrands), len(theta)))
     found, doubt, crossing = evaluated
-    looked = np.bincount(segments["ray"], minlength=len(theta))
     with np.errstate(divide="ignore", invalid="ignore"):
         # What an inverse square root has within `NEAREST` of the boundary.
         noise = np.sqrt(NEAREST * segments["outer"] / (segments["outer"] - segments["inner"])) * np.abs(found)
@@ -264,9 +258,8 @@ def _along(
             there = rough[crossed]
             at[crossed] = _crossing(designs, design[there["ray"]], theta[there["ray"]], there, crossing[split][crossed])
         segments, noise = _divided(rough, at), np.tile(noise[:, split], 2)
-        looked += np.bincount(segments["ray"], minlength=len(theta))
         found, doubt, crossing = _segments(designs, integrands, design, theta, segments)
-    return value, error, looked * len(RADII.nodes)
+    return value, error
 
 
 def _segments(
