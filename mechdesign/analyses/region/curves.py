@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.pieces import Pieces
-from mechdesign.analyses.region.rays import SAME, Designs, Intervals, trace
+from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, trace
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 SLACK = 1e-9
@@ -77,7 +77,7 @@ def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterat
             # At its very ends a panel meets its neighbour, or an interval vanishes.
             theta = np.clip(theta, low + BESIDE * (high - low), high - BESIDE * (high - low))
             traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
-        ray, inner, outer, enters, leaves = _whole(traced, SAME * float(panels.reach[0]))
+        ray, inner, outer, enters, leaves = _whole(traced, SAME_ROOT * float(panels.reach[0]))
         counts = np.bincount(ray, minlength=number)
         usual = int(np.argmax(np.bincount(counts)))
         kept = np.flatnonzero(counts == usual)

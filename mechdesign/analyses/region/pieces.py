@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.region.panels import MIDDLE, Panels
-from mechdesign.analyses.region.rays import SAME, Designs, Intervals, trace
+from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, trace
 from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.mechanism.variant import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -28,7 +28,7 @@ TOUCHES = 1.75
 NODES = 8
 # Areas as near as this, as parts of the whole, are equal; smaller ones than the second are slits that rounding leaves.
 EQUAL = 1e-4
-NOTHING = 1e-10
+SLIT = 1e-10
 # The piece of an interval that no ray beside it tells.
 UNKNOWN = -2
 
@@ -170,7 +170,7 @@ class Pieces:
             share = area / np.bincount(owner, area, designs.count)[owner]
         held = self._holding(several, samples)
         share[held[held >= 0]] = np.inf
-        slit = share < NOTHING
+        slit = share < SLIT
         drawn = self.drawn.copy()
         drawn[several[held < 0]] = False
         # Of equal ones the first along the scan.
@@ -187,7 +187,7 @@ class Pieces:
         reach = self.panels.reach[design]
         theta = self.scan[0] + (np.angle(place) - self.scan[0]) % (2 * np.pi)
         # At the centre of the scan one ray is as good as another.
-        centre = np.abs(place) <= SAME * reach
+        centre = np.abs(place) <= SAME_ROOT * reach
         theta = np.where(centre, self.scan[0] + MIDDLE * (self.scan[1] - self.scan[0]), theta)
         radius = np.where(centre, 0.0, np.abs(place))
         held = np.full(len(design), -1, dtype=np.intp)

@@ -23,11 +23,11 @@ from mechdesign.numerics.roots import bracketed_roots
 BLOCK = 8192
 ROUNDING = 1e-14
 # Roots nearer than this (relative to the reach) are the same boundary; of several margins the first is named.
-SAME = 1e-9
+SAME_ROOT = 1e-9
 # Five samples that a parabola meets to this fraction of their size are of a quadratic function.
 QUADRATIC = 1e-13
 # Intervals no wider than this part of the reach are rounding's.
-NOTHING = 1e-10
+NARROWEST = 1e-10
 # First and last sample of an interval, as fractions of it.
 INSET = 1e-10
 FIVE = np.linspace(0.0, 1.0, 5)
@@ -164,7 +164,7 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
     found = _intervals(margin, ray, turn, x * reach[ray], start, reach, slack)
     if not (quadratic.all() and not designs.field.same_assembly):
         found = _others(designs, places, direction, found, quadratic, samples, slack * reach, reach)
-    return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
+    return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
 
 
 def _parabolas(values: Floats) -> tuple[Flags, tuple[Floats, Floats, Floats]]:
@@ -186,11 +186,11 @@ def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints,
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
         roots = np.stack([half / c, a / half])
-        margin_of = (roots > SAME) & (roots < 1)
+        margin_of = (roots > SAME_ROOT) & (roots < 1)
     which, margin, ray = np.nonzero(margin_of)
     # The slope at the first of the two roots has the sign of -b, at the other that of b: also where they are one.
     rising = np.signbit(b[margin, ray]) == (which == 0)
-    x, start = roots[which, margin, ray], (a + SAME * (b + SAME * c) <= 0).sum(axis=0)
+    x, start = roots[which, margin, ray], (a + SAME_ROOT * (b + SAME_ROOT * c) <= 0).sum(axis=0)
     return margin, ray, np.where(rising, 1, -1), x, start
 
 
@@ -247,7 +247,7 @@ def _others(
     radius[asked] = bracketed_roots(evaluate, a, fa, b, fb, c, fc, tolerance)
     start = (~positive[:, 0]).sum(axis=0)
     part = _intervals(rows[margin], lane, np.where(f[1] > 0, 1, -1), radius, start, found.outer[cut_of], 0.0)
-    return _replace(found, cut_of, part, NOTHING * reach)
+    return _replace(found, cut_of, part, NARROWEST * reach)
 
 
 def _without_rounding(values: Floats, noise: Floats) -> Floats:
@@ -355,7 +355,7 @@ def _intervals(
     owner, inner, outer, enters, leaves = (v[sort] for v in (owner, inner, outer, enters, leaves))
     beyond = np.zeros(rays, dtype=bool)
     beyond[owner[leaves < 0]] = True
-    tie = SAME * reach
+    tie = SAME_ROOT * reach
     enters = _first_named(owner, inner, enters, margin[turn > 0], ray[turn > 0], radius[turn > 0], tie)
     leaves = _first_named(owner, outer, leaves, margin[turn < 0], ray[turn < 0], radius[turn < 0], tie)
     return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, (ray, radius, margin, turn))

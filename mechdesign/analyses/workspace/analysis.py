@@ -15,7 +15,15 @@ from mechdesign.analyses.workspace.indices.index import determinant_power, power
 from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
-from mechdesign.analyses.workspace.question import COLUMNS, Answer, Question, answer, areas_of_pieces, questions, split
+from mechdesign.analyses.workspace.question import (
+    COLUMNS,
+    Evaluation,
+    Question,
+    answer,
+    areas_of_pieces,
+    questions,
+    split,
+)
 from mechdesign.analyses.workspace.singularities import singular_everywhere
 from mechdesign.analyses.workspace.tables import (
     PIECE,
@@ -36,10 +44,7 @@ from mechdesign.threads import one_thread
 
 # An error of the area beyond this part of it is told.
 AREA_SURE = 1e-3
-ROOTLESS = (
-    "without a closed form of the inverse problem the workspace grows from the sketch, and with the held values the "
-    "mechanism does not reach the point's place in it; draw it nearer to them"
-)
+ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; redraw the sketch at those values"
 
 
 @one_thread()
@@ -67,7 +72,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
         return reachable(study, progress)
     asked = questions(study)
     progress.start(len(asked), "regions")
-    answers: list[Answer] = []
+    answers: list[Evaluation] = []
     local: list[list[Column]] = []
     regions: list[tuple[Study, Question, list[Patch]]] = []
     shapes: list[tuple[Circle, Rectangle]] = []
@@ -135,7 +140,7 @@ def _unreachable(study: Study, asked: Sequence[Question]) -> str:
     )
 
 
-def _doubts(question: Question, given: Answer) -> Iterator[str]:
+def _doubts(question: Question, given: Evaluation) -> Iterator[str]:
     there = where(question)
     if not given.panels.closes[0]:
         assembly = " in the sketch's assembly" if question.field.same_assembly else ""
@@ -153,7 +158,7 @@ def _doubts(question: Question, given: Answer) -> Iterator[str]:
             yield f"{name}{there} is only known to {error:.1g}, not to the tolerance asked for"
 
 
-def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Answer]) -> Iterator[Column]:
+def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluation]) -> Iterator[Column]:
     for name in asked[0].held:
         label = study.units.label(study.mechanism.quantity(name))
         yield Column(name, np.array([question.held[name] for question in asked]), label, "held coordinate")

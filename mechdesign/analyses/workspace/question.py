@@ -57,7 +57,7 @@ class Question(Region):
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class Evaluation:
     """The wanted columns for each design, and their estimated errors (0 where the rule has none).
 
     Parameters
@@ -126,7 +126,7 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     ]  # fmt: skip
 
 
-def answer(question: Question, places: Places, count: int, effort: Effort) -> Answer:
+def answer(question: Question, places: Places, count: int, effort: Effort) -> Evaluation:
     """Indices of `count` designs, whose changed places are arrays of shape (count,).
 
     Raises
@@ -146,7 +146,7 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
     if not panels.closes.any():
         nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
         errors = {name: np.maximum(panels.seen, 0.0) * (name == "area") for name in question.wanted}
-        return Answer(nothing, errors, panels, pieces)
+        return Evaluation(nothing, errors, panels, pieces)
     samples, gauss = effort.samples, question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
     integrands, peaks = _integrands(question), _peaks(question, designs, panels, samples)
@@ -184,10 +184,10 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> An
         if name:
             values[column], errors[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
     pick = question.wanted
-    return Answer({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels, pieces)
+    return Evaluation({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels, pieces)
 
 
-def areas_of_pieces(question: Question, given: Answer, effort: Effort) -> list[float]:
+def areas_of_pieces(question: Question, given: Evaluation, effort: Effort) -> list[float]:
     """Area of each piece of a single design's region."""
     assert given.pieces is not None
     if given.pieces.number[0] == 1 and "area" in given.values:
