@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Answer, Owners, answer, load_study, study_label, tell
+from mechdesign.cli.execution import Answer, Owners, answer, folder, load_study, study_label, tell
 from mechdesign.cli.failure import INTERRUPTED
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
@@ -38,7 +38,7 @@ def questions(study: Study) -> tuple[str, ...]:
 
 
 @one_thread()
-def run(paths: Sequence[Path], options: Options, junit: Path | None = None) -> int:
+def run(paths: Sequence[Path], options: Options) -> int:
     """Answer every question of the studies; returns the exit code, the highest of them all.
 
     A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
@@ -54,11 +54,11 @@ def run(paths: Sequence[Path], options: Options, junit: Path | None = None) -> i
         terminal.say("interrupted; what was finished is whole")
         answers.append(Answer("", "", Path(), INTERRUPTED, 0, failed="interrupted"))
     terminal.show(_summary(answers), as_json=options.json)
-    if junit is not None:
+    if options.junit is not None:
         from mechdesign.cli.junit import to_xml
         from mechdesign.report.writer import write_text
 
-        write_text(junit, to_xml(answers))
+        write_text(options.junit, to_xml(answers))
     return max(given.exit_code for given in answers)
 
 
@@ -78,9 +78,7 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Answer]
         except StudyError as error:
             yield _failure(label, "check", Path(), error)
             continue
-        root = options.out or Path("results") / label
-        if options.out is not None and len(paths) > 1:
-            root /= label
+        root = folder(study, "", options, several=len(paths) > 1)
         for command in questions(study):
             yield _ask(study, command, root / command, options)
 

@@ -24,7 +24,7 @@ from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Poses, Study
-from mechdesign.study.schema.sections import KinematicsSection
+from mechdesign.study.schema.kinematics import KinematicsSection
 
 # A place this near to a pose or to zero, as a part of the sweep, is there.
 AT_POSE = 1e-12

@@ -17,8 +17,7 @@ from mechdesign.analyses.optimize.assembling import assembly_margins
 from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
-from mechdesign.expressions import Expression
-from mechdesign.linearity import is_linear
+from mechdesign.expressions import Expression, is_linear
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 from mechdesign.study import Study

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import yaml
@@ -33,11 +33,16 @@ _WORDS_BOOLEAN = {"true": True, "True": True, "TRUE": True, "false": False, "Fal
 
 @dataclass(frozen=True)
 class Mark:
-    """A place in a text, counted from 1; line 0 where there is no text (an override)."""
+    """A place in a text, counted from 1; line 0 where there is no text (an override).
+
+    `start` and `end` are those of the value there, in characters of the text from 0.
+    """
 
     file: str
     line: int = 0
     column: int = 0
+    start: int = 0
+    end: int = 0
 
     def problem(self, message: str, key: str = "") -> Problem:
         """Build a problem that stands here."""
@@ -156,7 +161,8 @@ class _Builder:
             yield loader.get_event()
 
     def _mark(self, event: Any) -> Mark:
-        return Mark(self.name, event.start_mark.line + 1, event.start_mark.column + 1)
+        begin, end = event.start_mark, event.end_mark
+        return Mark(self.name, begin.line + 1, begin.column + 1, begin.index, end.index)
 
     def _node(self, event: Any, events: Iterator[Any], depth: int, in_flow: bool) -> _Node:
         mark = self._mark(event)
@@ -178,6 +184,7 @@ class _Builder:
             children: list[_Node] = []
             while not isinstance(child := next(events), yaml.CollectionEndEvent):
                 children.append(self._node(child, events, depth + 1, inside))
+            node.mark = replace(node.mark, end=self._mark(child).end)
             if isinstance(event, yaml.SequenceStartEvent):
                 node.items = children
             else:
@@ -262,3 +269,19 @@ def plain(data: Any) -> Any:
     if isinstance(data, Mapping):
         return {key: plain(value) for key, value in data.items()}
     return [plain(item) for item in data] if isinstance(data, list) else data
+
+
+def has(data: Any, key: Any) -> bool:
+    """Whether a mapping has a key, or a list an index."""
+    if isinstance(data, list):
+        return isinstance(key, int) and 0 <= key < len(data)
+    return isinstance(data, Mapping) and key in data
+
+
+def leaves(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """Every value of data that is neither a mapping nor a list, with its path."""
+    if isinstance(data, Mapping | list):
+        for key, value in data.items() if isinstance(data, Mapping) else enumerate(data):
+            yield from leaves(value, (*path, key))
+    else:
+        yield path, data
