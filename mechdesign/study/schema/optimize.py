@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
@@ -43,6 +43,8 @@ class Variable(fields.Model):
 class Judged(fields.Model):
     """A result, and the rows of it that count."""
 
+    bare = "result"
+    short: ClassVar[tuple[fields.Form, ...]] = (fields.NAME_FORM,)
     result: fields.CoordinateName
     where: dict[str, str | float | int] = Field(default_factory=dict)
 
@@ -56,6 +58,7 @@ class Judged(fields.Model):
 class Condition(Judged):
     """A result and its bounds."""
 
+    bare, short = "", ()
     abs: bool = False
     at_least: fields.Number | None = None
     at_most: fields.Number | None = None
@@ -101,16 +104,7 @@ WeightRow = Annotated[
 ]
 
 
-def _goal(raw: Any) -> Any:
-    return {"result": raw} if isinstance(raw, str) else raw
-
-
-# Names of results, or with `where` which of their rows count.
-Goals = Annotated[
-    tuple[Annotated[Judged, BeforeValidator(_goal), fields.OrShort((fields.NAME_FORM,))], ...],
-    BeforeValidator(lambda raw: [raw] if isinstance(raw, str | Mapping) else raw),
-    fields.OrShort((fields.NAME_FORM,)),
-]
+Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.OrOne()]
 
 
 class OptimizeSection(fields.Model):

@@ -118,27 +118,13 @@ class Path(fields.Model):
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """The path of a point; all arrays have the shape (poses,).
+    """The path of a point; all arrays have the shape (poses,)."""
 
-    Parameters
-    ----------
-    places : ndarray of complex
-        x + i y.
-    way : ndarray
-        Length of the path up to each place.
-    directions : ndarray of complex
-        Unit vector along the path, the derivative of the place by its length.
-    bends : ndarray of complex
-        Second derivative of the place by the path's length: towards the centre of curvature, 1 / radius long.
-    closed : bool
-        Whether the path goes on from its last place to its first.
-    """
-
-    places: Complexes
-    way: Floats
-    directions: Complexes
-    bends: Complexes
-    closed: bool = False
+    places: Complexes  # x + i y
+    way: Floats  # length of the path up to each place
+    directions: Complexes  # unit vectors along the path: first derivatives of the place by the path's length
+    bends: Complexes  # second derivatives: towards the centre of curvature, 1 / radius long
+    closed: bool = False  # whether the path goes on from its last place to its first
 
 
 def course(name: str, given: Path, folder: pathlib.Path, turn: float) -> Course | Floats:

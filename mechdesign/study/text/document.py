@@ -6,7 +6,6 @@ before anything is built. Scalars follow YAML 1.2: ``1e-3`` is a number, ``on`` 
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -51,26 +50,19 @@ class Mark:
 
 @dataclass
 class Document:
-    """Plain data (dict, list, str, int, float, bool, None) and where each part of it stands.
+    """Plain data (dict, list, str, int, float, bool, None) and where its keys and values stand.
 
-    Parameters
-    ----------
-    keys, values : mapping of path to Mark
-        Where a mapping's key, and a value, stands; a path is the sequence of keys and indices from the root.
-    problems : list of Problem
-        Mistakes of writing that leave the rest readable: duplicate keys, expressions split at a comma.
-    spoiled : set of paths
-        Parts in which such a mistake was found, where further complaints would only repeat it.
-    added : set of paths
-        Entries that the text does not have: an override made them.
+    A path is the sequence of keys and indices from the root.
     """
 
     name: str
     data: Any
     keys: dict[Path, Mark] = field(default_factory=dict)
     values: dict[Path, Mark] = field(default_factory=dict)
+    # Mistakes of writing that leave the rest readable, and the parts where complaints would only repeat them.
     problems: list[Problem] = field(default_factory=list)
     spoiled: set[Path] = field(default_factory=set)
+    # Entries that the text does not have: an override made them.
     added: set[Path] = field(default_factory=set)
 
 
@@ -250,11 +242,7 @@ class _Builder:
         if _FLOAT.fullmatch(text):
             return float(text)
         if _NOT_FINITE.fullmatch(text):
-            return (
-                math.nan
-                if "n" in text.lower().replace("inf", "")
-                else math.copysign(math.inf, -1 if text[0] == "-" else 1)
-            )
+            return float(text.replace(".", ""))
         return text
 
 
