@@ -141,17 +141,18 @@ def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
         path = (*root, "actuators", drive)
         if checker.known(drive, checker.names.drives, "drive", path, at_key=True):
             checker.kind(path, _STIFFNESS_KINDS[checker.names.drives[drive]])
+    slides = [*checker.names.slides, *checker.names.legs]
+    clamped = [set(other.fixed) for other in checker.names.section.joints.values() if other.fixed is not None]
+    pins = [p for p, owners in checker.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
     for joint, bearing in section.bearings.items():
         path = (*root, "bearings", joint)
-        slides = [*checker.names.slides, *checker.names.legs]
-        clamped = [set(other.fixed) for other in checker.names.section.joints.values() if other.fixed is not None]
-        pins = [p for p, owners in checker.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
-        if checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
-            if bearing.radial is not None:
-                checker.kind((*path, "radial"), "stiffness")
-            if bearing.moment is not None:
-                checker.kind((*path, "moment"), "rotational_stiffness")
-            if bearing.moment is not None and joint not in slides:
+        if not checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
+            continue
+        if bearing.radial is not None:
+            checker.kind((*path, "radial"), "stiffness")
+        if bearing.moment is not None:
+            checker.kind((*path, "moment"), "rotational_stiffness")
+            if joint not in slides:
                 checker.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
     loads = [
         checker.load(load, (*root, "loads", index), on_pin=section.link is None)
