@@ -180,7 +180,7 @@ def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> 
     return Poses((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
 
 
-def _path(path: Mapping[str, paths.Path], folder: Path, turn: float) -> Poses:
+def _path(path: Mapping[str, paths.PathSection], folder: Path, turn: float) -> Poses:
     if not path:
         raise StudyError("an empty path")
     columns: dict[str, Floats] = {}

@@ -12,7 +12,7 @@ from mechdesign.study.build.names import GROUND
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.numbers import Context, failure, read_number
 
 _ELASTIC = (
@@ -120,7 +120,7 @@ class StiffnessSection(PoseSection):
 
 def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
     """Check what is named, the units of stiffnesses, and the loads; returns the section with loads of three numbers."""
-    root: Path = ("stiffness",)
+    root: KeyPath = ("stiffness",)
     right = checker.known(section.at, checker.names.owners, "point", (*root, "at"))
     if right and section.link is None and GROUND in checker.names.owners[section.at]:
         checker.reporter.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
@@ -130,7 +130,7 @@ def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
             message = f"link {section.link!r} has no point {section.at!r}; it has {', '.join(points)}"
             checker.reporter.report((*root, "at"), message)
     for link, profile in section.elastic.items():
-        path: Path = (*root, "elastic", link)
+        path: KeyPath = (*root, "elastic", link)
         checker.known(link, checker.names.moving, "moving link", path, at_key=True)
         checker.known(profile, section.sections, "section", path)
     for profile in section.sections:

@@ -15,7 +15,7 @@ import yaml
 
 from mechdesign.errors import Problem, StudyError
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 MAX_DEPTH = 40
 MAX_NODES = 200_000
@@ -57,13 +57,13 @@ class Document:
 
     name: str
     data: Any
-    keys: dict[Path, Mark] = field(default_factory=dict)
-    values: dict[Path, Mark] = field(default_factory=dict)
+    keys: dict[KeyPath, Mark] = field(default_factory=dict)
+    values: dict[KeyPath, Mark] = field(default_factory=dict)
     # Mistakes of writing that leave the rest readable, and the parts where complaints would only repeat them.
     problems: list[Problem] = field(default_factory=list)
-    spoiled: set[Path] = field(default_factory=set)
+    spoiled: set[KeyPath] = field(default_factory=set)
     # Entries that the text does not have: an override made them.
-    added: set[Path] = field(default_factory=set)
+    added: set[KeyPath] = field(default_factory=set)
 
 
 def dotted(path: Sequence[str | int]) -> str:
@@ -185,7 +185,7 @@ class _Builder:
             self.anchors[event.anchor] = node
         return node
 
-    def _expand(self, node: _Node, path: Path, depth: int) -> Any:
+    def _expand(self, node: _Node, path: KeyPath, depth: int) -> Any:
         self.nodes += 1
         if self.nodes > MAX_NODES:
             raise StudyError([node.mark.problem(f"more than {MAX_NODES} values once its aliases are expanded")])
@@ -198,13 +198,13 @@ class _Builder:
             return self._expand_mapping(node.pairs, path, depth)
         return self._scalar(node, path)
 
-    def _expand_mapping(self, pairs: list[tuple[_Node, _Node]], path: Path, depth: int) -> dict[str, Any]:
+    def _expand_mapping(self, pairs: list[tuple[_Node, _Node]], path: KeyPath, depth: int) -> dict[str, Any]:
         mapping: dict[str, Any] = {}
         for key_node, value_node in pairs:
             if key_node.scalar is None:
                 self.document.problems.append(key_node.mark.problem("a key must be a word", dotted(path)))
                 continue
-            here: Path = (*path, key_node.scalar)
+            here: KeyPath = (*path, key_node.scalar)
             if key_node.scalar in mapping:
                 first = self.document.keys[here]
                 message = f"duplicate key; {key_node.scalar!r} is given in line {first.line} already"
@@ -214,7 +214,7 @@ class _Builder:
             mapping[key_node.scalar] = self._expand(value_node, here, depth + 1)
         return mapping
 
-    def _check_split(self, nodes: list[_Node], path: Path) -> None:
+    def _check_split(self, nodes: list[_Node], path: KeyPath) -> None:
         """Find ``{to: min(a, b)}``, which YAML splits at the comma into two entries."""
         if path in self.document.spoiled:
             return
@@ -229,7 +229,7 @@ class _Builder:
             self.document.spoiled.add(path)
             return
 
-    def _scalar(self, node: _Node, path: Path) -> Any:
+    def _scalar(self, node: _Node, path: KeyPath) -> Any:
         text = node.scalar or ""
         if not node.plain:
             return text
@@ -266,7 +266,7 @@ def has(data: Any, key: Any) -> bool:
     return isinstance(data, Mapping) and key in data
 
 
-def leaves(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+def leaves(data: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
     """Every value of data that is neither a mapping nor a list, with its path."""
     if isinstance(data, Mapping | list):
         for key, value in data.items() if isinstance(data, Mapping) else enumerate(data):
