@@ -28,7 +28,7 @@ FINE = 1e-13
 # A limit this near to the first or the last value of the sweep lies at it (as a part of the value, or of 1).
 AT_END = 1e-9
 # Ends within this part of the sweep's size are one; a change point within this part of a step of a pose is at it.
-SAME, AT_POSE = 1e-11, 1e-6
+ONE_END, AT_POSE = 1e-11, 1e-6
 # How far beside a single place, as a part of the step, the motion must go on for it to have no gap there.
 BESIDE = 1e-5
 
@@ -164,7 +164,7 @@ class _Search:
         span = float(np.ptp(self.at))
         kept: list[Boundary] = []
         for end in ends:
-            if not kept or abs(end.place - kept[-1].place) > SAME * span or end.cause != kept[-1].cause:
+            if not kept or abs(end.place - kept[-1].place) > ONE_END * span or end.cause != kept[-1].cause:
                 kept.append(end)
         return kept, changes
 
@@ -198,8 +198,7 @@ class _Search:
             return []
         side = np.where(parts.valid[0], 0, 1)
         inner, bad = parts.x[side, lanes], parts.x[1 - side, lanes]
-        good, poses = inner, self.solve(step, inner)
-        causes = self._causes(step, bad)[1]
+        good, poses, causes = inner, self.solve(step, inner), self._causes(step, bad)[1]
         turned = {k: self._turned(float(good[k]), poses.take(k), cause)
                   for k, cause in enumerate(causes) if cause.role == "reached"}  # fmt: skip
         for _ in range(HALVINGS):
@@ -211,7 +210,10 @@ class _Search:
         good = np.where(outer, np.where(step == 0, self.at[1], self.at[-2]), good)
         poses = self.solve(step, good)
         which, causes = self._causes(step, bad)
-        places = np.where(outer, good, self._zeros(step, which, causes, inner, good, bad))
+        # Where the margin is zero, without that allowance.
+        root = self._root(step, which, inner, bad)
+        smooth = np.array([cause.role in ("closure", "limit", "leg") for cause in causes])
+        places = np.where(smooth & ~outer & np.isfinite(root), root, good)
         found = []
         for k in lanes.tolist():
             place, pose, cause = turned.get(k) or self._named(float(places[k]), poses.take(k), causes[k])
@@ -219,24 +221,17 @@ class _Search:
             found.append(Boundary(position, place, cause, pose))
         return found
 
-    def _zeros(
-        self, step: Ints, which: Ints, causes: list[Cause], inner: Floats, good: Floats, bad: Floats
-    ) -> Floats:  # fmt: skip
-        """Where the margins that end the motion are zero, without the allowance for rounding; `good` for others."""
-        smooth = np.flatnonzero([cause.role in ("closure", "limit", "leg") for cause in causes])
+    def _root(self, step: Ints, which: Ints, low: Floats, high: Floats) -> Floats:
+        """Where margins `which` are zero between two places; nan where they have the same sign at both."""
 
-        def margin(left: Ints, x: Floats) -> Floats:
-            lane = smooth[left]
-            one: Floats = self.evaluate(step[lane], x)[which[lane], np.arange(len(lane))]
-            return one
+        def margin(lane: Ints, x: Floats) -> Floats:
+            found: Floats = self.evaluate(step[lane], x)[which[lane], np.arange(len(lane))]
+            return found
 
-        found = good.copy()
-        if len(smooth):
-            a, b, every = inner[smooth], bad[smooth], np.arange(len(smooth))
-            at_a, at_b, none = margin(every, a), margin(every, b), np.full(len(smooth), np.nan)
-            place = bracketed_roots(margin, a, at_a, b, at_b, none, none, np.abs(b - a) * 2.0**-HALVINGS)
-            found[smooth] = np.where((at_a >= 0) & (at_b < 0), place, good[smooth])
-        return found
+        every, none = np.arange(len(step)), np.full(len(step), np.nan)
+        a, b = margin(every, low), margin(every, high)
+        place = bracketed_roots(margin, low, a, high, b, none, none, FINE * np.abs(high - low))
+        return np.where((a >= 0) != (b >= 0), place, np.nan)
 
     def _turned(self, place: float, pose: Configuration, cause: Cause) -> tuple[float, Configuration, Cause] | None:
         """The very place at which a group without a closed form turns back; its continuation ends a little before."""
@@ -280,12 +275,8 @@ class _Search:
         """Single places at which the motion goes to infinity."""
         a, b = np.moveaxis(parts.values, 1, 0)
         function, lane = np.nonzero(self.role("across")[:, None] & ((a >= 0) != (b >= 0)) & np.isfinite(a + b))
-        step, (low, high) = parts.step[lane], parts.x[:, lane]
-        none = np.full(len(lane), np.nan)
-        place = bracketed_roots(
-            lambda k, x: self.evaluate(step[k], x)[function[k], np.arange(len(k))],
-            low, a[function, lane], high, b[function, lane], none, none, FINE * np.abs(high - low),
-        )  # fmt: skip
+        step = parts.step[lane]
+        place = self._root(step, function, *parts.x[:, lane])
         positions = self._position(step, place).tolist()
         return [
             Boundary(positions[k], float(place[k]), self.margins.causes[function[k]], None)

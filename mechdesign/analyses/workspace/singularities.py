@@ -109,7 +109,7 @@ def singular_everywhere(field: Field) -> bool:
     """Whether every pose is a forward singularity, so that determinants are nothing but rounding."""
     field = replace(field, same_assembly=False)
     z = field.surroundings
-    closures = [kind == "singularity" for kind, _ in field.labels]
+    closures = [kind != "limit" for kind, _ in field.labels]
     reached = (field.margins(z, {})[closures] > 0).all(axis=0)
     return bool(reached.any()) and _singular(field, z[reached])
 
