@@ -197,29 +197,36 @@ class _Search:
         if not len(step):
             return []
         side = np.where(parts.valid[0], 0, 1)
-        inner, bad = parts.x[side, lanes], parts.x[1 - side, lanes]
-        good, poses, causes = inner, self.solve(step, inner), self._causes(step, bad)[1]
-        turned = {k: self._turned(float(good[k]), poses.take(k), cause)
-                  for k, cause in enumerate(causes) if cause.role == "reached"}  # fmt: skip
-        for _ in range(HALVINGS):
+        good, bad = parts.x[side, lanes], parts.x[1 - side, lanes]
+        poses, (_, causes) = self.solve(step, good), self._causes(step, bad)
+        turned = [
+            self._turned(int(step[k]), float(good[k]), poses.take(k), cause) if cause.role == "reached" else None
+            for k, cause in enumerate(causes)
+        ]
+        rest = np.flatnonzero([end is None for end in turned])
+        return [end for end in turned if end is not None] + self._closed_in(step[rest], good[rest], bad[rest])
+
+    def _closed_in(self, step: Ints, inner: Floats, bad: Floats) -> list[Boundary]:
+        """Ends between places of which one is valid and the other is not, brought together."""
+        good = inner
+        for _ in range(HALVINGS if len(step) else 0):
             middle = good + (bad - good) / 2
             inside = self.solve(step, middle).valid
             good, bad = np.where(inside, middle, good), np.where(inside, bad, middle)
         # Right beyond the end, where rounding is still forgiven, lies the pose in which a dead centre is straight.
+        last = len(self.at) - 2
         outer = (step == 0) | (step == last)
         good = np.where(outer, np.where(step == 0, self.at[1], self.at[-2]), good)
-        poses = self.solve(step, good)
-        which, causes = self._causes(step, bad)
+        poses, (which, causes) = self.solve(step, good), self._causes(step, bad)
         # Where the margin is zero, without that allowance.
         root = self._root(step, which, inner, bad)
-        smooth = np.array([cause.role in ("closure", "limit", "leg") for cause in causes])
+        smooth = np.array([cause.role in ("closure", "limit", "leg") for cause in causes], dtype=bool)
         places = np.where(smooth & ~outer & np.isfinite(root), root, good)
-        found = []
-        for k in lanes.tolist():
-            place, pose, cause = turned.get(k) or self._named(float(places[k]), poses.take(k), causes[k])
-            position = float(self._position(step[[k]], np.array([place]))[0])
-            found.append(Boundary(position, place, cause, pose))
-        return found
+        positions = self._position(step, places).tolist()
+        return [
+            Boundary(positions[k], float(places[k]), self._named(poses.take(k), cause), poses.take(k))
+            for k, cause in enumerate(causes)
+        ]
 
     def _root(self, step: Ints, which: Ints, low: Floats, high: Floats) -> Floats:
         """Where margins `which` are zero between two places; nan where they have the same sign at both."""
@@ -233,7 +240,7 @@ class _Search:
         place = bracketed_roots(margin, low, a, high, b, none, none, FINE * np.abs(high - low))
         return np.where((a >= 0) != (b >= 0), place, np.nan)
 
-    def _turned(self, place: float, pose: Configuration, cause: Cause) -> tuple[float, Configuration, Cause] | None:
+    def _turned(self, step: int, place: float, pose: Configuration, cause: Cause) -> Boundary | None:
         """The very place at which a group without a closed form turns back; its continuation ends a little before."""
         margins = self.margins
         given = list(margins.held)
@@ -241,19 +248,20 @@ class _Search:
         exact = turning_point(margins.plan, given, margins.which, pose)
         if exact is None:
             return None
-        group = margins.plan.structure.groups[exact[2]]
-        return exact[0], exact[1], replace(cause, joint=joints_of(margins.mechanism, group), group=exact[2])
+        joint = joints_of(margins.mechanism, margins.plan.structure.groups[exact[2]])
+        position = float(self._position(np.array([step]), np.array([exact[0]]))[0])
+        return Boundary(position, exact[0], replace(cause, joint=joint, group=exact[2]), exact[1])
 
-    def _named(self, place: float, pose: Configuration, cause: Cause) -> tuple[float, Configuration, Cause]:
+    def _named(self, pose: Configuration, cause: Cause) -> Cause:
         """The cause where a group without a closed form is not continued although it does not turn back."""
-        if cause.role == "reached":
-            mechanism = self.margins.mechanism
-            for slide in self.margins.legs:
-                leg = mechanism.graph.slides[slide]
-                if abs(float(pose.slides[slide])) <= AT_END * mechanism.size:
-                    return place, pose, Cause(ZERO_LENGTH, leg, leg, -1, "leg")
-            cause = replace(cause, kind=Reason.OTHER_ASSEMBLY.text)
-        return place, pose, cause
+        if cause.role != "reached":
+            return cause
+        mechanism = self.margins.mechanism
+        for slide in self.margins.legs:
+            leg = mechanism.graph.slides[slide]
+            if abs(float(pose.slides[slide])) <= AT_END * mechanism.size:
+                return Cause(ZERO_LENGTH, leg, leg, -1, "leg")
+        return replace(cause, kind=Reason.OTHER_ASSEMBLY.text)
 
     def _causes(self, step: Ints, bad: Floats) -> tuple[Ints, list[Cause]]:
         """What ends the motion just beyond its end: the margin that is most below zero, and its index."""
