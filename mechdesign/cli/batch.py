@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Answer, Owners, answer, folder, load_study, study_label, tell
+from mechdesign.cli.execution import Outcome, Owners, answer, folder, load_study, study_label, tell
 from mechdesign.cli.failure import INTERRUPTED
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
@@ -39,12 +39,12 @@ def questions(study: Study) -> tuple[str, ...]:
 
 @one_thread()
 def run(paths: Sequence[Path], options: Options) -> int:
-    """Answer every question of the studies; returns the exit code, the highest of them all.
+    """Outcome every question of the studies; returns the exit code, the highest of them all.
 
     A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
     summary and the JUnit file then tell what was finished.
     """
-    answers: list[Answer] = []
+    answers: list[Outcome] = []
     try:
         for given in _answers(paths or [None], options):
             answers.append(given)
@@ -52,7 +52,7 @@ def run(paths: Sequence[Path], options: Options) -> int:
                 break
     except KeyboardInterrupt:
         terminal.say("interrupted; what was finished is whole")
-        answers.append(Answer("", "", Path(), INTERRUPTED, 0, failed="interrupted"))
+        answers.append(Outcome("", "", Path(), INTERRUPTED, 0, failed="interrupted"))
     terminal.show(_summary(answers), as_json=options.json)
     if options.junit is not None:
         from mechdesign.cli.junit import to_xml
@@ -62,7 +62,7 @@ def run(paths: Sequence[Path], options: Options) -> int:
     return max(given.exit_code for given in answers)
 
 
-def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Answer]:
+def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome]:
     """Answers of all studies in order; every study is read before the first is computed."""
     studies: list[Study] = []
     for path in paths:
@@ -83,7 +83,7 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Answer]
             yield _ask(study, command, root / command, options)
 
 
-def _ask(study: Study, command: str, directory: Path, options: Options) -> Answer:
+def _ask(study: Study, command: str, directory: Path, options: Options) -> Outcome:
     label = study_label(study)
     try:
         given = answer(study, command, directory, options)
@@ -93,13 +93,13 @@ def _ask(study: Study, command: str, directory: Path, options: Options) -> Answe
     return given
 
 
-def _failure(label: str, command: str, directory: Path, error: Exception) -> Answer:
+def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
     code, message = explain(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
-    return Answer(label, command, directory, code, 0, failed=message)
+    return Outcome(label, command, directory, code, 0, failed=message)
 
 
-def _summary(answers: Sequence[Answer]) -> Table:
+def _summary(answers: Sequence[Outcome]) -> Table:
     import numpy as np
 
     from mechdesign.results import Column, Table
@@ -109,7 +109,7 @@ def _summary(answers: Sequence[Answer]) -> Table:
     def words(values: list[str]) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
         return np.array(values, dtype=np.str_)
 
-    def met(given: Answer) -> str:
+    def met(given: Outcome) -> str:
         return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
 
     return Table(

@@ -15,7 +15,7 @@ from mechdesign.threads import one_thread
 
 if TYPE_CHECKING:
     from mechdesign.journal import Journal
-    from mechdesign.report.manifest import Asked
+    from mechdesign.report.manifest import Extras
     from mechdesign.report.requirements import Verdict
     from mechdesign.results import Result, Table
     from mechdesign.study import Study
@@ -24,7 +24,7 @@ BUILT_IN = "two_link_arm"
 
 
 @dataclass(frozen=True)
-class Answer:
+class Outcome:
     """What one command gave.
 
     Parameters
@@ -99,7 +99,7 @@ class Owners:
             raise StudyError(f"{source}: its results would overwrite those of {owner}; rename one of the files")
 
 
-def answer(study: Study, command: str, directory: Path, options: Options) -> Answer:
+def answer(study: Study, command: str, directory: Path, options: Options) -> Outcome:
     """Compute one command's result, judge it by the study's requirements and write it, unless it is there.
 
     Raises
@@ -113,7 +113,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
 
     begun = time.perf_counter()
     writer.check_writable(directory)
-    asked = manifest.Asked(not options.no_plots, options.animate and command == "kinematics", options.all_modes)
+    asked = manifest.Extras(not options.no_plots, options.animate and command == "kinematics", options.all_modes)
     if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
     if command in LONG:
@@ -141,13 +141,13 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         journal.discard()
     warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
     code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
-    return Answer(
+    return Outcome(
         study_label(study), command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         result=result,
     )  # fmt: skip
 
 
-def _finished(study: Study, command: str, directory: Path, asked: Asked) -> Answer | None:
+def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
     """The answer that an earlier run left whole in the directory, if this run would give the same."""
     from mechdesign.report import manifest
     from mechdesign.report.requirements import Verdict, command_of
@@ -163,7 +163,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Asked) -> Answ
         return None
     rows = next(iter(content["tables"].values()))["rows"]
     code = _exit_code(content["failed"], verdicts)
-    return Answer(
+    return Outcome(
         study_label(study), command, directory, code, rows, content["warnings"], content["failed"], verdicts, kept=True
     )
 
@@ -185,7 +185,7 @@ def _main_table(directory: Path) -> Table:
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Asked
+    directory: Path, study: Study, result: Result, asked: Extras
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     from mechdesign.analyses.look import LONG
@@ -215,7 +215,7 @@ def _journal(study: Study, directory: Path, options: Options) -> Journal:
     return journal
 
 
-def tell(given: Answer, options: Options) -> None:
+def tell(given: Outcome, options: Options) -> None:
     """Say on stderr what came out; what is not met or failed is said even where quiet is wanted."""
     for warning in given.warnings:
         terminal.say(f"warning: {warning}", quiet=options.quiet)

@@ -8,7 +8,7 @@ from typing import Any
 
 from mechdesign.errors import Problem, StudyError, suggestion
 from mechdesign.study.schema.study_file import StudyFile
-from mechdesign.study.text.document import Document, Mark, Path, dotted, has, parse_value
+from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, parse_value
 from mechdesign.study.text.reporter import LIST_FORM, schema_fields
 
 MAX_LENGTH = 1000
@@ -63,7 +63,7 @@ def _apply(document: Document, text: str) -> None:
         document.added.add(path)
 
 
-def _descend(document: Document, segments: list[str], label: str, *, making: bool) -> tuple[Any, Path]:
+def _descend(document: Document, segments: list[str], label: str, *, making: bool) -> tuple[Any, KeyPath]:
     """Find the mapping or list to change and the path of the entry; mappings on the way are made where wanted."""
     data: Any = document.data
     path: list[str | int] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -180,7 +180,7 @@ def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> 
     return Poses((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
 
 
-def _path(path: Mapping[str, paths.Path], folder: Path, turn: float) -> Poses:
+def _path(path: Mapping[str, paths.PathSection], folder: Path, turn: float) -> Poses:
     if not path:
         raise StudyError("an empty path")
     columns: dict[str, Floats] = {}
@@ -200,46 +200,28 @@ def _path(path: Mapping[str, paths.Path], folder: Path, turn: float) -> Poses:
     for owner in {name.rpartition(".")[0] for name in columns if name.endswith(".x")} - set(found):
         if f"{owner}.y" in columns:
             found[owner] = paths.polyline(values[f"{owner}.x"] + 1j * values[f"{owner}.y"])
-    slopes: dict[str, Floats] = {}
-    bends: dict[str, Floats] = {}
-    closed = False
+    poses = _single(values, count, (count,))
     # The way of a point that stays where it is says nothing.
-    moving = {owner: course for owner, course in found.items() if len(course.places) == count and course.way[-1] > 0}
-    if len(moving) == 1:
-        ((owner, course),) = moving.items()
-        slopes, bends = _along(values, owner, course)
-        closed = course.closed
-    group = PoseGroup(tuple(values), values, np.arange(count))
-    return Poses((group,), count, False, (count,), motion=count > 1, closed=closed, slopes=slopes, bends=bends)
-
-
-def _along(
-    values: Mapping[str, Floats], owner: str, course: paths.Course
-) -> tuple[dict[str, Floats], dict[str, Floats]]:  # fmt: skip
-    """Derivatives of all coordinates by the length of a point's path; those listed beside it change evenly between."""
+    moving = [(owner, one) for owner, one in found.items() if len(one.places) == count and one.way[-1] > 0]
+    if len(moving) != 1:
+        return poses
+    ((owner, along),) = moving
     slopes: dict[str, Floats] = {}
-    bends: dict[str, Floats] = {}
     for name, column in values.items():
-        if name in (f"{owner}.x", f"{owner}.y"):
-            part = np.real if name.endswith(".x") else np.imag
-            slopes[name], bends[name] = part(course.directions).copy(), part(course.bends).copy()
-            continue
+        # What is listed beside the point's path changes evenly between the places.
         with np.errstate(divide="ignore", invalid="ignore"):
-            steps = np.diff(column) / np.diff(course.way)
-        steps = np.where(np.diff(column) == 0, 0.0, steps)
-        slopes[name], bends[name] = np.append(steps, steps[-1:]), np.zeros(len(column))
-    return slopes, bends
+            steps = np.where(np.diff(column) == 0, 0.0, np.diff(column) / np.diff(along.way))
+        slopes[name] = np.append(steps, steps[-1:])
+    bends = dict.fromkeys(values, np.zeros(count))
+    for axis, part in (("x", np.real), ("y", np.imag)):
+        slopes[f"{owner}.{axis}"], bends[f"{owner}.{axis}"] = part(along.directions).copy(), part(along.bends).copy()
+    return replace(poses, closed=along.closed, slopes=slopes, bends=bends)
 
 
 def default(description: Description, turn: float) -> Poses:
     """Poses where a study gives none: a turn of an angle drive in 72 steps, or the drive's limits in 50.
 
-    Parameters
-    ----------
-    description : Description
-        The mechanism.
-    turn : float
-        A full turn in the study's unit.
+    `turn` is a full turn in the study's unit.
 
     Raises
     ------
@@ -257,9 +239,9 @@ def default(description: Description, turn: float) -> Poses:
         low, high = limit.minimum, limit.maximum
         if limit.kind == "drive" and limit.items[0] == drive.name and low is not None and high is not None:
             ends = [(description.places[end].nominal if isinstance(end, str) else end) / factor for end in (low, high)]
-            return _single({drive.name: np.linspace(ends[0], ends[1], 51)}, 51, (51,))
+            return _grid({drive.name: np.linspace(ends[0], ends[1], 51)})
     if drive.kind == "angle":
-        return _single({drive.name: np.linspace(0.0, turn, 73)}, 73, (73,))
+        return _grid({drive.name: np.linspace(0.0, turn, 73)})
     raise StudyError(
         f"the study says no poses, and the drive {drive.name!r} has no limits to move between; "
         "give 'poses', 'sweep' or 'path', or limits of the drive"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from mechdesign.errors import StudyError
-from mechdesign.study.text.document import Path, leaves, read
+from mechdesign.study.text.document import KeyPath, leaves, read
 
 if TYPE_CHECKING:
     from mechdesign.study.loading import Study
@@ -49,7 +49,7 @@ def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, di
     return f"# {heading}\n{text}", files
 
 
-def inputs(study: Study) -> Iterator[tuple[Path, pathlib.Path, str]]:
+def inputs(study: Study) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
     """Files that a study reads: the keys of their names, the file, and what it holds."""
     folder = study.path.parent if study.path is not None else pathlib.Path()
     for keys, value in leaves(study.resolved):
@@ -97,7 +97,7 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         return None
 
 
-def _replaced(old: Any, new: Any, keys: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
+def _replaced(old: Any, new: Any, keys: KeyPath) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
     """Keys in whose place several others stand, and those with their values, where mappings differ in just that."""
     if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
         return

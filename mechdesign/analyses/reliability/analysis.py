@@ -192,7 +192,8 @@ class NominalPoses:
             found = nominal_values(study.mechanism, configuration, question.channels, rates)
             for row, value in zip(values, found, strict=True):
                 row[solved.rows] = value
-            drives = np.stack([np.broadcast_to(d, configuration.shape) for d in solved.drives], axis=-1)
+            each = [configuration.value(study.mechanism.coordinate(name)) for name in study.mechanism.drives]
+            drives = np.stack([np.broadcast_to(value, configuration.shape) for value in each], axis=-1)
             forward = set(solved.given) == set(study.mechanism.drives)
             groups.append((solved.rows, configuration, drives, forward, rates))
         return NominalPoses(reason, tuple(groups), values)

@@ -9,15 +9,15 @@ from collections.abc import Iterable, Mapping
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.model import Link, Place, Quantity, Term
 from mechdesign.study.build import section as models
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.build.names import GROUND, Names
-from mechdesign.study.text.numbers import Value
+from mechdesign.study.text.numbers import StudyNumber
 from mechdesign.errors import suggestion
 from mechdesign.study.build.parameters import Parameters
 from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Units
 
-ROOT: Path = ("mechanism",)
+ROOT: KeyPath = ("mechanism",)
 
 
 class Builder:
@@ -48,12 +48,12 @@ class Builder:
         """Note a problem at a path below ``mechanism``."""
         self.reporter.report((*ROOT, *path), message, at_key=at_key)
 
-    def place(self, name: str, value: Value | float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
+    def place(self, name: str, value: StudyNumber | float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
         """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
         factor = self.units.angle_factor if quantity == "angle" else 1.0
-        nominal = value.nominal if isinstance(value, Value) else value
+        nominal = value.nominal if isinstance(value, StudyNumber) else value
         self.places[name] = Place(name, nominal * factor, quantity)
-        if isinstance(value, Value) and value.expression is not None:
+        if isinstance(value, StudyNumber) and value.expression is not None:
             self.formulas[name] = value.expression
         if measured:
             self.measured.add(name)
@@ -63,7 +63,7 @@ class Builder:
         """Whether a name is known; if not, note it with the nearest one."""
         return self.reporter.known(name, known, what, (*ROOT, *path))
 
-    def check_named(self, what: str, names: Iterable[str], path: Path) -> bool:
+    def check_named(self, what: str, names: Iterable[str], path: KeyPath) -> bool:
         """Whether all names of a list are known links, points, drives or measures; each that is not is noted.
 
         `what` may be the quantity that they give: an angle is that of links, a distance that of points.
@@ -104,7 +104,7 @@ class Builder:
                 )
                 self.report(("drives", name), message, at_key=True)
 
-    def _where(self, point: str) -> Path:
+    def _where(self, point: str) -> KeyPath:
         link = self.names.owners[point][0]
         section = self.section.links[link]
         end = {section.from_: "from", section.to: "to"}.get(point)
@@ -158,7 +158,7 @@ class Builder:
             if name == GROUND:
                 self.report(("links", name), "the ground cannot be telescopic")
             return points
-        length: Value | float = section.length or 1.0
+        length: StudyNumber | float = section.length or 1.0
         if section.length is None and (drawn := self._drawn([start, end], ("links", name), "its length")):
             length = abs(drawn[1] - drawn[0])
             if length == 0.0:
@@ -178,7 +178,7 @@ class Builder:
         the second, and one without given points so by its first two; one with given points is laid on the drawing by
         them.
         """
-        path: Path = ("links", name)
+        path: KeyPath = ("links", name)
         free = not ends and name != GROUND
         if free and len(given) == 1:
             self.report(path, "one given point does not fix the link's frame on the sketch; give two, or none")
@@ -208,7 +208,7 @@ class Builder:
             found[measured[1]] = complex(found[measured[1]].real, 0.0)
         return found
 
-    def _drawn(self, points: list[str], path: Path, what: str) -> list[complex] | None:
+    def _drawn(self, points: list[str], path: KeyPath, what: str) -> list[complex] | None:
         missing = [point for point in points if point not in self.sketch]
         if missing:
             names = ", ".join(repr(point) for point in missing)

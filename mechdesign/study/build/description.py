@@ -13,7 +13,7 @@ from mechdesign.study.build import joints as joint_rules
 from mechdesign.study.build import section as models
 from mechdesign.study.build.builder import ROOT, Builder
 from mechdesign.study.build.names import GROUND
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 
 
 def build(builder: Builder) -> Description:
@@ -43,7 +43,7 @@ def _drives(builder: Builder) -> dict[str, Drive]:
     found: dict[str, Drive] = {}
     for name, section in builder.section.drives.items():
         kind, item = names.driven(name)
-        path: Path = ("drives", name) if section is None else ("drives", name, kind)
+        path: KeyPath = ("drives", name) if section is None else ("drives", name, kind)
         reference = section.from_ or GROUND if section is not None else GROUND
         if section is None:
             right = builder.check_name(name, [*names.moving, *names.slides], "link, leg or slide", path)
@@ -67,7 +67,7 @@ def _measures(builder: Builder) -> dict[str, Measure]:
     known = [name for name in builder.names.coordinates if name not in builder.section.measures]
     found: dict[str, Measure] = {}
     for name, section in builder.section.measures.items():
-        path: Path = ("measures", name)
+        path: KeyPath = ("measures", name)
         pair = section.angle or section.distance
         if section.expression is not None:
             try:
@@ -89,7 +89,7 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
     """Every limit whose names are right; its bounds become places."""
     found = []
     for index, section in enumerate(builder.section.limits):
-        path: Path = ("limits", index)
+        path: KeyPath = ("limits", index)
         kind, given = section.kind, getattr(section, section.kind)
         items: tuple[str, ...] = given if isinstance(given, tuple) else (given,)
         right = builder.check_named(kind, items, (*path, kind))
@@ -107,7 +107,7 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
     return tuple(found)
 
 
-def _check_bounds(builder: Builder, section: models.Limit, quantity: Quantity, path: Path) -> None:
+def _check_bounds(builder: Builder, section: models.Limit, quantity: Quantity, path: KeyPath) -> None:
     low, high = section.min, section.max
     if low is not None and high is not None and high.nominal < low.nominal:
         mend = "; add a full turn to it" if quantity == "angle" else ""

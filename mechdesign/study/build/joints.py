@@ -9,7 +9,7 @@ from mechdesign.mechanism.model import Joint as JointModel
 from mechdesign.mechanism.model import Link as LinkModel
 from mechdesign.study.build import section as models
 from mechdesign.study.build.builder import Builder
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.build.names import GROUND
 from mechdesign.errors import suggestion
 
@@ -24,7 +24,7 @@ def build(builder: Builder) -> dict[str, JointModel]:
     return {name: joint for name, joint in joints.items() if joint is not None}
 
 
-def _pair(builder: Builder, path: Path, pair: tuple[str, str]) -> bool:
+def _pair(builder: Builder, path: KeyPath, pair: tuple[str, str]) -> bool:
     if not builder.check_named("link", pair, path):
         return False
     if pair[0] == pair[1]:
@@ -33,7 +33,7 @@ def _pair(builder: Builder, path: Path, pair: tuple[str, str]) -> bool:
     return True
 
 
-def _on_link(builder: Builder, link: str, point: str, path: Path) -> bool:
+def _on_link(builder: Builder, link: str, point: str, path: KeyPath) -> bool:
     points = builder.names.points_of(link)
     if point in points:
         return True
@@ -43,7 +43,7 @@ def _on_link(builder: Builder, link: str, point: str, path: Path) -> bool:
 
 
 def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line | None:
-    path: Path = ("joints", name)
+    path: KeyPath = ("joints", name)
     through = section.through or ()
     if not all(_on_link(builder, link, point, (*path, "through", k)) for k, point in enumerate(through)):
         return None
@@ -64,7 +64,7 @@ def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line
 
 
 def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Prismatic | None:
-    path: Path = ("joints", name)
+    path: KeyPath = ("joints", name)
     if not _pair(builder, (*path, "prismatic"), pair):
         return None
     guide, slider = pair
@@ -84,7 +84,7 @@ def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[s
 
 
 def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slot | None:
-    path: Path = ("joints", name)
+    path: KeyPath = ("joints", name)
     if not builder.check_name(guide, builder.section.links, "link", (*path, "slot")):
         return None
     if section.point is None:
@@ -100,7 +100,7 @@ def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slo
 
 
 def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed | None:
-    path: Path = ("joints", name)
+    path: KeyPath = ("joints", name)
     if not _pair(builder, (*path, "fixed"), pair):
         return None
     shared = [point for point in builder.names.points_of(pair[0]) if point in builder.names.points_of(pair[1])]

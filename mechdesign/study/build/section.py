@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.expressions import Expression
 from mechdesign.study.text import fields
-from mechdesign.study.text.numbers import FILES, Context, Value, failure, read_expression, read_rows, shown
+from mechdesign.study.text.numbers import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
 from mechdesign.errors import suggestion
 from mechdesign.study.text.units import QuantityError, check_unit
 
@@ -34,7 +34,7 @@ def names_to_mapping(raw: Any) -> Any:
 
 
 Point = Annotated[tuple[fields.LengthValue, fields.LengthValue], fields.pair_of("[x, y]")]
-PointValues = tuple[Value, Value]
+PointValues = tuple[StudyNumber, StudyNumber]
 TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
 TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of("a list of two names")]
 

@@ -8,7 +8,7 @@ from typing import Any
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.build.builder import Builder
 from mechdesign.study.build.parameters import Parameters
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 
 # Kinds of a coordinate, its rate and its acceleration.
 ORDERS: dict[Quantity | None, tuple[str, str, str]] = {
@@ -27,7 +27,9 @@ class Checker:
         self.parts = parts
         self.known, self.kind = builder.reporter.known, builder.reporter.kind
 
-    def coordinate(self, name: str, path: Path, *, at_key: bool = False, others: Iterable[str] = ()) -> Quantity | None:
+    def coordinate(
+        self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = ()
+    ) -> Quantity | None:
         """Kind of a coordinate; None, and noted, where there is none of that name.
 
         `others` are names that might have stood there as well.
@@ -45,14 +47,14 @@ class Checker:
                 self.known(name, [*self.names.coordinates, *others], what, path, at_key=at_key)
         return quantity
 
-    def coordinates(self, names: Iterable[str], path: Path, order: int = 0) -> None:
+    def coordinates(self, names: Iterable[str], path: KeyPath, order: int = 0) -> None:
         """Check the coordinates that are keys of a mapping, and the units of their values, rates or accelerations."""
         for name in names:
             quantity = self.coordinate(name, (*path, name), at_key=True)
             if quantity in ORDERS:
                 self.kind((*path, name), ORDERS[quantity][order])
 
-    def outputs(self, outputs: Iterable[str] | None, path: Path) -> None:
+    def outputs(self, outputs: Iterable[str] | None, path: KeyPath) -> None:
         """Check a list of coordinates and points that are asked for."""
         seen: set[str] = set()
         for index, name in enumerate(outputs or ()):
@@ -63,7 +65,7 @@ class Checker:
                 self.reporter.report((*path, index), f"{name!r} is listed twice")
             seen.update(parts)
 
-    def load(self, load: tuple[float, ...], path: Path, *, on_pin: bool) -> tuple[float, ...]:
+    def load(self, load: tuple[float, ...], path: KeyPath, *, on_pin: bool) -> tuple[float, ...]:
         """A load of the stiffness section's point or link as fx, fy, mz."""
         if len(load) not in ((2, 3) if on_pin else (3,)):
             self.reporter.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
@@ -74,12 +76,12 @@ class Checker:
             self.reporter.report((*path, 2), NO_MOMENT)
         return (*load, 0.0)[:3]
 
-    def range(self, low: float | None, high: float | None, path: Path) -> None:
+    def range(self, low: float | None, high: float | None, path: KeyPath) -> None:
         """Check that the end of a range is beyond its beginning."""
         if low is not None and high is not None and high <= low:
             self.reporter.report((*path, "to"), f"{high:g} is not beyond 'from', {low:g}")
 
-    def needs(self, section: str | None, what: str, path: Path) -> None:
+    def needs(self, section: str | None, what: str, path: KeyPath) -> None:
         """Check that the study has a section that something cannot do without."""
         if section is not None and self.reporter.raw((section,)) is None:
             self.reporter.report(path, f"{what} needs the {section} section, and the study has none")

@@ -7,7 +7,7 @@ from pydantic import model_validator
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.numbers import failure
 
 
@@ -39,7 +39,7 @@ def check(checker: Checker, section: KinematicsSection) -> None:
     """Check the outputs, and what loads act on."""
     checker.outputs(section.outputs, ("kinematics", "outputs"))
     for index, load in enumerate(section.loads):
-        path: Path = ("kinematics", "loads", index)
+        path: KeyPath = ("kinematics", "loads", index)
         if load.at is not None:
             checker.known(load.at, checker.names.owners, "point", (*path, "at"))
         if load.link is not None:

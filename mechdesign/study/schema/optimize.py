@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
@@ -12,7 +12,7 @@ from mechdesign.errors import suggestion
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.workspace import INDEX_NAMES, NEEDED
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.numbers import failure
 
 # Results of a workspace that a goal or condition may name without its command.
@@ -43,6 +43,8 @@ class Variable(fields.Model):
 class Judged(fields.Model):
     """A result, and the rows of it that count."""
 
+    bare = "result"
+    short: ClassVar[tuple[fields.Form, ...]] = (fields.NAME_FORM,)
     result: fields.CoordinateName
     where: dict[str, str | float | int] = Field(default_factory=dict)
 
@@ -56,6 +58,7 @@ class Judged(fields.Model):
 class Condition(Judged):
     """A result and its bounds."""
 
+    bare, short = "", ()
     abs: bool = False
     at_least: fields.Number | None = None
     at_most: fields.Number | None = None
@@ -101,16 +104,7 @@ WeightRow = Annotated[
 ]
 
 
-def _goal(raw: Any) -> Any:
-    return {"result": raw} if isinstance(raw, str) else raw
-
-
-# Names of results, or with `where` which of their rows count.
-Goals = Annotated[
-    tuple[Annotated[Judged, BeforeValidator(_goal), fields.OrShort((fields.NAME_FORM,))], ...],
-    BeforeValidator(lambda raw: [raw] if isinstance(raw, str | Mapping) else raw),
-    fields.OrShort((fields.NAME_FORM,)),
-]
+Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.OrOne()]
 
 
 class OptimizeSection(fields.Model):
@@ -135,7 +129,7 @@ class OptimizeSection(fields.Model):
 
 def check(checker: Checker, section: OptimizeSection) -> None:
     """Check the variables of an optimisation, its method, and the results that its goals name."""
-    root: Path = ("optimize",)
+    root: KeyPath = ("optimize",)
     report = checker.reporter.report
     if not section.variables:
         report((*root, "variables"), "an optimisation needs at least one variable")
@@ -143,7 +137,7 @@ def check(checker: Checker, section: OptimizeSection) -> None:
         report(root, "say what to 'maximize' or 'minimize'", at_key=True)
     above = [name for name in checker.parameters.nominal if name not in section.variables]
     for name, variable in section.variables.items():
-        path: Path = (*root, "variables", name)
+        path: KeyPath = (*root, "variables", name)
         checker.known(name, checker.parameters.known(), "parameter or dimension", path, at_key=True)
         if name in checker.parameters.formulas:
             message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
@@ -169,7 +163,7 @@ def check(checker: Checker, section: OptimizeSection) -> None:
         check_result(checker, condition.result, (*root, "subject_to", index, "result"))
 
 
-def check_result(checker: Checker, name: str, path: Path, *, required: bool = False) -> None:
+def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:
     """Check the name of a result: a statistic of the workspace, or ``command.column``, as it must be if `required`."""
     command, _, rest = name.partition(".")
     if rest:

@@ -71,7 +71,7 @@ def _through(raw: Any, context: Context) -> tuple[tuple[float, ...], ...]:
     return read_rows(raw, context, 2, rule, "an empty path")
 
 
-class Path(fields.Model):
+class PathSection(fields.Model):
     """What one coordinate or point passes; a list, a CSV file's name or a number alone are short forms."""
 
     short = (_ROWS,)
@@ -99,10 +99,10 @@ class Path(fields.Model):
     def _long_form(cls, raw: Any) -> Any:
         if isinstance(raw, str) and raw.lower().endswith(FILES):
             return {"file": raw}
-        return raw if isinstance(raw, dict | Path) else {"through": raw}
+        return raw if isinstance(raw, dict | PathSection) else {"through": raw}
 
     @model_validator(mode="after")
-    def _one(self) -> Path:
+    def _one(self) -> PathSection:
         shapes = ("through", "file", "circle", "arc", "line")
         given = self.given(*shapes)
         if len(given) != 1:
@@ -118,30 +118,16 @@ class Path(fields.Model):
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """The path of a point; all arrays have the shape (poses,).
+    """The path of a point; all arrays have the shape (poses,)."""
 
-    Parameters
-    ----------
-    places : ndarray of complex
-        x + i y.
-    way : ndarray
-        Length of the path up to each place.
-    directions : ndarray of complex
-        Unit vector along the path, the derivative of the place by its length.
-    bends : ndarray of complex
-        Second derivative of the place by the path's length: towards the centre of curvature, 1 / radius long.
-    closed : bool
-        Whether the path goes on from its last place to its first.
-    """
-
-    places: Complexes
-    way: Floats
-    directions: Complexes
-    bends: Complexes
-    closed: bool = False
+    places: Complexes  # x + i y
+    way: Floats  # length of the path up to each place
+    directions: Complexes  # unit vectors along the path: first derivatives of the place by the path's length
+    bends: Complexes  # second derivatives: towards the centre of curvature, 1 / radius long
+    closed: bool = False  # whether the path goes on from its last place to its first
 
 
-def course(name: str, given: Path, folder: pathlib.Path, turn: float) -> Course | Floats:
+def course(name: str, given: PathSection, folder: pathlib.Path, turn: float) -> Course | Floats:
     """The path of a point, or the values of a coordinate; `turn` is a full turn in the study's unit.
 
     Raises

@@ -8,10 +8,9 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.paths import Path as PathModel
-from mechdesign.study.schema.paths import Speed
+from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.numbers import failure
 
 
@@ -57,7 +56,7 @@ class PoseSection(fields.Model):
 
     poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort(({"const": "workspace"},))] | None = None
     sweep: dict[fields.CoordinateName, Sweep] | None = None
-    path: dict[fields.CoordinateName, PathModel] | None = None
+    path: dict[fields.CoordinateName, PathSection] | None = None
 
     @property
     def at_nodes(self) -> bool:
@@ -96,7 +95,7 @@ def check(checker: Checker, command: str, section: PoseSection) -> None:
     for name, given in (section.path or {}).items():
         if name in checker.names.owners:
             continue
-        place: Path = (command, "path", name)
+        place: KeyPath = (command, "path", name)
         if checker.coordinate(name, place, at_key=True) is not None and (given.spline or given.shape is not None):
             what = "spline" if given.spline else f"{given.shape}"
             checker.reporter.report(place, f"{name!r} is no point: a {what} is the path of a point", at_key=True)

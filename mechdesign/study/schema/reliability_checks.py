@@ -21,7 +21,7 @@ from mechdesign.study.schema.reliability import (
     ReliabilitySection,
     split_order,
 )
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 
 # Digits of a clearance beyond which its lowest value is zero.
 _ROUNDING = 1e-9
@@ -84,7 +84,7 @@ def split_link(names: Names, name: str) -> tuple[str, str, str]:
 def _said(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
     """The link that outputs and limits mean by each point, where they say; what contradicts itself is noted."""
     found: dict[str, str] = {}
-    given: list[tuple[Path, str, bool]] = [
+    given: list[tuple[KeyPath, str, bool]] = [
         *((("reliability", "outputs", k), name, False) for k, name in enumerate(section.outputs or ())),
         *((("reliability", "limits", name), name, True) for name in section.limits),
     ]
@@ -116,7 +116,7 @@ def _carrier(links: list[str], meant: str | None) -> str:
 
 def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension]) -> tuple[float, ...] | None:
     """The load as fx, fy, mz."""
-    path: Path = ("reliability", "load")
+    path: KeyPath = ("reliability", "load")
     report, stiffness = checker.reporter.report, checker.parts.get("stiffness")
     random = [name for name in LOADS if name in dimensions]
     if checker.reporter.raw(("stiffness",)) is None:
@@ -152,7 +152,7 @@ def _varies(dimension: Dimension) -> bool:
 
 
 def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
-    path: Path = ("reliability", "clearances", point)
+    path: KeyPath = ("reliability", "clearances", point)
     names, report = checker.names, checker.reporter.report
     if not checker.known(point, names.owners, "point", path, at_key=True):
         return None
@@ -181,7 +181,7 @@ def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | 
 
 
 def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: ErrorLimit) -> None:
-    path: Path = ("reliability", "limits", name)
+    path: KeyPath = ("reliability", "limits", name)
     names, report = checker.names, checker.reporter.report
     known = names.owners if limit.radius is not None else {**names.coordinates, **names.owners}
     name = split_link(names, name)[1]
@@ -204,7 +204,7 @@ def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dime
     found: dict[str, Dimension] = {}
     parameters, report = checker.parameters, checker.reporter.report
     for name, dimension in section.dimensions.items():
-        path: Path = ("reliability", "dimensions", name)
+        path: KeyPath = ("reliability", "dimensions", name)
         if "*" in name or "?" in name:
             matching = parameters.match(name)
             if not matching:
@@ -224,7 +224,7 @@ def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dime
     return found
 
 
-def _dimension(checker: Checker, name: str, dimension: Dimension, path: Path) -> None:
+def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
     if dimension.distribution == "lognormal":
         nominal = checker.parameters.nominal.get(name)
         if name in checker.names.drives or name in LOADS or (nominal is not None and nominal <= 0):

@@ -12,7 +12,7 @@ from mechdesign.study.build.names import GROUND
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.numbers import Context, failure, read_number
 
 _ELASTIC = (
@@ -120,7 +120,7 @@ class StiffnessSection(PoseSection):
 
 def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
     """Check what is named, the units of stiffnesses, and the loads; returns the section with loads of three numbers."""
-    root: Path = ("stiffness",)
+    root: KeyPath = ("stiffness",)
     right = checker.known(section.at, checker.names.owners, "point", (*root, "at"))
     if right and section.link is None and GROUND in checker.names.owners[section.at]:
         checker.reporter.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
@@ -130,7 +130,7 @@ def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
             message = f"link {section.link!r} has no point {section.at!r}; it has {', '.join(points)}"
             checker.reporter.report((*root, "at"), message)
     for link, profile in section.elastic.items():
-        path: Path = (*root, "elastic", link)
+        path: KeyPath = (*root, "elastic", link)
         checker.known(link, checker.names.moving, "moving link", path, at_key=True)
         checker.known(profile, section.sections, "section", path)
     for profile in section.sections:
@@ -141,17 +141,18 @@ def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
         path = (*root, "actuators", drive)
         if checker.known(drive, checker.names.drives, "drive", path, at_key=True):
             checker.kind(path, _STIFFNESS_KINDS[checker.names.drives[drive]])
+    slides = [*checker.names.slides, *checker.names.legs]
+    clamped = [set(other.fixed) for other in checker.names.section.joints.values() if other.fixed is not None]
+    pins = [p for p, owners in checker.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
     for joint, bearing in section.bearings.items():
         path = (*root, "bearings", joint)
-        slides = [*checker.names.slides, *checker.names.legs]
-        clamped = [set(other.fixed) for other in checker.names.section.joints.values() if other.fixed is not None]
-        pins = [p for p, owners in checker.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
-        if checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
-            if bearing.radial is not None:
-                checker.kind((*path, "radial"), "stiffness")
-            if bearing.moment is not None:
-                checker.kind((*path, "moment"), "rotational_stiffness")
-            if bearing.moment is not None and joint not in slides:
+        if not checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
+            continue
+        if bearing.radial is not None:
+            checker.kind((*path, "radial"), "stiffness")
+        if bearing.moment is not None:
+            checker.kind((*path, "moment"), "rotational_stiffness")
+            if joint not in slides:
                 checker.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
     loads = [
         checker.load(load, (*root, "loads", index), on_pin=section.link is None)

@@ -23,7 +23,7 @@ from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.reporter import Reporter
 
 
@@ -96,7 +96,7 @@ def check_poses(
                 try:
                     mechanism.plan(group.names)
                 except MechanismError as error:
-                    place: Path = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
+                    place: KeyPath = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
                     reporter.report(place, str(error))
             if found is not None and not found.slopes and getattr(section, "speed", None) is not None:
                 reporter.report((command, "speed"), "the path's point does not move: it has no direction", at_key=True)

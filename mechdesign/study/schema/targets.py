@@ -15,10 +15,10 @@ from mechdesign.study.build.section import Wanted
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import read_table
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.reporter import Reporter
 
-ROOT: Path = ("mechanism", "targets")
+ROOT: KeyPath = ("mechanism", "targets")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) 
     found: dict[str, Target] = {}
     seen: dict[str, str] = {}
     for owner, value in wanted.items():
-        path: Path = (*ROOT, owner)
+        path: KeyPath = (*ROOT, owner)
         point = owner in checker.names.owners
         if not point and checker.coordinate(owner, path, at_key=True) is None:
             continue
@@ -80,7 +80,7 @@ def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) 
     return found
 
 
-def _right(checker: Checker, owner: str, expression: Expression, path: Path, point: bool) -> bool:
+def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, point: bool) -> bool:
     """Whether the target of a coordinate is an expression over others."""
     if point:
         message = f"the target of a point is a path; give {owner}.x and {owner}.y their expressions"
@@ -97,7 +97,7 @@ def _right(checker: Checker, owner: str, expression: Expression, path: Path, poi
 
 
 def _table(
-    checker: Checker, owner: str, value: Wanted, path: Path, folder: pathlib.Path, count: int, quantity: str
+    checker: Checker, owner: str, value: Wanted, path: KeyPath, folder: pathlib.Path, count: int, quantity: str
 ) -> Floats | None:
     """The target's table, where its rows have `count` numbers or one more."""
     try:

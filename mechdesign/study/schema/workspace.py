@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo,
 
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.numbers import failure
 
 INDEX_NAMES = (
@@ -95,7 +95,7 @@ class WorkspaceSection(fields.Model):
 
 def check(checker: Checker, section: WorkspaceSection) -> None:
     """Check the names, units and ranges of a workspace."""
-    root: Path = ("workspace",)
+    root: KeyPath = ("workspace",)
     checker.known(section.point, checker.names.owners, "point", (*root, "point"))
     checker.coordinates(section.at, (*root, "at"))
     ranges = [name for name, values in section.at.items() if isinstance(values, Over)]

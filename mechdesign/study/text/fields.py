@@ -23,7 +23,7 @@ from mechdesign.study.text.numbers import (
     SHORTEST,
     SMALLEST,
     Context,
-    Value,
+    StudyNumber,
     failure,
     read_expression,
     read_number,
@@ -92,7 +92,7 @@ class Read(Annotation):
 class Reader(Annotation):
     """Annotation of a number: its kind in `units.KINDS`, if that is the same everywhere, and its least value.
 
-    It becomes a float, a `Value`, or an `Expression` whose names are looked up later.
+    It becomes a float, a `StudyNumber`, or an `Expression` whose names are looked up later.
     """
 
     kind: str | None = None
@@ -103,7 +103,7 @@ class Reader(Annotation):
     def form(self) -> Form:
         return {**NUMBER_FORM, "description": "a number, a quantity or an expression"}
 
-    def read(self, raw: Any, context: Context) -> float | Value | Expression:
+    def read(self, raw: Any, context: Context) -> float | StudyNumber | Expression:
         if self.keep == "expression":
             return read_expression(raw, context)
         value = read_number(raw, context, self.kind)
@@ -259,10 +259,10 @@ PositiveStress = Annotated[float, Reader("stress", 0.0, True)]
 PositiveArea = Annotated[float, Reader("area", 0.0, True)]
 PositiveInertia = Annotated[float, Reader("inertia", 0.0, True)]
 
-LengthValue = Annotated[Value, Reader("length", keep="value")]
-PositiveLengthValue = Annotated[Value, Reader("length", 0.0, True, keep="value")]
-AngleValue = Annotated[Value, Reader("angle", keep="value")]
-AnyValue = Annotated[Value, Reader(keep="value")]
+LengthValue = Annotated[StudyNumber, Reader("length", keep="value")]
+PositiveLengthValue = Annotated[StudyNumber, Reader("length", 0.0, True, keep="value")]
+AngleValue = Annotated[StudyNumber, Reader("angle", keep="value")]
+AnyValue = Annotated[StudyNumber, Reader(keep="value")]
 Bound = Annotated[Expression, Reader(keep="expression")]
 
 LinkName = Annotated[str, NameOf("a link")]

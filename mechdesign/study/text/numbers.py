@@ -44,14 +44,14 @@ class Context:
 
 
 @dataclass(frozen=True)
-class Value:
+class StudyNumber:
     """A number in the study's units, with its expression where it depends on parameters."""
 
     nominal: float
     expression: Expression | None = None
 
 
-LOST = Value(math.nan)
+LOST = StudyNumber(math.nan)
 """Stands for a number whose own mistake has been told, so that the rest can be checked."""
 
 
@@ -74,7 +74,7 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def read_number(raw: object, context: Context, kind: str | None = None) -> Value:
+def read_number(raw: object, context: Context, kind: str | None = None) -> StudyNumber:
     """Read a number, a quantity or an expression over parameters.
 
     Raises
@@ -82,7 +82,7 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Value
     PydanticCustomError
         Where it is none of them, not finite, too large, or a quantity of another kind than `kind`.
     """
-    if isinstance(raw, Value):
+    if isinstance(raw, StudyNumber):
         return raw
     value = _read(raw, context, kind)
     largest = LONGEST if kind == "length" else LARGEST
@@ -92,7 +92,7 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Value
     return value
 
 
-def _read(raw: object, context: Context, kind: str | None) -> Value:
+def _read(raw: object, context: Context, kind: str | None) -> StudyNumber:
     if isinstance(raw, bool) or not isinstance(raw, int | float | str):
         raise failure(f"expected a number, not {shown(raw)}")
     if isinstance(raw, str):
@@ -103,21 +103,21 @@ def _read(raw: object, context: Context, kind: str | None) -> Value:
         raise failure("too large a number") from None
     if not math.isfinite(number):
         raise failure(f"expected a finite number, not {number:g}")
-    return Value(number)
+    return StudyNumber(number)
 
 
-def _read_text(text: str, context: Context, kind: str | None) -> Value:
+def _read_text(text: str, context: Context, kind: str | None) -> StudyNumber:
     try:
         if QUANTITY.fullmatch(text):
             number = context.units.convert(text, kind)
             if not math.isfinite(number):
                 raise failure(f"{text!r} is too large a number")
-            return Value(number)
+            return StudyNumber(number)
         expression = context.expression(text)
         for name in sorted(expression.names - set(context.parameters)):
             raise failure(f"unknown name {name!r} in {shown(text)}{_known_names(name, context)}")
         result = expression.evaluate(context.parameters)
-        return Value(float(result), expression if expression.names else None)
+        return StudyNumber(float(result), expression if expression.names else None)
     except (QuantityError, ExpressionError) as error:
         raise failure(str(error)) from None
 

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from mechdesign.errors import Problem, StudyError, nearest, suggestion
-from mechdesign.study.text.document import Document, Path, dotted, has, leaves, plain
+from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
 from mechdesign.study.text.numbers import LOST, shown
 from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, fits, measure
 
@@ -68,7 +68,7 @@ class Reporter:
         if problem not in self.problems:
             self.problems.append(problem)
 
-    def kind(self, path: Path, kind: str) -> None:
+    def kind(self, path: KeyPath, kind: str) -> None:
         """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
         for keys, raw in leaves(self.raw(path)):
             if not isinstance(raw, str) or not QUANTITY.fullmatch(raw):
@@ -85,7 +85,7 @@ class Reporter:
         """Note what is likely a mistake, though the study can be answered, at a key of the data."""
         self.warnings.append(self._placed(self.written(path), message, True))
 
-    def unused(self, path: Path, what: str, others: Iterable[str]) -> None:
+    def unused(self, path: KeyPath, what: str, others: Iterable[str]) -> None:
         """Note a named thing that nothing uses: one that an override brought in is a name misspelt."""
         name = path[-1]
         if path in self.document.added:
@@ -94,7 +94,7 @@ class Reporter:
         else:
             self.warn(path, f"nothing uses {what} {name!r}")
 
-    def _placed(self, found: Path, message: str, at_key: bool) -> Problem:
+    def _placed(self, found: KeyPath, message: str, at_key: bool) -> Problem:
         known = self._nearest(found)
         mark = self.document.values[known]
         if (at_key or known != found) and known in self.document.keys:
@@ -126,7 +126,7 @@ class Reporter:
             data = data[segment]
         return data
 
-    def written(self, path: Sequence[str | int]) -> Path:
+    def written(self, path: Sequence[str | int]) -> KeyPath:
         """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
         data: Any = self.document.data
         found: list[str | int] = []
@@ -151,12 +151,12 @@ class Reporter:
                 found.append(segment)
         return tuple(found)
 
-    def _nearest(self, path: Path) -> Path:
+    def _nearest(self, path: KeyPath) -> KeyPath:
         while path and path not in self.document.values:
             path = path[:-1]
         return path
 
-    def report_validation(self, error: ValidationError, root: type[BaseModel], prefix: Path) -> None:
+    def report_validation(self, error: ValidationError, root: type[BaseModel], prefix: KeyPath) -> None:
         """Note every error of the validation of the part at `prefix`, in words."""
         for item in error.errors(include_url=False):
             location = (*prefix, *item["loc"])
