@@ -289,7 +289,7 @@ def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *forms: dict[str
 class Choice:
     """Annotation of a word out of a list."""
 
-    words: tuple[str, ...]
+    words: Collection[str]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self._validate)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from mechdesign.mechanism.model import Quantity
 from mechdesign.study import pin_links
 from mechdesign.study.checker import Checker
 from mechdesign.study.document import Path
 from mechdesign.study.reliability_models import (
     LOADS,
+    QUANTITIES,
     Clearance,
     Dimension,
     ErrorLimit,
@@ -17,11 +17,6 @@ from mechdesign.study.reliability_models import (
 
 # Digits of a clearance beyond which its lowest value is zero.
 _ROUNDING = 1e-9
-
-_KINDS: dict[Quantity, tuple[str, str, str]] = {
-    "length": ("length", "velocity", "acceleration"),
-    "angle": ("angle", "angular_velocity", "angular_acceleration"),
-}
 
 
 def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
@@ -147,14 +142,14 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
         report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)
     if limit.radius is not None:
         if checker.known(base, names.owners, "point", path, at_key=True):
-            checker.kind((*path, "radius"), _KINDS["length"][order])
+            checker.kind((*path, "radius"), QUANTITIES["length"][order])
     elif base in names.owners:
         report(path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True)
     else:
         quantity = checker.coordinate(base, path, at_key=True)
-        if quantity in _KINDS:
+        if quantity in QUANTITIES:
             for key in ("min", "max"):
-                checker.kind((*path, key), _KINDS[quantity][order])
+                checker.kind((*path, key), QUANTITIES[quantity][order])
 
 
 def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dimension]:

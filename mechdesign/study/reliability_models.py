@@ -9,7 +9,8 @@ from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchema
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from mechdesign.study.lists import CoordinateNames, one_or_many
+from mechdesign.study.lists import CoordinateNames, OrOne, one_or_many
+from mechdesign.study.methods import METHODS
 from mechdesign.study.models import Model
 from mechdesign.study.numbers import (
     NAME_FORM,
@@ -21,7 +22,6 @@ from mechdesign.study.numbers import (
     NonNegative,
     NonNegativeLength,
     Number,
-    OrShort,
     Positive,
     Reader,
     Whole,
@@ -35,22 +35,16 @@ from mechdesign.study.pose_models import PoseSection
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
 PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")
-METHODS = (
-    "analytic",
-    "second_order",
-    "monte_carlo",
-    "quasi_monte_carlo",
-    "form",
-    "importance_sampling",
-    "auto",
-)
-# Those that solve made mechanisms at random.
-SAMPLING = frozenset(("monte_carlo", "quasi_monte_carlo", "importance_sampling", "auto"))
 DEFAULT_METHODS = ("analytic", "monte_carlo")
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
 # What the names of errors of positions, velocities and accelerations end in.
 SUFFIXES = ("", "_velocity", "_acceleration")
+# Quantities of positions, velocities and accelerations.
+QUANTITIES: dict[str, tuple[str, str, str]] = {
+    "length": ("length", "velocity", "acceleration"),
+    "angle": ("angle", "angular_velocity", "angular_acceleration"),
+}
 
 
 def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
@@ -326,11 +320,9 @@ class ReliabilitySection(PoseSection):
     speed: Speed | None = None
     limits: dict[CoordinateName, ErrorLimit] = Field(default_factory=dict)
     load: tuple[Number, ...] | None = None
-    methods: Annotated[
-        tuple[Annotated[str, Choice(METHODS)], ...],
-        BeforeValidator(one_or_many),
-        OrShort(({"enum": list(METHODS)},)),
-    ] = DEFAULT_METHODS
+    methods: Annotated[tuple[Annotated[str, Choice(METHODS)], ...], BeforeValidator(one_or_many), OrOne()] = (
+        DEFAULT_METHODS
+    )
     samples: Annotated[int, Whole(2, 10**15)] = 40_000
     precision: Precision | None = None
     sobol: Annotated[int, Whole(0, 10**9)] | None = None

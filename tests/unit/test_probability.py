@@ -11,8 +11,8 @@ from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
 from mechdesign.analyses.reliability.probability import (
     disc_failure,
     failure_probability,
-    rectangle_failure,
 )
+from mechdesign.numerics.statistics import rectangle_failure
 
 
 def quadrant(h: float, k: float, rho: float) -> float:

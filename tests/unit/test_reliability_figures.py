@@ -16,7 +16,7 @@ from mechdesign.report.figures.errors.panels import number
 from mechdesign.report.figures.planes import Plane
 from mechdesign.report.figures.reliability import figures
 from mechdesign.results import Column, Table
-from mechdesign.study.reliability_models import METHODS
+from mechdesign.study.methods import METHODS
 
 SLIDER = """
 units: {length: mm}

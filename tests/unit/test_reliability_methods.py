@@ -10,8 +10,8 @@ import mechdesign
 from mechdesign.analyses.workspace import nodes
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.study import Study
+from mechdesign.study.methods import METHODS
 from mechdesign.study.poses import PoseGroup, Poses
-from mechdesign.study.reliability_models import METHODS
 
 SLIDER_CRANK = """
 mechanism:

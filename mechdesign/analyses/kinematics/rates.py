@@ -14,7 +14,7 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.outputs import second
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.reliability_models import ReliabilitySection
@@ -27,6 +27,13 @@ class DriveRates:
 
     velocities: Sequence[Value]
     accelerations: Sequence[Value]
+
+    def take(self, index: Ints | int) -> DriveRates:
+        """Those of some poses, or of one; numbers are the same at all."""
+        return DriveRates(*(
+            [value if np.ndim(value) == 0 else value[index] for value in values]
+            for values in (self.velocities, self.accelerations)
+        ))  # fmt: skip
 
 
 def of_given(study: Study, section: KinematicsSection | ReliabilitySection) -> bool:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.error_limits import Channel
 from mechdesign.analyses.reliability.sources import Source, Sources
@@ -20,22 +22,6 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.reliability_models import LOADS
 
 ORDERS = ("position", "velocity", "acceleration")
-
-
-@dataclass(frozen=True)
-class Rates:
-    """Rates and accelerations of the drives (radians and lengths per time): numbers, or arrays over poses."""
-
-    velocity: tuple[Value, ...]
-    acceleration: tuple[Value, ...]
-
-    def take(self, index: Ints | int) -> Rates:
-        """Those of some poses, or of one."""
-
-        def part(values: tuple[Value, ...]) -> tuple[Value, ...]:
-            return tuple(value if np.ndim(value) == 0 else value[index] for value in values)
-
-        return Rates(part(self.velocity), part(self.acceleration))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,26 +54,27 @@ class FirstOrder:
         offset = None if self.offset is None else self.offset[:, poses]
         return replace(self, components=self.components[:, :, poses], offset=offset)
 
+    def of(self, sources: Sources) -> FirstOrder:
+        """The same mechanism made with other tolerances."""
+        known = sources.first_order
+        mean, variance = (np.array([getattr(known[k], name) for k in self.owner]) for name in ("mean", "variance"))
+        return replace(self, sources=known, mean=mean, variance=variance)
+
+    @cached_property
+    def _weighted(self) -> Floats:
+        """Covariance of each component with the channels, in the shape of `components`."""
+        if self.correlation is None:
+            return self.variance[:, None] * self.components
+        sigma = np.sqrt(self.variance)
+        return np.asarray(self.correlation * np.outer(sigma, sigma) @ self.components)
+
     def covariance(self) -> Floats:
         """Covariance of the channels, shape (poses, channels, channels) [S2, eq. 9]."""
-        moved = np.moveaxis(self.components, 2, 0)
-        return (
-            np.asarray((moved * self.variance) @ np.swapaxes(moved, 1, 2))
-            if self.correlation is None
-            else (np.asarray(moved @ self._spread @ np.swapaxes(moved, 1, 2)))
-        )
-
-    @property
-    def _spread(self) -> Floats:
-        """Covariance of the components."""
-        sigma = np.sqrt(self.variance)
-        return np.diag(self.variance) if self.correlation is None else self.correlation * np.outer(sigma, sigma)
+        return np.asarray(np.moveaxis(self.components, 2, 0) @ np.moveaxis(self._weighted, 2, 0).swapaxes(1, 2))
 
     def deviation(self) -> Floats:
         """Standard deviation of each channel, shape (channels, poses)."""
-        if self.correlation is None:
-            return np.asarray(np.sqrt(np.einsum("czp,z->cp", self.components**2, self.variance)))
-        return np.asarray(np.sqrt(np.einsum("czp,zy,cyp->cp", self.components, self._spread, self.components)))
+        return np.asarray(np.sqrt(np.maximum(np.einsum("czp,czp->cp", self.components, self._weighted), 0.0)))
 
     def shift(self) -> Floats:
         """Mean error of each channel, shape (channels, poses): deflections, and tolerances that are not symmetric."""
@@ -96,21 +83,16 @@ class FirstOrder:
 
     def sensitivity(self) -> Floats:
         """Per source, shape (channels, sources, poses): the derivative, of a pin sqrt(s_x^2 + s_y^2)."""
-        found = np.empty((self.components.shape[0], len(self.sources), self.components.shape[2]))
-        for k in range(len(self.sources)):
-            own = self.components[:, self.owner == k]
-            found[:, k] = own[:, 0] if own.shape[1] == 1 else np.sqrt((own * own).sum(axis=1))
-        return found
+        each = [self.components[:, self.owner == k] for k in range(len(self.sources))]
+        return np.stack([own[:, 0] if own.shape[1] == 1 else np.linalg.norm(own, axis=1) for own in each], axis=1)
 
     def share(self) -> Floats:
         """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies.
 
         Of correlated sources each has its covariance with the error, which may be negative.
         """
-        owned = np.zeros((len(self.sources), len(self.owner)))
-        owned[self.owner, np.arange(len(self.owner))] = 1.0
-        each = self.components * np.einsum("zy,cyp->czp", self._spread, self.components)
-        parts = np.einsum("sz,czp->csp", owned, each)
+        each = self.components * self._weighted
+        parts = np.stack([each[:, self.owner == k].sum(axis=1) for k in range(len(self.sources))], axis=1)
         total = parts.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
 
@@ -121,30 +103,28 @@ class FirstOrder:
 
     def worst_ends(self, sensitivity: Floats) -> tuple[Floats, Floats]:
         """Lowest and highest error with each source at the end of its tolerance that leads there, (channels, poses)."""
-        low, high = (sensitivity * np.array(ends)[:, None]
-                     for ends in zip(*(source.ends for source in self.sources), strict=True))  # fmt: skip
+        low, high = (sensitivity * np.array([source.ends[k] for source in self.sources])[:, None] for k in (0, 1))
         offset = 0.0 if self.offset is None else self.offset
         return np.minimum(low, high).sum(axis=1) + offset, np.maximum(low, high).sum(axis=1) + offset
 
 
 def nominal_values(
-    mechanism: Mechanism, configuration: Configuration, channels: Sequence[Channel], rates: Rates
+    mechanism: Mechanism, configuration: Configuration, channels: Sequence[Channel], rates: DriveRates
 ) -> list[Value]:
     """Values of the channels at solved configurations (radians, lengths)."""
-    if all(channel.order == 0 for channel in channels):
-        return [configuration.value(channel.coordinate) for channel in channels]
-    linear = mechanism.linearize(configuration)
-    velocity = linear.velocity(rates.velocity)
-    bends = any(channel.order == 2 for channel in channels)
-    acceleration = linear.acceleration(velocity, rates.acceleration) if bends else None
+    orders = {channel.order for channel in channels}
+    velocity = acceleration = None
+    if orders - {0}:
+        linear = mechanism.linearize(configuration)
+        velocity = linear.velocity(rates.velocities)
+        acceleration = linear.acceleration(velocity, rates.accelerations) if 2 in orders else None
     values = []
     for channel in channels:
-        if channel.order == 0:
+        if velocity is None or channel.order == 0:
             values.append(configuration.value(channel.coordinate))
-        elif channel.order == 1:
+        elif acceleration is None or channel.order == 1:
             values.append(first(configuration, channel.coordinate, velocity))
         else:
-            assert acceleration is not None
             values.append(second(configuration, channel.coordinate, velocity, acceleration))
     return values
 
@@ -154,7 +134,7 @@ def derivatives(
     configuration: Configuration,
     channels: Sequence[Channel],
     names: Sequence[str],
-    rates: Rates,
+    rates: DriveRates,
     elastic: Elastic | None = None,
 ) -> Floats:
     """Derivative of each channel by places, drives and loads, shape (channels, names, n).
@@ -184,8 +164,8 @@ def derivatives(
     position = linear.sensitivity(names)
     motion: Motion | None = None
     if any(channel.order for channel in channels):
-        velocity = linear.velocity(rates.velocity)
-        acceleration = linear.acceleration(velocity, rates.acceleration)
+        velocity = linear.velocity(rates.velocities)
+        acceleration = linear.acceleration(velocity, rates.accelerations)
         velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
         assert acceleration_z is not None
         motion = Motion(velocity, acceleration, position, velocity_z, acceleration_z)
@@ -204,7 +184,7 @@ def linear_errors(
     configuration: Configuration,
     channels: Sequence[Channel],
     sources: Sources,
-    rates: Rates,
+    rates: DriveRates,
     elastic: Elastic | None = None,
 ) -> FirstOrder:
     """Linear error model at a flat batch of nominal configurations, the drives held, perhaps under a load.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -47,11 +47,18 @@ class Source:
 
 @dataclass(frozen=True)
 class Scalar:
-    """A dimension that varies: a ``parameter``, a ``place``, a ``drive`` or a ``load``."""
+    """A dimension that varies: a ``parameter``, a ``place``, a ``drive`` or a ``load``.
+
+    Parameters
+    ----------
+    moves : mapping of str to (float, str)
+        Derivative of each place, drive or load that it changes, and the quantity of that.
+    """
 
     name: str
     kind: str
     law: Marginal
+    moves: Mapping[str, tuple[float, str]]
 
 
 @dataclass(frozen=True)
@@ -66,6 +73,8 @@ class Pin:
         Law of its deviation.
     places : tuple of str
         What the pin moves: the offsets of its point in its link, or the link's length.
+    factor : float
+        Of the radial clearance, its mean and its deviation alike.
     """
 
     name: str
@@ -74,6 +83,19 @@ class Pin:
     analytic: str
     sampled: str
     places: tuple[str, ...]
+    factor: float = 1.0
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        """Mean of the radial clearance, and its second to fourth central moment."""
+        mean, *central = (0.0,) * 4 if self.spread is None else self.spread.moments
+        second, third, fourth = (self.factor**k * moment for k, moment in enumerate(central, start=2))
+        return self.factor * (self.radius + mean), second, third, fourth
+
+    @property
+    def largest(self) -> float:
+        """Largest radial clearance."""
+        return self.factor * (self.radius + (0.0 if self.spread is None else self.spread.ends[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,18 +171,22 @@ class Sources:
         found = []
         for scalar in self.scalars:
             mean, variance, _, _ = scalar.law.moments
-            slopes = {scalar.name: 1.0}
-            if scalar.kind == "parameter":
-                # Of one that changes nothing there are none.
-                slopes = _geometric(self.study.parameters.derivatives(scalar.name))
+            slopes = {name: slope for name, (slope, _) in scalar.moves.items()}
             found.append(Source(scalar.name, (slopes,), mean, variance, scalar.law.ends))
         for pin in self.pins:
-            mean, variance, _, _ = (0.0, 0.0, 0.0, 0.0) if pin.spread is None else pin.spread.moments
-            spread = PIN_LAWS[pin.analytic].variance * (variance + (pin.radius + mean) ** 2)
-            reach = pin.radius + (0.0 if pin.spread is None else pin.spread.ends[1])
+            mean, variance, _, _ = pin.moments
+            spread = PIN_LAWS[pin.analytic].variance * (variance + mean**2)
             # Along a binary link the pin changes its length; across it, only in the second order.
-            found.append(Source(pin.name, tuple({name: 1.0} for name in pin.places), 0.0, spread, (-reach, reach)))
+            directions = tuple({name: 1.0} for name in pin.places)
+            found.append(Source(pin.name, directions, 0.0, spread, (-pin.largest, pin.largest)))
         return tuple(found)
+
+    def widened(self, factors: Sequence[float] | Floats) -> Sources:
+        """The same where tolerances are as many times as wide; of a clearance, the radius and its tolerance."""
+        each = [float(factor) for factor in factors]
+        scalars = tuple(replace(s, law=s.law.widened(f)) for s, f in zip(self.scalars, each, strict=False))
+        pins = tuple(replace(p, factor=f) for p, f in zip(self.pins, each[len(scalars) :], strict=True))
+        return replace(self, scalars=scalars, pins=pins)
 
     def correlated(self) -> Floats | None:
         """Correlation coefficients of the components of `first_order`; None where all are independent."""
@@ -181,7 +207,8 @@ class Sources:
         radii: list[Floats | float] = []
         pins = []
         for pin in self.pins:
-            radii.append(pin.radius if pin.spread is None else pin.radius + pin.spread.draw(rng, count))
+            radius = pin.radius if pin.spread is None else pin.radius + pin.spread.draw(rng, count)
+            radii.append(pin.factor * radius)
             pins.append(PIN_LAWS[pin.sampled].draw(rng, count))
         return Drawn(scalars, radii, pins)
 
@@ -211,7 +238,8 @@ class Sources:
         radii: list[Floats | float] = []
         pins = []
         for pin in self.pins:
-            radii.append(pin.radius if pin.spread is None else pin.radius + pin.spread.at(next(rest)))
+            radius = pin.radius if pin.spread is None else pin.radius + pin.spread.at(next(rest))
+            radii.append(pin.factor * radius)
             place = next(rest), next(rest)
             given = directed and pin.sampled == "contact"
             pins.append(place if given else PIN_LAWS[pin.sampled].at(*place))
@@ -259,24 +287,24 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
     scalars = []
     warnings = []
     for name, dimension in section.dimensions.items():
-        nominal, factor = 0.0, 1.0
+        nominal = 0.0
         if name in study.parameters.nominal:
             kind, nominal = "parameter", study.parameters.nominal[name]
-            moved = [place for place, slope in _geometric(study.parameters.derivatives(name)).items() if slope]
+            slopes = _geometric(study.parameters.derivatives(name))
+            moved = [place for place, slope in slopes.items() if slope]
             if not moved:
                 warnings.append(f"parameter '{name}' changes no dimension of the mechanism")
             elif len(moved) > 1:
                 warnings.append(f"parameter '{name}' varies {', '.join(moved)} together")
-        elif name in LOADS:
-            kind = "load"
         else:
-            kind = "drive" if name in mechanism.drives else "place"
-            quantity = mechanism.quantity(name) if kind == "drive" else mechanism.description.places[name].quantity
-            factor = study.units.angle_factor if quantity == "angle" else 1.0
-            nominal = mechanism.nominal[name] if kind == "place" else 0.0
+            kind, slopes = "load" if name in LOADS else "drive" if name in mechanism.drives else "place", {name: 1.0}
             if kind == "place":
+                nominal = mechanism.nominal[name]
                 warnings += _twice(study, name, section.dimensions)
-        scalars.append(Scalar(name, kind, marginal(dimension, nominal, factor)))
+        moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
+        turned = kind != "parameter" and moves[name][1] == "angle"
+        law = marginal(dimension, nominal, study.units.angle_factor if turned else 1.0)
+        scalars.append(Scalar(name, kind, law, moves))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
     pins = tuple(_pin(point, clearance) for point, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))
@@ -284,26 +312,24 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
     return sources, warnings
 
 
+def _quantity(mechanism: Mechanism, name: str) -> str:
+    """Quantity of a place, a drive or a load."""
+    places = mechanism.description.places
+    return LOADS[name] if name in LOADS else places[name].quantity if name in places else mechanism.quantity(name)
+
+
 def _check_sizes(sources: Sources) -> None:
     """Refuse what no mechanism of this size varies by: its squares are no numbers any more."""
-    study, mechanism = sources.study, sources.study.mechanism
+    study, size = sources.study, sources.study.mechanism.size or 1.0
+    most = {"angle": (MOST, "a million radians"), "force": (HEAVY, "1e100"), "moment": (HEAVY, "1e100")}
     for scalar in sources.scalars:
-        slopes = {scalar.name: 1.0}
-        if scalar.kind == "parameter":
-            slopes = _geometric(study.parameters.derivatives(scalar.name))
-        for name, slope in slopes.items():
-            drive = scalar.kind == "drive"
-            angle = (
-                scalar.kind != "load"
-                and (mechanism.quantity(name) if drive else mechanism.description.places[name].quantity) == "angle"
-            )
-            most = HEAVY if scalar.kind == "load" else MOST * (1.0 if angle else mechanism.size or 1.0)
-            if not max(abs(slope * end) for end in scalar.law.ends) <= most:
-                size = "a million radians" if angle else "a million times the size of the mechanism"
-                message = f"varies by more than {'1e100' if scalar.kind == 'load' else size}"
+        for slope, quantity in scalar.moves.values():
+            allowed, words = most.get(quantity, (MOST * size, "a million times the size of the mechanism"))
+            if not max(abs(slope * end) for end in scalar.law.ends) <= allowed:
+                message = f"varies by more than {words}"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
     for pin in sources.pins:
-        if not pin.radius + (0.0 if pin.spread is None else pin.spread.ends[1]) <= MOST * (mechanism.size or 1.0):
+        if not pin.largest <= MOST * size:
             message = "is more than a million times the size of the mechanism"
             raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
 
