@@ -22,8 +22,8 @@ from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.analyses.reliability.tolerances import retold, tolerances
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Table
-from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.rewriting import rewritten
+from mechdesign.study.schema.reliability import ReliabilitySection
 
 # How often a target is corrected, and the failures that the study's own samples must show to confirm one.
 _ROUNDS = 5

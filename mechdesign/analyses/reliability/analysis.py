@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.rates import DriveRates, drive_rates
-from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses
+from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses, study_poses
 from mechdesign.analyses.reliability import drawn_tables, methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import Allocated, allocate
 from mechdesign.analyses.reliability.assembly import forward_plan
@@ -30,7 +30,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.reliability_models import ReliabilitySection
+from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.threads import one_thread
 
 # Poses whose sensitivities are computed together.
@@ -73,7 +73,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     keep_freed_memory()
     sources, warnings = find_sources(study)
     section = _section(study)
-    task, groups, doubts = _first_order(study, study.poses("reliability"), sources)
+    task, groups, doubts = _first_order(study, study_poses(study, "reliability"), sources)
     poses = task.poses
     warnings += [*doubts, *unsaid(study, task.question)]
     failures, failed = judge_failures(study, poses, task.reason)

@@ -21,7 +21,7 @@ from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Ints
 from mechdesign.parallel import map_chunks
-from mechdesign.study.methods import METHODS
+from mechdesign.study.schema.methods import METHODS
 
 # Streams of their own: no other name has four numbers.
 _STREAM = (3, 0)

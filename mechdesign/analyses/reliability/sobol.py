@@ -17,8 +17,8 @@ from mechdesign.analyses.reliability.task import Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
 from mechdesign.results import Column
-from mechdesign.study.methods import METHODS
-from mechdesign.study.reliability_models import ReliabilitySection
+from mechdesign.study.schema.methods import METHODS
+from mechdesign.study.schema.reliability import ReliabilitySection
 
 REPLICATES = 16
 # Mechanisms solved a pose, and poses, where the study does not say how many points.

@@ -1,4 +1,4 @@
-"""The methods declared in `mechdesign.study.methods`, one a file: ``run(task)`` says what each finds at every pose."""
+"""The methods declared in the schema, one a file: ``run(task)`` says what each finds at every pose."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mechdesign.analyses.reliability.simulation import Setting, Sums
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
-from mechdesign.study.methods import METHODS
+from mechdesign.study.schema.methods import METHODS
 
 # Streams of random numbers, beside those of the chunks of plain samples.
 SEARCH, QUASI = 1, 2

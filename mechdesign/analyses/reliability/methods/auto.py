@@ -11,7 +11,7 @@ from mechdesign.analyses.reliability.methods import SEARCH, counted, pose_by_pos
 from mechdesign.analyses.reliability.sampling import generator
 from mechdesign.analyses.reliability.simulation import Setting, Sums, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
-from mechdesign.study.methods import METHODS
+from mechdesign.study.schema.methods import METHODS
 
 
 def rungs() -> dict[str, ladder.Rung]:
