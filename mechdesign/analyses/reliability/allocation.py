@@ -9,7 +9,7 @@ where the model holds the tolerances back for nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from mechdesign.analyses.reliability.tables import at_poses
 from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.analyses.reliability.tolerances import retold, tolerances
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.results import Column, Table
+from mechdesign.results import Column, Result, Table
 from mechdesign.study.rewriting import rewritten
 from mechdesign.study.schema.reliability import ReliabilitySection
 
@@ -36,24 +36,6 @@ _ACTIVE = 0.99
 _NOTHING = 1e-12
 # A limit of 0 weighs as much as this one.
 _NARROW = 1e-100
-
-
-@dataclass(frozen=True, eq=False)
-class Allocated:
-    """What an allocation gives to the result.
-
-    Parameters
-    ----------
-    tables : dict of str to Table
-        ``allocation`` and ``confirmation``.
-    failed : str
-        Why what was asked is not reached.
-    """
-
-    tables: dict[str, Table] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    files: dict[str, str] = field(default_factory=dict)
-    failed: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +70,10 @@ class _Round:
         return self.model.task.where(self.model.task.settings[k].pose), _plain(self.analytic[k]), simulated
 
 
-def allocate(task: Task, section: ReliabilitySection) -> Allocated:
-    """Allocate the tolerances of a study that asks for it."""
+def allocate(task: Task, section: ReliabilitySection) -> Result:
+    """Allocate the tolerances of a study that asks for it: tables, notes, and the study that has them."""
     if section.allocate is None or not task.settings:
-        return Allocated()
+        return Result("allocation", {})
     study, reliability = task.study, section.allocate.reliability
     asked = 1.0 - reliability
     found = tolerances(study, task.sources)
@@ -122,7 +104,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Allocated:
         if (allowed == rounds[-1].allowed).all():
             break
     if not rounds:
-        return Allocated(failed=failed)
+        return Result("allocation", {}, failed=failed)
     met = [each for each in rounds if not each.missed(asked).any()]
     last = min(met, key=lambda each: model.cost(np.log(each.scales[free]))[0]) if met else rounds[-1]
     where, by_model, by_simulation = last.worst()
@@ -147,17 +129,17 @@ def allocate(task: Task, section: ReliabilitySection) -> Allocated:
         )
     heading = f"Tolerances of {study.name}, the cheapest for a reliability of {reliability:.15g}"
     text, beside = rewritten(study, retold(study, found, last.scales), heading)
-    return Allocated(
-        {"allocation": _allocation(last), "confirmation": _confirmation(last, reliability)},
-        [*notes, *_ends(replace(last, model=model))], {"allocated.yaml": text, **beside}, failed,
-    )  # fmt: skip
+    tables = {"allocation": _allocation(last), "confirmation": _confirmation(last, reliability)}
+    notes += _ends(replace(last, model=model))
+    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **beside})
 
 
 def _simulated(model: Model, scales: Floats, method: str) -> list[Estimate]:
     """What simulation says of these tolerances, at each pose."""
     task = model.task
     try:
-        said = methods.run(method, replace(task, sources=task.sources.widened(scales), linear=model.linear(scales)))
+        linear = model.linear(scales)
+        said = methods.run(method, replace(task, sources=linear.sources, linear=linear))
     except Partial as partial:
         # What it had found is not the answer to the study's own question.
         raise KeyboardInterrupt from partial

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.kinematics.rates import DriveRates, drive_rates
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses, study_poses
 from mechdesign.analyses.reliability import drawn_tables, methods, sobol, tables
-from mechdesign.analyses.reliability.allocation import Allocated, allocate
+from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
@@ -86,7 +86,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     found: list[MethodResult] = []
     interrupted = ""
     indices: dict[int, SobolIndices] = {}
-    allocated = Allocated()
+    allocated = Result("allocation", {})
     try:
         for method in section.methods:
             found.append(with_cycle(methods.run(method, task), task, found))
@@ -120,8 +120,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     # Of the first method that samples the errors.
     made += drawn_tables.build(task, next((each.sums for each in found if each.sums), {}))
     result = Result(
-        "reliability", {table.name: table for table in made} | allocated.tables,
-        [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.notes], counts,
+        "reliability", {table.name: table for table in made} | dict(allocated.tables),
+        [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,
         "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
     )  # fmt: skip
     if interrupted:

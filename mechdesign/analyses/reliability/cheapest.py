@@ -8,7 +8,7 @@ far as they are broken.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -56,7 +56,7 @@ class Model:
 
     def linear(self, scales: Floats) -> FirstOrder:
         """The linear model of these tolerances."""
-        return self.task.linear.of(self.task.sources.widened(scales))
+        return replace(self.task.linear, sources=self.task.sources.widened(scales))
 
     def failures(self, scales: Floats, which: Sequence[int]) -> Floats:
         """Probability of failure at some of the task's settings."""

@@ -14,7 +14,7 @@ import numpy as np
 from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.error_limits import Channel
-from mechdesign.analyses.reliability.sources import Source, Sources
+from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
@@ -34,19 +34,13 @@ class FirstOrder:
         Derivative of each channel (radians, lengths) by each independent component of the sources.
     owner : ndarray of int, shape (components,)
         The source of each component.
-    mean, variance : ndarray, shape (components,)
-    correlation : ndarray, shape (components, components), or None
-        Correlation coefficients of the components; None where they are independent.
     offset : ndarray, shape (channels, poses), or None
         Errors that nothing random causes: deflections.
     """
 
-    sources: tuple[Source, ...]
+    sources: Sources
     components: Floats
     owner: Ints
-    mean: Floats
-    variance: Floats
-    correlation: Floats | None
     offset: Floats | None = None
 
     def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
@@ -54,19 +48,19 @@ class FirstOrder:
         offset = None if self.offset is None else self.offset[:, poses]
         return replace(self, components=self.components[:, :, poses], offset=offset)
 
-    def of(self, sources: Sources) -> FirstOrder:
-        """The same mechanism made with other tolerances."""
-        known = sources.first_order
-        mean, variance = (np.array([getattr(known[k], name) for k in self.owner]) for name in ("mean", "variance"))
-        return replace(self, sources=known, mean=mean, variance=variance)
+    @cached_property
+    def _spread(self) -> Floats:
+        """Mean and variance of each component, shape (2, components)."""
+        return np.array([source.spread for source in self.sources.all])[self.owner].T
 
     @cached_property
     def _weighted(self) -> Floats:
         """Covariance of each component with the channels, in the shape of `components`."""
-        if self.correlation is None:
-            return self.variance[:, None] * self.components
-        sigma = np.sqrt(self.variance)
-        return np.asarray(self.correlation * np.outer(sigma, sigma) @ self.components)
+        variance, correlation = self._spread[1], self.sources.correlated()
+        if correlation is None:
+            return np.asarray(variance[:, None] * self.components)
+        sigma = np.sqrt(variance)
+        return np.asarray(correlation * np.outer(sigma, sigma) @ self.components)
 
     def covariance(self) -> Floats:
         """Covariance of the channels, shape (poses, channels, channels) [S2, eq. 9]."""
@@ -78,12 +72,12 @@ class FirstOrder:
 
     def shift(self) -> Floats:
         """Mean error of each channel, shape (channels, poses): deflections, and tolerances that are not symmetric."""
-        found = np.asarray(np.einsum("czp,z->cp", self.components, self.mean))
+        found = np.asarray(np.einsum("czp,z->cp", self.components, self._spread[0]))
         return found if self.offset is None else found + self.offset
 
     def sensitivity(self) -> Floats:
         """Per source, shape (channels, sources, poses): the derivative, of a pin sqrt(s_x^2 + s_y^2)."""
-        each = [self.components[:, self.owner == k] for k in range(len(self.sources))]
+        each = [self.components[:, self.owner == k] for k in range(len(self.sources.all))]
         return np.stack([own[:, 0] if own.shape[1] == 1 else np.linalg.norm(own, axis=1) for own in each], axis=1)
 
     def share(self) -> Floats:
@@ -92,18 +86,18 @@ class FirstOrder:
         Of correlated sources each has its covariance with the error, which may be negative.
         """
         each = self.components * self._weighted
-        parts = np.stack([each[:, self.owner == k].sum(axis=1) for k in range(len(self.sources))], axis=1)
+        parts = np.stack([each[:, self.owner == k].sum(axis=1) for k in range(len(self.sources.all))], axis=1)
         total = parts.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
 
     def worst_case(self, sensitivity: Floats) -> Floats:
         """Sum of |sensitivity| times the larger end of the tolerance, shape (channels, poses)."""
-        reach = np.array([max(abs(end) for end in source.ends) for source in self.sources])
+        reach = np.array([max(abs(end) for end in source.ends) for source in self.sources.all])
         return np.asarray(np.einsum("csp,s->cp", np.abs(sensitivity), reach))
 
     def worst_ends(self, sensitivity: Floats) -> tuple[Floats, Floats]:
         """Lowest and highest error with each source at the end of its tolerance that leads there, (channels, poses)."""
-        low, high = (sensitivity * np.array([source.ends[k] for source in self.sources])[:, None] for k in (0, 1))
+        low, high = (sensitivity * np.array([source.ends[k] for source in self.sources.all])[:, None] for k in (0, 1))
         offset = 0.0 if self.offset is None else self.offset
         return np.minimum(low, high).sum(axis=1) + offset, np.maximum(low, high).sum(axis=1) + offset
 
@@ -194,19 +188,13 @@ def linear_errors(
     MechanismError
         For the acceleration of a measure that is an expression.
     """
-    linear_sources = sources.first_order
-    directions = [(k, direction) for k, source in enumerate(linear_sources) for direction in source.directions]
+    directions = [(k, direction) for k, source in enumerate(sources.all) for direction in source.directions]
     names = list(dict.fromkeys(name for _, direction in directions for name in direction))
-    slopes = np.zeros((len(directions), len(names)))
-    for row, (_, direction) in enumerate(directions):
-        for name, slope in direction.items():
-            slopes[row, names.index(name)] = slope
+    slopes = np.array([[direction.get(name, 0.0) for name in names] for _, direction in directions])
+    by_name = derivatives(mechanism, configuration, channels, names, rates, elastic)
     return FirstOrder(
-        linear_sources,
-        np.einsum("zn,cnp->czp", slopes, derivatives(mechanism, configuration, channels, names, rates, elastic)),
+        sources,
+        np.einsum("zn,cnp->czp", slopes.reshape(-1, len(names)), by_name),
         np.array([k for k, _ in directions], dtype=np.intp),
-        np.array([linear_sources[k].mean for k, _ in directions]),
-        np.array([linear_sources[k].variance for k, _ in directions]),
-        sources.correlated(),
         None if elastic is None else elastic.offset,
     )

@@ -9,7 +9,6 @@ import numpy as np
 
 from mechdesign.analyses.reliability.engine.sobol import Replicate, SobolIndices, combine, sample
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.pins import PIN_LAWS
 from mechdesign.analyses.reliability.sampling import generator
 from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Drawn, Sources
@@ -39,7 +38,7 @@ def indices(task: Task, section: ReliabilitySection) -> dict[int, SobolIndices]:
         return {}
     sources, linear = task.sources, task.linear
     alone, owners = uncorrelated(sources), np.array(sources.owners)
-    rows = [np.flatnonzero(owners == s.name).tolist() if s.name in alone else [] for s in linear.sources]
+    rows = [np.flatnonzero(owners == s.name).tolist() if s.name in alone else [] for s in sources.all]
     points = BUDGET // (sum(map(bool, rows)) + 2) if count is None else count
     replicates = max(REPLICATES, -(-points // _MOST))
     each = max(2, points // replicates)
@@ -55,7 +54,7 @@ def indices(task: Task, section: ReliabilitySection) -> dict[int, SobolIndices]:
     for (setting, _), part in zip(items, map_chunks(work, items, task.jobs), strict=True):
         found[setting.pose].append(part)
         task.progress.update(1)
-    return {pose: combine(parts, _variances(sources, linear, pose)) for pose, parts in found.items()}
+    return {pose: combine(parts, _variances(linear, pose)) for pose, parts in found.items()}
 
 
 def uncorrelated(sources: Sources) -> set[str]:
@@ -105,12 +104,10 @@ def _components(sources: Sources, drawn: Drawn, count: int) -> Floats:
     return np.stack([np.broadcast_to(row, (count,)) for row in rows]) if rows else np.zeros((0, count))
 
 
-def _variances(sources: Sources, linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:
+def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:
     """Variances of the linear model with the pins as they are sampled: of each source, and of all together."""
-    ratio = np.ones(len(linear.sources))
-    for k, pin in enumerate(sources.pins, start=len(sources.scalars)):
-        ratio[k] = PIN_LAWS[pin.sampled].variance / PIN_LAWS[pin.analytic].variance
-    model = replace(linear.take([pose]), variance=ratio[linear.owner] * linear.variance)
+    pins = tuple(replace(pin, analytic=pin.sampled) for pin in linear.sources.pins)
+    model = replace(linear.take([pose]), sources=replace(linear.sources, pins=pins))
     whole = model.deviation()[:, 0] ** 2
     own = np.nan_to_num(model.share()[:, :, 0]) * whole[:, None]
     return (own, whole) if np.isfinite(whole).all() else None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -23,42 +22,36 @@ MOST, HEAVY = 1e6, 1e100
 
 
 @dataclass(frozen=True)
-class Source:
-    """One random source as the first-order analysis sees it.
-
-    Parameters
-    ----------
-    name : str
-        As the study names it: a parameter, a place, a drive, a load or a joint.
-    directions : tuple of mapping
-        Per independent component (one, or a pin's x and y), derivatives of places, drives and loads (radians, lengths).
-    mean, variance : float
-        Of each component (a parameter's in its own unit, an angle's in radians).
-    ends : (float, float)
-        Lowest and highest deviation: the tolerance, or of a pin the largest radial clearance in any direction.
-    """
-
-    name: str
-    directions: tuple[Mapping[str, float], ...]
-    mean: float
-    variance: float
-    ends: tuple[float, float]
-
-
-@dataclass(frozen=True)
 class Scalar:
     """A dimension that varies: a ``parameter``, a ``place``, a ``drive`` or a ``load``.
 
     Parameters
     ----------
+    law : Marginal
+        Of a parameter in its own unit, of an angle in radians.
     moves : mapping of str to (float, str)
-        Derivative of each place, drive or load that it changes, and the quantity of that.
+        Derivative of each place, drive or load that it changes (radians, lengths), and the quantity of that.
     """
 
     name: str
     kind: str
     law: Marginal
     moves: Mapping[str, tuple[float, str]]
+
+    @property
+    def directions(self) -> list[dict[str, float]]:
+        """Of the single component, derivatives of places, drives and loads."""
+        return [{name: slope for name, (slope, _) in self.moves.items()}]
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Mean and variance."""
+        return self.law.moments[:2]
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest deviation: the tolerance."""
+        return self.law.ends
 
 
 @dataclass(frozen=True)
@@ -69,8 +62,10 @@ class Pin:
     ----------
     radius : float
         Mean radial clearance.
-    spread : Marginal or None
-        Law of its deviation.
+    law : Marginal or None
+        Of its deviation.
+    analytic, sampled : str
+        Laws of the pin's place, of the analytic methods and of those that sample.
     places : tuple of str
         What the pin moves: the offsets of its point in its link, or the link's length.
     factor : float
@@ -79,7 +74,7 @@ class Pin:
 
     name: str
     radius: float
-    spread: Marginal | None
+    law: Marginal | None
     analytic: str
     sampled: str
     places: tuple[str, ...]
@@ -88,14 +83,26 @@ class Pin:
     @property
     def moments(self) -> tuple[float, float, float, float]:
         """Mean of the radial clearance, and its second to fourth central moment."""
-        mean, *central = (0.0,) * 4 if self.spread is None else self.spread.moments
+        mean, *central = (0.0,) * 4 if self.law is None else self.law.moments
         second, third, fourth = (self.factor**k * moment for k, moment in enumerate(central, start=2))
         return self.factor * (self.radius + mean), second, third, fourth
 
     @property
-    def largest(self) -> float:
-        """Largest radial clearance."""
-        return self.factor * (self.radius + (0.0 if self.spread is None else self.spread.ends[1]))
+    def directions(self) -> list[dict[str, float]]:
+        """Of the components x and y. Along a binary link the pin changes its length; across it, in the second order."""
+        return [{name: 1.0} for name in self.places]
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Mean and variance of each component [S2, eqs. 5, 6]."""
+        mean, variance, _, _ = self.moments
+        return 0.0, PIN_LAWS[self.analytic].variance * (variance + mean**2)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The largest radial clearance in any direction."""
+        largest = self.factor * (self.radius + (0.0 if self.law is None else self.law.ends[1]))
+        return -largest, largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,26 +167,15 @@ class Sources:
     correlation: Correlation | None
 
     @property
-    def owners(self) -> tuple[str, ...]:
-        """The source of each standard normal variable of `at`: scalars, then each pin's radius, x and y."""
-        return (*(scalar.name for scalar in self.scalars),
-                *(pin.name for pin in self.pins for _ in range(2 + (pin.spread is not None))))  # fmt: skip
+    def all(self) -> tuple[Scalar | Pin, ...]:
+        """Each with its name, as the study gives it."""
+        return *self.scalars, *self.pins
 
-    @cached_property
-    def first_order(self) -> tuple[Source, ...]:
-        """Sources with the pins' variances of the analytic method [S2, eqs. 5, 6]."""
-        found = []
-        for scalar in self.scalars:
-            mean, variance, _, _ = scalar.law.moments
-            slopes = {name: slope for name, (slope, _) in scalar.moves.items()}
-            found.append(Source(scalar.name, (slopes,), mean, variance, scalar.law.ends))
-        for pin in self.pins:
-            mean, variance, _, _ = pin.moments
-            spread = PIN_LAWS[pin.analytic].variance * (variance + mean**2)
-            # Along a binary link the pin changes its length; across it, only in the second order.
-            directions = tuple({name: 1.0} for name in pin.places)
-            found.append(Source(pin.name, directions, 0.0, spread, (-pin.largest, pin.largest)))
-        return tuple(found)
+    @property
+    def owners(self) -> list[str]:
+        """The source of each standard normal variable of `at`: scalars, then each pin's radius, x and y."""
+        pins = [pin.name for pin in self.pins for _ in range(2 + (pin.law is not None))]
+        return [scalar.name for scalar in self.scalars] + pins
 
     def widened(self, factors: Sequence[float] | Floats) -> Sources:
         """The same where tolerances are as many times as wide; of a clearance, the radius and its tolerance."""
@@ -189,7 +185,7 @@ class Sources:
         return replace(self, scalars=scalars, pins=pins)
 
     def correlated(self) -> Floats | None:
-        """Correlation coefficients of the components of `first_order`; None where all are independent."""
+        """Correlation coefficients of the components of `all`; None where all are independent."""
         if self.correlation is None:
             return None
         count = len(self.scalars) + sum(len(pin.places) for pin in self.pins)
@@ -207,8 +203,7 @@ class Sources:
         radii: list[Floats | float] = []
         pins = []
         for pin in self.pins:
-            radius = pin.radius if pin.spread is None else pin.radius + pin.spread.draw(rng, count)
-            radii.append(pin.factor * radius)
+            radii.append(pin.factor * (pin.radius if pin.law is None else pin.radius + pin.law.draw(rng, count)))
             pins.append(PIN_LAWS[pin.sampled].draw(rng, count))
         return Drawn(scalars, radii, pins)
 
@@ -221,7 +216,7 @@ class Sources:
         """The variables of `at` of which the direction alone counts: the places of pins in contact."""
         found, row = [], len(self.scalars)
         for pin in self.pins:
-            row += 2 + (pin.spread is not None)
+            row += 2 + (pin.law is not None)
             if pin.sampled == "contact":
                 found.append((row - 2, row - 1))
         return found
@@ -238,8 +233,7 @@ class Sources:
         radii: list[Floats | float] = []
         pins = []
         for pin in self.pins:
-            radius = pin.radius if pin.spread is None else pin.radius + pin.spread.at(next(rest))
-            radii.append(pin.factor * radius)
+            radii.append(pin.factor * (pin.radius if pin.law is None else pin.radius + pin.law.at(next(rest))))
             place = next(rest), next(rest)
             given = directed and pin.sampled == "contact"
             pins.append(place if given else PIN_LAWS[pin.sampled].at(*place))
@@ -329,7 +323,7 @@ def _check_sizes(sources: Sources) -> None:
                 message = f"varies by more than {words}"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
     for pin in sources.pins:
-        if not pin.largest <= MOST * size:
+        if not pin.ends[1] <= MOST * size:
             message = "is more than a million times the size of the mechanism"
             raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
 

@@ -76,7 +76,9 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
     used += ["monte_carlo" if estimate.samples else "bounds" for _, _, estimate in cycles]
     rho = [np.nan if each.rho is None else each.rho[row] for row, each, _ in entries] + [np.nan] * len(cycles)
     estimates = [estimate for _, _, estimate in entries + cycles]
-    failure, low, high = (np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high"))
+    failure, low, high, error = (
+        np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high", "error")
+    )
     samples, invalid, evaluations = (
         np.array([getattr(e, name) for e in estimates], dtype=np.int64)
         for name in ("samples", "invalid", "evaluations")
@@ -94,7 +96,7 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
                "failure_high bounds it"),
         Column("failure_low", low, meaning=f"lower end of its interval, {kind}; of a cycle's bounds the worst pose's"),
         Column("failure_high", high, meaning=f"upper end of its interval, {kind}; of a cycle's bounds the poses' sum"),
-        Column("error", np.array([_error(e) for e in estimates]),
+        Column("error", error,
                meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),
         Column("samples", samples, meaning="samples that the value is taken from; 0: none"),
         Column("invalid", invalid, meaning="samples that cannot be assembled; they are failures"),
@@ -108,21 +110,11 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
     return Table("reliability", tuple(columns), "probability that the errors keep their limits")
 
 
-def _error(estimate: Estimate) -> float:
-    """Three standard errors of counted failures [S2, eq. 16]; of another method half its interval."""
-    if estimate.samples and estimate.failure == estimate.failures / estimate.samples:
-        # SciPy takes a quarter of a second to import, and only a study with limits needs it.
-        from mechdesign.analyses.reliability.engine.intervals import simulation_error
-
-        return simulation_error(estimate.failure, estimate.samples)
-    return 0.5 * (estimate.high - estimate.low)
-
-
 def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     """Sensitivity to each source and its share of the variance, to the first order; Sobol' indices by pose."""
     sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity(), task.linear.share()))
     pose, channel, source = (index.ravel() for index in np.indices(share.shape))
-    names = np.array([source.name for source in task.linear.sources])
+    names = np.array([source.name for source in task.sources.all])
     links = np.array([links_meant(task.study, c.coordinate) for c in task.question.channels])
     columns = [
         *at_poses(task, pose),

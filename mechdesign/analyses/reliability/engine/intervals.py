@@ -51,8 +51,3 @@ def replicated(means: Floats) -> tuple[float, float]:
     half = student(count - 1, CONFIDENCE) * float(np.std(means, ddof=1)) / float(np.sqrt(count))
     mean = float(np.mean(means))
     return max(mean - half, 0.0), min(mean + half, 1.0)
-
-
-def simulation_error(failure: float, samples: int) -> float:
-    """Error of a simulated reliability at 99.7 %, three standard errors [S2, eq. 16]."""
-    return 3.0 * float(np.sqrt(failure * (1.0 - failure) / samples))
