@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers import limit_states
-from helpers.limit_states import Case
+from helpers.limit_states import Case, quasi_monte_carlo
 from scipy.special import ndtr
 
-from mechdesign.analyses.reliability.engine import quasi
 from mechdesign.analyses.reliability.engine.design_points import find
 from mechdesign.analyses.reliability.engine.form import form
 from mechdesign.analyses.reliability.engine.importance import importance_sampling
 from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
+from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 
 CASES = {
     **{f"half_space_{d}_{beta:g}": limit_states.linear(d, beta) for d in (1, 2, 30, 100) for beta in (2.0, 4.0, 7.0)},
@@ -49,17 +48,6 @@ def generator(seed: int) -> np.random.Generator:
 def sampled(problem: Problem, seed: int = 1, most: int = 100_000) -> Estimate:
     rng = generator(seed)
     return importance_sampling(problem, find(problem, rng), rng, most, PRECISION)
-
-
-def quasi_monte_carlo(problem: Problem, seed: int, samples: int) -> Estimate:
-    counts, broken, invalid = quasi.replicates(samples), [], 0
-    for k, count in enumerate(counts):
-        broken.append(0)
-        for u in quasi.points(problem.dimension, count, seed + k):
-            margins = problem.margins(u)
-            broken[-1] += int(failed(margins).sum())
-            invalid += int(np.isnan(margins).any(axis=0).sum())
-    return quasi.estimate(broken, counts[0], invalid)
 
 
 def tangents(problem: Problem, seed: int = 1) -> float:

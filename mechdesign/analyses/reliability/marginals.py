@@ -122,7 +122,7 @@ class Normal(_Bell):
         return self.mean, self.sigma**2, 0.0, 3.0 * self.sigma**4
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return _shifted(rng.standard_normal(count), self.sigma, self.mean)
+        return self.mean + self.sigma * rng.standard_normal(count)
 
     def at(self, u: Floats) -> Floats:
         return np.asarray(self.mean + self.sigma * u)
@@ -145,7 +145,7 @@ class TruncatedNormal(_Bell):
             again = rng.standard_normal(len(outside))
             drawn[outside] = again
             outside = outside[np.abs(again) > SIGMAS]
-        return _shifted(drawn, self.sigma, self.mean)
+        return np.asarray(self.mean + self.sigma * drawn)
 
     def at(self, u: Floats) -> Floats:
         from scipy.special import ndtr, ndtri
@@ -167,7 +167,7 @@ class Uniform(_Bounded):
         return 0.5 * (self.low + self.high), half**2 / 3.0, 0.0, half**4 / 5.0
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return _shifted(rng.random(count), self.high - self.low, self.low)
+        return self.low + (self.high - self.low) * rng.random(count)
 
     def at(self, u: Floats) -> Floats:
         from scipy.special import ndtr
@@ -246,10 +246,3 @@ LAWS: dict[str, type[Marginal]] = {
     "triangular": Triangular,
     "lognormal": Lognormal,
 }
-
-
-def _shifted(drawn: Floats, factor: float, offset: float) -> Floats:
-    drawn *= factor
-    if offset:
-        drawn += offset
-    return drawn
