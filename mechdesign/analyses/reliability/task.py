@@ -22,7 +22,7 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.progress import NULL, Progress
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.reliability import QUANTITIES
+from mechdesign.study.schema.checker import ORDERS as QUANTITIES
 
 Strings = NDArray[np.str_]
 
