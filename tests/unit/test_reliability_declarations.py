@@ -20,8 +20,8 @@ from mechdesign.errors import StudyError
 from mechdesign.report.figures import style
 from mechdesign.report.figures.reliability import figures
 from mechdesign.report.tables import to_csv
-from mechdesign.study.schema.json_schema import schema
 from mechdesign.study.schema.methods import METHODS, Method, register
+from mechdesign.study.schema.study_file import schema
 
 LEVER = """
 mechanism:
