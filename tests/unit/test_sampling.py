@@ -17,7 +17,7 @@ from mechdesign.analyses.reliability.marginals import (
     marginal,
 )
 from mechdesign.analyses.reliability.pins import PIN_LAWS
-from mechdesign.analyses.reliability.sampling import generator
+from mechdesign.analyses.reliability.simulation import generator
 from mechdesign.errors import StudyError
 from mechdesign.study.schema.reliability import DISTRIBUTIONS, Dimension
 

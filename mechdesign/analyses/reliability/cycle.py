@@ -15,8 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.sampling import CHUNK, generator
-from mechdesign.analyses.reliability.simulation import Setting, errors_of, keeps
+from mechdesign.analyses.reliability.simulation import CHUNK, Setting, errors_of, generator, keeps
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Ints

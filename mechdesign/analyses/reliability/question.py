@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from mechdesign.analyses.kinematics.motion import default_outputs
-from mechdesign.analyses.kinematics.rates import DriveRates, of_given
 from mechdesign.analyses.poses import expand_outputs, radians
 from mechdesign.analyses.reliability.error_limits import Band, Channel, Disc
 from mechdesign.errors import MechanismError
@@ -95,17 +94,6 @@ def ask(study: Study, section: ReliabilitySection) -> Question:
         pair = (0, 1)
     channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
     return Question(channels, tuple(bands), tuple(discs), pair)
-
-
-def constant_rates(study: Study, section: ReliabilitySection) -> DriveRates | None:
-    """Rates of the drives that are the same everywhere; None where they follow from a motion."""
-    if of_given(study, section):
-        return None
-    drives = [study.mechanism.coordinate(name) for name in study.mechanism.drives]
-    return DriveRates(*(
-        [float(radians(study, drive, known.get(drive.name, 0.0))) for drive in drives]
-        for known in (section.rates, section.accelerations)
-    ))  # fmt: skip
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:

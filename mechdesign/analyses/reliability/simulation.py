@@ -13,7 +13,6 @@ from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.first_order import nominal_values
 from mechdesign.analyses.reliability.question import Question
-from mechdesign.analyses.reliability.sampling import CHUNK, generator
 from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
@@ -22,6 +21,8 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
 
+# Samples drawn together.
+CHUNK = 20_000
 # The density's grid, in standard deviations [S2, Fig. 4], and the chunks it is counted over: a million samples.
 CELLS = 25
 REACH = 3.0
@@ -30,6 +31,15 @@ _DENSITY_CHUNKS = 50
 # histogram too, then at powers of two.
 _TREND_STEP = 1000
 _TREND_CHUNKS = 16
+
+
+def generator(seed: int, *stream: int) -> np.random.Generator:
+    """The stream of this name, for example one chunk of samples at one pose.
+
+    Every chunk of every pose has its own, so that the answer depends neither on the number of threads nor on how many
+    samples follow.
+    """
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(entropy=seed, spawn_key=stream)))
 
 
 @dataclass(frozen=True, eq=False)

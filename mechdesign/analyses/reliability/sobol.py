@@ -9,8 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.reliability.engine.sobol import Replicate, SobolIndices, combine, sample
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.sampling import generator
-from mechdesign.analyses.reliability.simulation import Setting, errors_of
+from mechdesign.analyses.reliability.simulation import Setting, errors_of, generator
 from mechdesign.analyses.reliability.sources import Drawn, Sources
 from mechdesign.analyses.reliability.task import Task
 from mechdesign.numerics.arrays import Floats

@@ -8,8 +8,7 @@ from mechdesign.analyses.reliability.engine import ladder
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.limit_states import problem_of
 from mechdesign.analyses.reliability.methods import SEARCH, counted, pose_by_pose
-from mechdesign.analyses.reliability.sampling import generator
-from mechdesign.analyses.reliability.simulation import Setting, Sums, simulate_chunk
+from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 

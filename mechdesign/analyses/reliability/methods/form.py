@@ -10,8 +10,7 @@ from mechdesign.analyses.reliability.engine.precision import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.limit_states import problem_of
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
-from mechdesign.analyses.reliability.sampling import generator
-from mechdesign.analyses.reliability.simulation import Setting
+from mechdesign.analyses.reliability.simulation import Setting, generator
 from mechdesign.analyses.reliability.task import MethodResult, Task
 
 

@@ -9,8 +9,7 @@ from mechdesign.analyses.reliability.engine.importance import importance_samplin
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.limit_states import problem_of
 from mechdesign.analyses.reliability.methods import SEARCH, counted, of_limits
-from mechdesign.analyses.reliability.sampling import generator
-from mechdesign.analyses.reliability.simulation import Setting, Sums, simulate
+from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, simulate
 from mechdesign.analyses.reliability.task import MethodResult, Task
 
 rung = importance_sampling

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from mechdesign.analyses.reliability.engine import quasi
 from mechdesign.analyses.reliability.methods import QUASI, pose_by_pose
-from mechdesign.analyses.reliability.sampling import generator
-from mechdesign.analyses.reliability.simulation import Setting, Sums, sums_of
+from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, sums_of
 from mechdesign.analyses.reliability.task import MethodResult, Task
 
 NAME = "quasi_monte_carlo"

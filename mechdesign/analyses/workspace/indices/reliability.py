@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
-from mechdesign.analyses.kinematics.rates import DriveRates
+from mechdesign.analyses.kinematics.rates import DriveRates, constant_rates, of_given
 from mechdesign.analyses.reliability.deflection import Elasticity, elasticity
 from mechdesign.analyses.reliability.first_order import linear_errors
 from mechdesign.analyses.reliability.probability import failure_probability
+from mechdesign.analyses.reliability.question import Question, ask
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index, number
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.numerics.arrays import Floats
-
-if TYPE_CHECKING:
-    from mechdesign.analyses.reliability.question import Question
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 
 def prepare(study: Study) -> Evaluate:
     """Find what varies and what it is limited to."""
-    # Here, for the poses of a reliability question may themselves be nodes of a workspace.
-    from mechdesign.analyses.reliability.question import ask, constant_rates
-
     sources = find_sources(study)[0]
     assert study.reliability is not None
     question = ask(study, study.reliability)
@@ -33,11 +27,10 @@ def prepare(study: Study) -> Evaluate:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
         raise StudyError((study.problem(message, "reliability", "limits"),))
     # Nothing else needs to be computed.
-    question, rates = question.narrowed, constant_rates(study, study.reliability)
-    if rates is None and any(channel.order for channel in question.channels):
+    question, rates = question.narrowed, constant_rates(study, study.reliability, study.mechanism.drives)
+    if of_given(study, study.reliability) and any(channel.order for channel in question.channels):
         message = "the index 'reliability' of velocities needs rates of the drives: those of a path are not known here"
         raise StudyError((study.problem(message, "reliability", "limits"),))
-    rates = rates or DriveRates((), ())
     return assembled_only(partial(evaluate, study.mechanism, question, rates, sources, elasticity(study)[0]))
 
 
