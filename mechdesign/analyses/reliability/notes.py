@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from mechdesign.analyses.reliability.engine.precision import WIDTH
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.task import MethodResult, Task
+from mechdesign.study.schema.methods import METHODS
 
 
 def notes(found: Sequence[MethodResult], task: Task) -> list[str]:
@@ -120,7 +121,7 @@ def _unassembled(found: Sequence[MethodResult]) -> list[str]:
     sentences = []
     for each in found:
         drawn = [estimate for pose, estimate in each.estimates.items() if estimate.invalid
-                 and each.used.get(pose, each.method) == "importance_sampling"]  # fmt: skip
+                 and _about_limits(each.used.get(pose, each.method))]  # fmt: skip
         if drawn:
             invalid, samples = sum(part.invalid for part in drawn), sum(part.samples for part in drawn)
             sentences.append(
@@ -130,19 +131,23 @@ def _unassembled(found: Sequence[MethodResult]) -> list[str]:
     return sentences
 
 
+def _about_limits(method: str) -> bool:
+    return METHODS[method].sampled and not METHODS[method].errors
+
+
 def _of_cycles(found: Sequence[MethodResult], task: Task) -> list[str]:
     """Of made mechanisms that cannot be assembled at some pose, and where `auto` ended too early."""
     sentences = []
     simulated = {each.method: each.cycle for each in found if each.cycle is not None and each.cycle.samples}
-    first, last = next(iter(simulated.values()), None), simulated.get("auto")
+    first = next(iter(simulated.values()), None)
     if first is not None and first.invalid:
         sentences.append(
             f"{first.invalid} of {first.samples} made mechanisms cannot be assembled at some pose of the cycle; "
             "they count as failures"
         )
-    if last is not None and last.failures and not task.precision.reached(last.failure, last.low, last.high):
-        sentences.append(
-            f"auto: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at {last.failure:.3g}, "
-            f"not as precise as asked; it ends at {last.samples} made mechanisms, which reliability.samples sets"
-        )
-    return sentences
+    return sentences + [
+        f"{method}: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at {last.failure:.3g}, "
+        f"not as precise as asked; it ends at {last.samples} made mechanisms, which reliability.samples sets"
+        for method, last in simulated.items()
+        if METHODS[method].precise and last.failures and not task.precision.reached(last.failure, last.low, last.high)
+    ]
