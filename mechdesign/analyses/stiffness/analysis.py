@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.poses import judge_failures, pose_in_words, solve_poses
+from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses
 from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.compliance import Held
 from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
@@ -39,6 +39,7 @@ from mechdesign.threads import one_thread
 CHUNK = 8192
 # Wrenches (of unit size) nearer to dependence than this are told: the answer hangs on rounding and on tolerances.
 NEAR_SINGULAR = 1e-4
+Pose = tuple[int, Configuration]
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     known = np.isfinite(found.matrices["K"]).all(axis=(1, 2)) | np.isfinite(found.matrices["C"]).all(axis=(1, 2))
     warnings += _cautions(study, poses, asked, known | (found.rank > 0), found.rank, found.margin)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(found.reason))}
-    return Result("stiffness", tables(study, asked, poses, found), warnings, counts, failed)
+    return Result("stiffness", tables(study, asked, poses, found), warnings, counts, failed, drawn=_drawn(asked, found))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +115,8 @@ class Found:
         See `mechdesign.mechanism.Reason`.
     effects : Effects or None
         What the study's loads do, where it has any.
+    first, loose : (int, Configuration) or None
+        The first valid pose and the first that has a free twist, with their rows.
     """
 
     matrices: dict[str, Floats]
@@ -123,6 +126,42 @@ class Found:
     reason: NDArray[np.int8]
     springs: list[Springs]
     effects: Effects | None
+    first: Pose | None
+    loose: Pose | None
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What pictures show of one pose.
+
+    Parameters
+    ----------
+    row : int
+        Its row among the study's poses.
+    springs : list of Springs
+        Those of this pose, one each.
+    twists : mapping of str to ndarray, shape (3, loads)
+        How each vertex shifts and turns under the study's loads, about the asked point.
+    """
+
+    asked: Asked
+    row: int
+    configuration: Configuration
+    springs: list[Springs]
+    twists: dict[str, Floats]
+
+
+def _drawn(asked: Asked, found: Found) -> dict[str, Drawn]:
+    """Of the first valid pose, and of the first that has a free twist."""
+    drawn = {}
+    for name, pose in (("first", found.first), ("loose", found.loose)):
+        if pose is not None:
+            row, configuration = pose
+            here = [(each, each.row == row) for each in found.springs]
+            springs = [Springs(*(v[of] for v in vars(each).values())) for each, of in here if of.any()]
+            twists = dict(zip(asked.network.paths, found.effects.twists[row], strict=True)) if found.effects else {}
+            drawn[name] = Drawn(asked, row, configuration, springs, twists)
+    return drawn
 
 
 def solve(study: Study, asked: Asked, poses: Poses, jobs: int | None = 1, progress: Progress = NULL) -> Found:
@@ -136,9 +175,12 @@ def solve(study: Study, asked: Asked, poses: Poses, jobs: int | None = 1, progre
     springs: list[Springs] = []
     loads = asked.section.loads
     effects = Effects.unknown(asked.network, poses.count, len(loads)) if loads else None
+    first: Pose | None = None
+    loose: Pose | None = None
     for solved in solve_poses(study, poses):
         configuration = solved.configuration
         reason[solved.rows] = configuration.reason
+        first = first or _pose(solved, configuration.valid)
         assembled = np.flatnonzero(np.isin(configuration.reason, (Reason.OK, Reason.LIMIT)))
         chunks = [assembled[k : k + CHUNK] for k in range(0, len(assembled), CHUNK)]
         batches = (configuration.take(index) for index in chunks)
@@ -151,7 +193,14 @@ def solve(study: Study, asked: Asked, poses: Poses, jobs: int | None = 1, progre
             if effects is not None and part is not None:
                 effects.put(rows, part)
             progress.update(len(index))
-    return Found(matrices, rank, free, margin, reason, springs, effects)
+        loose = loose or _pose(solved, np.isfinite(free[solved.rows, 0]))
+    return Found(matrices, rank, free, margin, reason, springs, effects, first, loose)
+
+
+def _pose(solved: SolvedPoses, wanted: Flags) -> Pose | None:
+    """The first of some solved poses that is wanted, and its row."""
+    index = np.flatnonzero(wanted)[:1]
+    return (int(solved.rows[index[0]]), solved.configuration.take(index)) if len(index) else None
 
 
 def tables(study: Study, asked: Asked, poses: Poses, found: Found) -> dict[str, Table]:

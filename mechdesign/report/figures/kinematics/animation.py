@@ -19,7 +19,8 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
-from mechdesign.report.figures.sweep import Sweep, is_motion, solve_sweep
+from mechdesign.report.figures.sweep import Sweep
+from mechdesign.results import Result
 from mechdesign.study import Study
 
 FRAMES = 72
@@ -29,11 +30,11 @@ _CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and o
 _DPI = 100  # 800 pixels wide
 
 
-def animation(study: Study) -> bytes:
+def animation(study: Study, result: Result) -> bytes:
     """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
-    if not is_motion(study.poses("kinematics")):
+    if not study.poses("kinematics").motion:
         return b""
-    sweep = solve_sweep(study)
+    sweep = Sweep.of(result.drawn["motion"])
     return gif(sweep) if len(sweep.valid) else b""
 
 

@@ -6,8 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
-from mechdesign.analyses.stiffness.analysis import ask, evaluate
-from mechdesign.mechanism import Configuration
+from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import name_labels, obstacles
 from mechdesign.report.figures.drawing import draw_mechanism, link_colors
@@ -16,7 +15,7 @@ from mechdesign.report.figures.labels import place_labels
 from mechdesign.report.figures.planes import Plane, map_sheet, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, pose
-from mechdesign.report.figures.stiffness.deflected import deflections, first_pose, free_motion
+from mechdesign.report.figures.stiffness.deflected import deflections, free_motion
 from mechdesign.report.figures.stiffness.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -28,9 +27,12 @@ _COIL = 0.17  # length of a coil over the size of the mechanism
 def figures(study: Study, result: Result) -> Gallery:
     """``springs`` (first pose), ``directions`` (a few poses), and over many poses ``stiffness``, curves or a map."""
     found = Gallery()
-    found.add("springs", _springs, study)
-    found.add("deflections", deflections, study)
-    found.add("free", free_motion, study, result)
+    first, loose = result.drawn.get("first"), result.drawn.get("loose")
+    if first is not None:
+        found.add("springs", _springs, study, first)
+        found.add("deflections", deflections, study, first)
+    if loose is not None:
+        found.add("free", free_motion, study, result, loose)
     found.add("directions", _directions, study, result)
     poses = study.poses("stiffness")
     if not poses.listed and poses.count > 2:
@@ -42,19 +44,15 @@ def figures(study: Study, result: Result) -> Gallery:
     return found
 
 
-def _springs(study: Study) -> Figure | None:
-    found = first_pose(study)
-    if found is None:
-        return None
-    configuration, row = found
-    scene = pose(study.mechanism, configuration)
-    coils = _coils(study, configuration, scene) if scene is not None else []
+def _springs(study: Study, drawn: Drawn) -> Figure | None:
+    scene = pose(study.mechanism, drawn.configuration)
+    coils = _coils(study, drawn, scene) if scene is not None else []
     if scene is None or not coils:
         return None
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
     figure, axes = equal_canvas(places, study.units.label("length"))
-    axes.set_title(f"equivalent springs at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
-    draw_mechanism(axes, study.mechanism, configuration, labels=False, drives=False)
+    axes.set_title(f"equivalent springs at {pose_in_words(study, study.poses('stiffness'), drawn.row)}", loc="left")
+    draw_mechanism(axes, study.mechanism, drawn.configuration, labels=False, drives=False)
     draw_coils(axes, coils)
     points = [label for label in name_labels(scene, link_colors(study.mechanism), (), style.INK) if not label.italic]
     blocked = np.concatenate([obstacles(axes, scene, (), {}), coil_obstacles(axes, coils)])
@@ -62,26 +60,22 @@ def _springs(study: Study) -> Figure | None:
     return figure
 
 
-def _coils(study: Study, configuration: Configuration, scene: Scene) -> list[Coil]:
-    asked = ask(study)
-    if asked.legs is None:
-        return []
-    _, springs, _ = evaluate(asked, configuration)
-    length = _COIL * scene.span
+def _coils(study: Study, drawn: Drawn, scene: Scene) -> list[Coil]:
+    legs, length = drawn.asked.legs or (), _COIL * scene.span
     coils = []
-    for spring in springs:
-        leg, angle = asked.legs[int(spring.leg[0])], float(spring.angle[0])
+    for spring in drawn.springs:
+        leg, angle = legs[int(spring.leg[0])], float(spring.angle[0])
         if np.isnan(angle):
             continue
         place, along = complex(spring.place[0]), complex(np.exp(1j * angle))
-        base, tip = (complex(configuration.point(point)[0]) for point in (leg.base, leg.tip))
+        base, tip = scene.points[leg.base], scene.points[leg.tip]
         inward = ((base - place) * along.conjugate()).real
         grounded = abs(inward) > length and abs(base - place - inward * along) < 1e-6 * scene.span
         if grounded:
             anchor = base
         else:
             # Its line passes the leg's base: away from the body.
-            body = complex(configuration.point(asked.section.at)[0])
+            body = scene.points[drawn.asked.section.at]
             anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
         text = quantity(float(spring.stiffness[0]), study.units.label("stiffness"))
         coils.append(Coil(text, place, anchor, tip, length, grounded))
