@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechdesign.analyses.poses import SolvedPoses, radians
+from mechdesign.analyses.poses import SolvedPoses, radians, study_poses
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Ints
 from mechdesign.study import Poses, Study
@@ -27,6 +27,7 @@ class Shown:
     """
 
     study: Study
+    poses: Poses
     rows: Ints
     configuration: Configuration
 
@@ -48,7 +49,7 @@ class Keeper:
     @property
     def shown(self) -> Shown:
         """All that was kept."""
-        return Shown(self.study, _rows(self.poses, MOST_POSES), _joined(self._parts))
+        return Shown(self.study, self.poses, _rows(self.poses, MOST_POSES), _joined(self._parts))
 
 
 def solve_shown(study: Study, most: int = MOST_POSES) -> Shown:
@@ -59,11 +60,11 @@ def solve_shown(study: Study, most: int = MOST_POSES) -> Shown:
     MechdesignError
         Where the coordinates given do not determine the mechanism.
     """
-    poses = study.poses("kinematics")
+    poses = study_poses(study, "kinematics")
     rows, names = _rows(poses, most), poses.groups[0].names
     plan = study.mechanism.plan(names)
     given = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]
-    return Shown(study, rows, plan.solve(given))
+    return Shown(study, poses, rows, plan.solve(given))
 
 
 def _rows(poses: Poses, most: int) -> Ints:

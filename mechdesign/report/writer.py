@@ -138,7 +138,7 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[di
         if animate:
             from mechdesign.report.figures.kinematics.animation import animation
 
-            drawings[ANIMATION] = lambda: animation(study, result)
+            drawings[ANIMATION] = lambda: animation(result)
         drawn, failed = render(drawings)
     warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":

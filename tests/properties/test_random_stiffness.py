@@ -15,10 +15,9 @@ from helpers.studies import study_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mechdesign.analyses.poses import solve_poses
-from mechdesign.analyses.stiffness.analysis import ask
+from mechdesign.analyses.poses import solve_poses, study_poses
+from mechdesign.analyses.stiffness.analysis import ask, hold
 from mechdesign.analyses.stiffness.force_method import load, twists_of
-from mechdesign.analyses.stiffness.serial import hold_by_legs
 from mechdesign.mechanism import Configuration
 from mechdesign.study import Study
 
@@ -28,7 +27,7 @@ NOTHING = 1e-15
 
 def posed(text: str) -> tuple[Study, Configuration]:
     study = study_of(text)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     return study, solved.configuration
 
 
@@ -168,7 +167,7 @@ def test_on_serial_legs_reciprocal_wrenches_forces_and_finite_elements_agree(see
     study, configuration = posed(platform(Random(seed)))
     asked = ask(study)
     assert asked.legs is not None
-    serial, _ = hold_by_legs(asked.legs, asked.section, configuration, asked.length, 3, False)
+    serial, _ = hold(asked, configuration)
     twists = twists_of(asked.network, asked.section, configuration, asked.length)
     other = load(twists, 3).held
     assume(other.margin > 1e-2)

@@ -101,7 +101,7 @@ def kinematics(
     if question.square:
         tables["jacobian"] = jacobian_table(motion)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(motion.reason))}
-    drawn: dict[str, Any] = {"motion": keeper.shown}
+    drawn: dict[str, Any] = {"poses": poses, "motion": keeper.shown}
     if all_modes:
         tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
         warnings += told

@@ -15,7 +15,7 @@ from mechdesign.analyses.kinematics.motion import Motion, asked
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.kinematics.transmission import transmission_table
 from mechdesign.analyses.optimize.assembling import assembly_margins
-from mechdesign.analyses.poses import SolvedPoses
+from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
 from mechdesign.expressions import Expression
@@ -24,7 +24,7 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
-from mechdesign.study.units import QUANTITY
+from mechdesign.study.text.units import QUANTITY
 from mechdesign.study.variants import follows, places_of
 
 Formulas = Mapping[tuple[int, str], Expression]
@@ -90,7 +90,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
         return False
     if any(s is not None and s.at_nodes for s in (getattr(study, command), study.kinematics)):
         return False  # The nodes follow each design's own boundary.
-    if any(mechanism.plan(group.names).change_points for group in study.poses(command).groups):
+    if any(mechanism.plan(group.names).change_points for group in study_poses(study, command).groups):
         return False
     if command == "reliability":
         return _first_order(study, names)
@@ -134,7 +134,7 @@ def poses_of(
     formulas: Formulas,
 ) -> Poses:  # fmt: skip
     """Poses of a command for designs whose places and parameters have the given values, of shape (designs,)."""
-    one = study.poses(command)
+    one = study_poses(study, command)
     poses = stacked(one, designs, places, parameters)
     values: Mapping[str, Any] = {**study.parameters.nominal, **parameters}
     for group in poses.groups if formulas else ():
@@ -175,7 +175,7 @@ def _poses_from_limits(study: Study, command: str) -> bool:
 
 def size(study: Study, command: str) -> int:
     """Number of designs that are solved together."""
-    return max(1, BLOCK // study.poses(command).count)
+    return max(1, BLOCK // study_poses(study, command).count)
 
 
 def tables(
@@ -196,7 +196,7 @@ def tables(
     graded : bool
         Whether the assembly margins are wanted, too.
     """
-    one = study.poses(command)
+    one = study_poses(study, command)
     poses = poses_of(study, command, designs, places, parameters, formulas or {})
     torn = np.zeros(designs, dtype=bool)
     solved: list[SolvedPoses] = []

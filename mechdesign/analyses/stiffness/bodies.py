@@ -13,7 +13,7 @@ from typing import Literal
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description, Drive, Fixed, Prismatic
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
 ASKED = ":asked"
 _PIN = "pin:"

@@ -16,7 +16,7 @@ from mechdesign.analyses.stiffness.beams import Beams, beams_of
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from mechdesign.analyses.stiffness.legs import Beam, Element, Hinge, joint_eleme
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
 Way = tuple[tuple[int, int], ...]
 

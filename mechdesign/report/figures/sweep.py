@@ -28,7 +28,7 @@ class Sweep(Shown):
     @classmethod
     def of(cls, shown: Shown) -> Sweep:
         """What a result carries."""
-        return cls(shown.study, shown.rows, shown.configuration)
+        return cls(shown.study, shown.poses, shown.rows, shown.configuration)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -38,8 +38,7 @@ class Sweep(Shown):
     @cached_property
     def values(self) -> dict[str, Floats]:
         """The coordinates given, in the study's units."""
-        poses = self.study.poses("kinematics")
-        return {name: poses.values[name][self.rows] for name in poses.groups[0].names}
+        return {name: self.poses.values[name][self.rows] for name in self.poses.groups[0].names}
 
     @cached_property
     def valid(self) -> Ints:
@@ -79,7 +78,7 @@ class Sweep(Shown):
     @property
     def returns(self) -> bool:
         """Whether the first and the last pose are one."""
-        if self.study.poses("kinematics").closed:
+        if self.poses.closed:
             return True
         _, wide, tall = extent(self.extent)
         return all(abs(path[-1] - path[0]) <= _CLOSED * max(wide, tall) for path in self.places.values())

@@ -19,7 +19,7 @@ def figures(study: Study, result: Result) -> Gallery:
     Lists and grids of poses have neither curves nor paths.
     """
     found = Gallery()
-    if study.poses("kinematics").motion:
+    if result.drawn["poses"].motion:
         found.add("motion", curves_figure, study, result)
         found.add("paths", _paths, result)
     if "modes" in result.tables:

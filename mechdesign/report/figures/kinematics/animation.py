@@ -21,7 +21,6 @@ from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
 from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Result
-from mechdesign.study import Study
 
 FRAMES = 72
 _COLORS, _WHITE = 128, 244
@@ -30,12 +29,10 @@ _CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and o
 _DPI = 100  # 800 pixels wide
 
 
-def animation(study: Study, result: Result) -> bytes:
+def animation(result: Result) -> bytes:
     """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
-    if not study.poses("kinematics").motion:
-        return b""
     sweep = Sweep.of(result.drawn["motion"])
-    return gif(sweep) if len(sweep.valid) else b""
+    return gif(sweep) if sweep.poses.motion and len(sweep.valid) else b""
 
 
 def gif(sweep: Sweep) -> bytes:

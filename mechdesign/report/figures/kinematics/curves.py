@@ -52,7 +52,7 @@ class _Curve:
 def curves_figure(study: Study, result: Result) -> Figure | None:
     """Every output over the swept coordinate, or along the path; None where nothing changes."""
     table = result.tables["motion"]
-    poses = study.poses("kinematics")
+    poses = result.drawn["poses"]
     moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
     if not moving:
         return None

@@ -22,7 +22,7 @@ def optimum_figure(result: Result, designs: Designs) -> Figure:
     best, own = result.drawn["best"]()
     if own.command == "workspace":
         return workspace_figure(best, own, regions(best, own)[0], f"the best design, {words}")
-    if any(goal(name).command == "kinematics" for name in designs.goals) and best.poses("kinematics").motion:
+    if any(goal(name).command == "kinematics" for name in designs.goals) and own.drawn["motion"].poses.motion:
         figure = paths_figure(Sweep.of(own.drawn["motion"]), above=0.4)
         figure.axes[0].set_title(f"The best design, {words}", loc="left")
         return figure

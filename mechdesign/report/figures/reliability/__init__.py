@@ -23,7 +23,7 @@ from mechdesign.study.poses import Poses
 
 def figures(study: Study, result: Result) -> Gallery:
     """Whatever the result holds enough of to draw."""
-    poses, tables = study.poses("reliability"), result.tables
+    poses, tables = result.drawn["poses"], result.tables
     swept, over = along(study, poses), plane(study, poses, study.reliability)
     found = Gallery()
     if swept is not None:

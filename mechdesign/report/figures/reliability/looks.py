@@ -12,7 +12,7 @@ from mechdesign.numerics.arrays import Flags
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
-from mechdesign.study.reliability_models import SUFFIXES as ORDER_SUFFIXES
+from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
 
 SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
 

@@ -19,7 +19,7 @@ from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import equal_canvas
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
-from mechdesign.study import Study
+from mechdesign.study import Poses, Study
 
 MOST_LOADS = 4
 _MOVED = 0.12  # largest drawn displacement over the size of the mechanism
@@ -29,9 +29,9 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
                    3 * _ALONG**2 - 2 * _ALONG**3, _ALONG**3 - _ALONG**2])  # fmt: skip
 
 
-def deflections(study: Study, drawn: Drawn) -> Figure | None:
+def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     """The whole mechanism where each load moves it."""
-    scene, asked = pose(study.mechanism, drawn.configuration), drawn.asked
+    scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
     if scene is None or not drawn.twists:
         return None
     shapes = _shapes(drawn, scene)
@@ -51,7 +51,7 @@ def deflections(study: Study, drawn: Drawn) -> Figure | None:
         # The asked point begins the first line.
         axes.plot([lines[0][0].real], [lines[0][0].imag], "o", color=color, zorder=6)
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(f"deflections, enlarged, at {pose_in_words(study, study.poses('stiffness'), drawn.row)}", loc="left")
+    axes.set_title(f"deflections, enlarged, at {pose_in_words(study, poses, drawn.row)}", loc="left")
     return figure
 
 
@@ -60,7 +60,7 @@ def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:
 
     The first begins at the asked point.
     """
-    network, at, moved = drawn.asked.network, scene.points[drawn.asked.section.at], drawn.twists
+    network, at, moved = drawn.body.network, scene.points[drawn.body.section.at], drawn.twists
 
     def shift(vertex: str, place: complex) -> Complexes:
         dx, dy, turn = moved[vertex]
@@ -123,7 +123,7 @@ def _beam(
 
 def free_motion(study: Study, result: Result, drawn: Drawn) -> Figure | None:
     """The asked body moved both ways along its free twist, at the first pose that has one."""
-    table, section, row = result.tables["stiffness"], drawn.asked.section, drawn.row
+    table, section, row = result.tables["stiffness"], drawn.body.section, drawn.row
     scene = pose(study.mechanism, drawn.configuration)
     if scene is None:
         return None
@@ -147,7 +147,7 @@ def free_motion(study: Study, result: Result, drawn: Drawn) -> Figure | None:
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(f"free motion at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
+    axes.set_title(f"free motion at {pose_in_words(study, result.drawn['poses'], row)}", loc="left")
     return figure
 
 

@@ -17,7 +17,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.workspace.regions import PALE, ROOM, keys, outline_of, pick, sheet
 from mechdesign.results import Result, Table
-from mechdesign.study.workspace_models import Over
+from mechdesign.study.schema.workspace import Over
 
 if TYPE_CHECKING:
     from mechdesign.study import Study

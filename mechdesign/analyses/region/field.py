@@ -1,0 +1,180 @@
+"""What is known of a mechanism at a point of the plane: margins, positive inside its region."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from mechdesign.analyses.workspace.atlas import Atlas, hidden
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import determinants
+from mechdesign.mechanism.plan import Plan
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
+
+Places = Mapping[str, Value]
+# Determinants below this part of the largest of those at some distances (of the mechanism's size) from the point's
+# place in the sketch are rounding.
+ROUNDING, SHARES = 1e-12, (0.03, 0.1, 0.3, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A mechanism seen from the place of one of its points, the other degrees of freedom held.
+
+    Parameters
+    ----------
+    plan : Plan
+        Solves for the point's x and y, then the held coordinates.
+    held : sequence of float
+        Values of the held coordinates, angles in radians.
+    same_assembly : bool
+        Whether the region ends where a forward determinant changes sign, that is where the assembly of the sketch
+        meets another one.
+    length : float or None
+        Characteristic length by which angles count as lengths in the Jacobian.
+    """
+
+    mechanism: Mechanism
+    plan: Plan
+    held: tuple[float, ...] = ()
+    same_assembly: bool = True
+    length: float | None = None
+    # Angles of rays at which the margins that bound the region change are wanted to this accuracy (radians).
+    accuracy: ClassVar[float] = 1e-13
+
+    @property
+    def outputs(self) -> Sequence[Coordinate]:
+        """Coordinates whose Jacobian is meant: the point's, then the held ones."""
+        return self.plan.structure.given
+
+    def configuration(self, z: Complexes, places: Places) -> Configuration:
+        """The mechanism with its point at `z`; outside the region what can still be computed is given.
+
+        Unlike `Plan.solve` this leaves finite what does not depend on a leg that cannot reach, so that margins keep
+        their sign and smoothness there.
+        """
+        given: list[Value] = [z.real, z.imag, *self.held]
+        if self.plan.iterative:
+            found, grip = self._atlas.solve(z, places)
+            return found if (grip > 0).all() else hidden(found, ~(grip > 0))
+        vectors = self.mechanism.geometry.vectors(places)
+        state = self.plan.run(given, vectors, None)
+        graph = self.mechanism.graph
+        return Configuration(
+            graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
+            np.zeros((), dtype=np.int8), places,
+            self._drawn | self.plan.turns(given, places),
+        )  # fmt: skip
+
+    @cached_property
+    def _drawn(self) -> dict[str, float]:
+        """Angles of the sketch: others lie within half a turn of them."""
+        return self.mechanism.drawn_angles()
+
+    @property
+    def rootless(self) -> bool:
+        """Whether poses would have to grow from the sketch's place of the point, and cannot be had there."""
+        return self.plan.iterative and self._atlas.empty
+
+    @cached_property
+    def _atlas(self) -> Atlas:
+        return Atlas.of(self.plan, self.held)
+
+    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
+        """All margins at points `z`, shape (margins, *z.shape), in the order of `labels`; nan where unknown.
+
+        Those of the assembly come last and may be left out.
+        """
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            if self.plan.iterative:
+                configuration, grip = self._atlas.solve(z, places)
+            else:
+                configuration = self.configuration(z, places)
+            found = [*configuration.closures]
+            found += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
+            found += [margin for _, margin in self.mechanism.margins(configuration)]
+            if self.plan.iterative:
+                found.append(grip)
+            if self.same_assembly and assembly:
+                signs = self._signs
+                found += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
+        if self.plan.iterative:
+            # Where nothing is reached one margin says so, and the others have no end of their own there.
+            lost = np.isnan(grip)
+            found = [margin if margin is grip else np.where(lost & np.isnan(margin), 1.0, margin) for margin in found]
+        stacked = np.empty((len(found), *z.shape))
+        for row, margin in zip(stacked, found, strict=True):
+            row[...] = margin
+        return stacked
+
+    @cached_property
+    def labels(self) -> tuple[tuple[str, str], ...]:
+        """Kind (``singularity`` or ``limit``) and name of each margin."""
+        mechanism = self.mechanism
+        at = np.asarray(complex(*(float(mechanism.sketch_configuration.value(c)) for c in self.outputs[:2])))
+        configuration = self.configuration(at, {})
+        found = [("singularity", name) for name in self._closure_names()]
+        found += [("singularity", f"{mechanism.graph.slides[s]} length") for s in mechanism.graph.telescopic]
+        found += [("limit", label) for label, _ in mechanism.margins(configuration)]
+        if self.plan.iterative:
+            found.append(("singularity", "continuation"))
+        if self.same_assembly:
+            found += [("singularity", f"assembly {k}") for k in range(len(self._signs))]
+        return tuple(found)
+
+    @cached_property
+    def singular(self) -> Flags:
+        """Which margins end where a leg is stretched or folded, so that indices have square roots there."""
+        closures = len(self._closure_names())
+        return np.arange(len(self.labels)) < closures
+
+    def _closure_names(self) -> list[str]:
+        """What ends the reach of each closed-form group, in the order of `Configuration.closures`."""
+        bodies = self.mechanism.graph.bodies
+        names = []
+        for group in self.plan.structure.groups:
+            links = "-".join(
+                dict.fromkeys(b.removesuffix(":rod") for b, (frame, _) in bodies.items() if frame in group.angles)
+            )
+            if group.form == "two angles":
+                names += [f"{links} stretched", f"{links} folded"]
+            elif group.form not in ("place", "newton", "two slides"):
+                names.append(f"{links} at its reach")
+        return names
+
+    @cached_property
+    def closing(self) -> int:
+        """Number of leading margins that say whether the mechanism can be assembled at all."""
+        return sum(1 for kind, name in self.labels if kind == "singularity" and not name.startswith("assembly"))
+
+    @cached_property
+    def _signs(self) -> list[float]:
+        sketch = self.mechanism.sketch_configuration
+        return [float(np.sign(d)) for d in self._determinants(sketch)]
+
+    @cached_property
+    def rounding(self) -> Floats:
+        """Values of each margin that have no sign of their own: of determinants what rounding leaves, else 0.
+
+        A determinant may touch zero along a whole curve (cranks that meet in one pin while the point goes round it);
+        each place there would have another sign.
+        """
+        found = np.zeros(len(self.labels))
+        if self.same_assembly:
+            turn, share = np.meshgrid(np.exp(1j * np.linspace(0, 2 * np.pi, 24, endpoint=False)), SHARES)
+            drawn = self.mechanism.sketch_configuration
+            at = complex(*(float(drawn.value(c)) for c in self.outputs[:2]))
+            around = np.append(at, at + self.mechanism.size * (turn * share).ravel())
+            sizes = np.abs(Field.margins(self, around, {}))[-len(self._signs) :]
+            found[-len(self._signs) :] = ROUNDING * np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
+        return found
+
+    def _determinants(self, configuration: Configuration) -> list[Value]:
+        return determinants(self.mechanism.linearize(configuration))
