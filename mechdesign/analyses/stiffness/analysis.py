@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -12,11 +11,13 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
 from mechdesign.analyses.stiffness.beams import beams_of
+from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held
+from mechdesign.analyses.stiffness.elements import Guide, Hinge
 from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
-from mechdesign.analyses.stiffness.legs import Guide, Hinge, Leg, NotSerialError, find_legs
+from mechdesign.analyses.stiffness.legs import Leg, find_legs
 from mechdesign.analyses.stiffness.loads import Effects, displacements_table, effects_of, forces_table
-from mechdesign.analyses.stiffness.network import Network, build_network
+from mechdesign.analyses.stiffness.network import Network, build_network, carrying_edges
 from mechdesign.analyses.stiffness.serial import hold_by_legs
 from mechdesign.analyses.stiffness.tables import (
     Springs,
@@ -234,10 +235,9 @@ def ask(study: Study) -> Body:
     condensed = link is None and len(bearers) == 1
     if condensed:
         link = bearers[0]
-    legs: tuple[Leg, ...] | None = None
-    with suppress(NotSerialError):
-        legs = find_legs(mechanism, link, section.at, section)
-    network = build_network(mechanism, section.link, section.at, section)
+    standing, pinned = (build_bodies(mechanism, name, section.at, section) for name in (link, section.link))
+    legs = find_legs(carrying_edges(mechanism, standing, section), standing, list(mechanism.description.links))
+    network = build_network(mechanism, pinned, section)
     return Body(section, legs, network, 2 if section.link is None else 3, condensed, _spread(mechanism, network))
 
 
