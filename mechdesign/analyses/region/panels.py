@@ -22,6 +22,8 @@ DOUBLINGS = 16
 LOOKS = 4
 # A ray inside a panel, not at half of it: by symmetry a single point may divide the ray there.
 MIDDLE = 0.4871
+# Width (radians) below which a panel may hold nothing but a tip.
+NARROW = 1e-3
 
 
 @dataclass(frozen=True)
@@ -113,10 +115,10 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     owner, place = owner[~drop], place[~drop]
     keep = owner[1:] == owner[:-1]
     owner, low, high = owner[:-1][keep], place[:-1][keep], place[1:][keep]
-    # A panel is empty where a ray inside it meets nothing.
+    # A panel is empty where a ray inside it meets nothing; a narrow one may hold a tip that is lost in rounding.
     middle = low + MIDDLE * (high - low)
     counts = trace(designs, owner, middle, reach[owner], samples).counts
-    full = counts > 0
+    full = (counts > 0) | (high - low < NARROW)
     closes = np.bincount(design, intervals.counts, count) > 0
     area, doubt = raster.area
     return Panels(owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
