@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import MAX_CHANGE, guess_of, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
@@ -144,13 +144,13 @@ class Atlas:
         reach = REACH * self.spacing
         far = np.abs(way) > reach
         within = np.where(far, near + way * (reach / np.maximum(np.abs(way), reach)), goal)
-        with np.errstate(all="ignore"):
-            ahead = slopes[0] * way.real + slopes[1] * way.imag
-            state, fold_distance = self._solved(goal, sizes, table, ahead, within, beyond)
-            fold_distance[lost | (far & ~self._open(state, flat.shape))] = np.nan
+        ahead = slopes[0] * way.real + slopes[1] * way.imag
+        state, fold_distance = self._solved(goal, sizes, table, ahead, within, beyond)
+        fold_distance[lost | (far & ~self._open(state, flat.shape))] = np.nan
         lost = np.isnan(fold_distance) if beyond else ~(fold_distance > 0)
         return self._configuration(state, places, lost.reshape(shape)), fold_distance.reshape(shape)
 
+    @quiet
     def _solved(
         self, z: Complexes, sizes: Sizes, table: Floats, ahead: Value, within: Complexes, beyond: bool = False
     ) -> tuple[State, Floats]:
@@ -305,9 +305,8 @@ class Atlas:
         """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
         h = DIFFERENCE * self.plan.core.size
         z = self.origin + self.spacing * lattice
-        with np.errstate(all="ignore"):
-            beside = [table_of(self._run(z + step, sizes, table, 1).unknowns, z.shape) for step in (h, 1j * h)]
-            slopes = (np.stack(beside) - table) / h
+        beside = [table_of(self._run(z + step, sizes, table, 1).unknowns, z.shape) for step in (h, 1j * h)]
+        slopes = (np.stack(beside) - table) / h
         return np.where(np.isfinite(slopes).all(axis=1, keepdims=True), slopes, 0.0)
 
     def _within(self, state: State, sizes: Sizes, shape: tuple[int, ...]) -> Flags:
