@@ -123,6 +123,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         "reliability", {table.name: table for table in made} | dict(allocated.tables),
         [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,
         "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
+        {"poses": poses},
     )  # fmt: skip
     if interrupted:
         raise Interrupted(result)
@@ -205,6 +206,8 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     settings = []
     for solved, rates in groups:
         given = set(solved.given) == set(mechanism.drives)
+        each = [solved.configuration.value(mechanism.coordinate(name)) for name in mechanism.drives]
+        drives = [np.broadcast_to(values, solved.configuration.shape) for values in each]
         for k, row in enumerate(solved.rows.tolist()):
             if not task.assembled[row]:
                 continue
@@ -216,7 +219,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
             settings.append(
                 Setting(
                     task.question, row, mechanism, mechanism.forward if given else forward_plan(mechanism, pose), pose,
-                    [float(np.asarray(drive)[k]) for drive in solved.drives], rates.take(k),
+                    [float(values[k]) for values in drives], rates.take(k),
                     task.nominal[:, row].tolist(), None if task.elastic is None else task.elastic.take([row]), scale,
                     row == assembled[0],
                 )
