@@ -18,24 +18,20 @@ from mechdesign.threads import one_thread
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 
-def texts(command, study, changes, **options):
-    result = getattr(mechdesign, command)(mechdesign.load(study, changes), **options)
+def texts(command, study, **options):
+    result = getattr(mechdesign, command)(mechdesign.load(study), **options)
     return {name: to_csv(table) for name, table in result.tables.items()} | dict(result.files)
 
 
 @pytest.mark.parametrize(
-    ("command", "name", "jobs", "changes"),
-    [
-        ("workspace", "two_rpr", 1, ()),
-        ("optimize", "gallery/path_synthesis", 2, ["optimize.evaluations=100"]),
-    ],
+    ("command", "name", "jobs"), [("workspace", "two_rpr", 1), ("optimize", "gallery/path_synthesis", 2)]
 )
-def test_tables_do_not_depend_on_threads(command, name, jobs, changes):
+def test_tables_do_not_depend_on_threads(command, name, jobs):
     study = CONFIGS / f"{name}.yaml"
     found = []
     for threads in (1, 2):
         with threadpool_limits(threads, user_api="blas"):
-            found.append(texts(command, study, changes, jobs=jobs))
+            found.append(texts(command, study, jobs=jobs))
     assert found[0] == found[1]
 
 
