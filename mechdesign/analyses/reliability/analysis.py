@@ -123,6 +123,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         "reliability", {table.name: table for table in made} | dict(allocated.tables),
         [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,
         "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
+        {"poses": poses},
     )  # fmt: skip
     if interrupted:
         raise Interrupted(result)
