@@ -11,9 +11,9 @@ import numpy as np
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.extremes import extremes, needed
-from mechdesign.analyses.kinematics.lines import Line
+from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
-from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry
+from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, characteristic_length, entry, motion_question
 from mechdesign.analyses.kinematics.motion_limits import motion_limits
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.poses import judge_failures, pose_in_words
@@ -52,8 +52,10 @@ def kinematics(
     Parameters
     ----------
     study : Study
-    seed, jobs : ignored
-        Kinematics draws no random numbers and is fast enough on one thread.
+    seed : ignored
+        Kinematics draws no random numbers.
+    jobs : int or None
+        Threads that solve a long sweep; None uses every processor.
     all_modes : bool
         Whether to follow every other assembly of the same links as well.
 
@@ -73,14 +75,14 @@ def kinematics(
     StudyError
         If all modes are asked of poses that give different coordinates.
     """
-    question = asked(study)
+    question = motion_question(study)
     poses = question.poses
     if all_modes and len(poses.groups) > 1:
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
     progress.start(poses.count, "poses")
     keeper = Keeper(study, poses)
-    motion = move(question, progress, also=keeper.keep)
+    motion = move(question, progress, jobs, also=keeper.keep)
     warnings, failed = judge_failures(study, poses, motion.reason)
     warnings += (
         _conditioning(motion)
@@ -108,7 +110,7 @@ def kinematics(
     return Result("kinematics", tables, warnings, counts, failed, drawn=drawn)
 
 
-def _modes(question: Asked, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
+def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
     """The motion of every assembly, the sketch's first; what is to be said of each, how many they are, some to draw."""
     study, poses = question.study, question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
@@ -119,7 +121,7 @@ def _modes(question: Asked, drawn: Motion, shown: Shown) -> tuple[Table, list[st
     for assembly in sorted(found, key=lambda assembly: not assembly.drawn):
         motion, seen = drawn, shown
         if not assembly.drawn:
-            other = asked(dataclasses.replace(study, mechanism=assembly.mechanism))
+            other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism))
             keeper = Keeper(other.study, other.poses)
             motion = move(other, also=keeper.keep)
             seen = keeper.shown
@@ -167,12 +169,12 @@ def tables_between(
         Tables ``extremes``, ``loops`` where there are four-bars and slider-cranks, and of a sweep their ``toggles``;
         and the designs whose motion ends where no limit is known, so that the tables do not answer for them.
     """
-    poses, swept, line = motion.asked.poses, swept_of(motion.asked.poses), None
-    loops = four_bars(motion.asked.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
+    poses, swept, line = motion.question.poses, swept_of(motion.question.poses), None
+    loops = four_bars(motion.question.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
     torn = np.zeros(poses.designs, dtype=bool)
     if swept is not None:
         coordinates = needed(motion, names) if "extremes" in wanted else []
-        line = Line(motion, swept, coordinates, functions(loops), ends)
+        line = PoseLine(motion, swept, coordinates, functions(loops), ends)
     tables = {}
     if "extremes" in wanted:
         tables["extremes"] = extremes(motion, swept, line, names)
@@ -185,13 +187,13 @@ def tables_between(
 
 def targets_table(motion: Motion) -> Table:
     """Errors against the targets."""
-    poses = motion.asked.poses
-    return targets.table(motion.asked.study, motion.errors, poses, swept_of(poses), motion.valid)
+    poses = motion.question.poses
+    return targets.table(motion.question.study, motion.errors, poses, swept_of(poses), motion.valid)
 
 
 def jacobian_table(motion: Motion) -> Table:
     """Every entry of the Jacobian, a row a pose."""
-    question = motion.asked
+    question = motion.question
     columns = motion.pose_columns()
     for output in question.listed:
         for drive in question.drives:
@@ -217,7 +219,7 @@ def _conditioning(motion: Motion) -> list[str]:
         return []
     values = motion.arrays["inverse_condition"]
     regular = motion.valid & (motion.arrays["conditioning"] >= STALLED)
-    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.asked.study) is None:
+    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.question.study) is None:
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
     near = regular & ~(values >= SINGULAR)
     if near.any():
@@ -229,7 +231,7 @@ def _conditioning(motion: Motion) -> list[str]:
 
 def _astray(motion: Motion) -> list[str]:
     """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
-    study, section, poses = motion.asked.study, motion.asked.section, motion.asked.poses
+    study, section, poses = motion.question.study, motion.question.section, motion.question.poses
     if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
         return []
     sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
@@ -250,7 +252,7 @@ def _astray(motion: Motion) -> list[str]:
 
 
 def _stalled(motion: Motion) -> list[str]:
-    study, poses = motion.asked.study, motion.asked.poses
+    study, poses = motion.question.study, motion.question.poses
     stalled = motion.valid & ~motion.smooth & ~(motion.arrays["conditioning"] >= STALLED)
     warnings = []
     rows = np.flatnonzero(stalled)
@@ -261,7 +263,7 @@ def _stalled(motion: Motion) -> list[str]:
             f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
             f"nothing there; the first: {pose_in_words(study, poses, rows[0])}"
         )
-    if motion.asked.of_given:
+    if motion.question.of_given:
         rates = motion.arrays[f"{study.mechanism.drives[0]}_velocity"]
         rows = np.flatnonzero(motion.valid & ~stalled & np.isnan(rates))
         if len(rows):
