@@ -171,7 +171,7 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
     elif required or name not in (*INDICES, *_STATISTICS):
         hint = suggestion(name, (*INDICES, *_STATISTICS))
         hint = hint or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
-        checker.report(path, f"there is no result {name!r}{hint}")
+        checker.reporter.report(path, f"there is no result {name!r}{hint}")
     if not required:
         column = name.rpartition(".")[2]
         checker.needs(command if command in _UNASSUMED else NEEDED.get(column.rpartition("_")[0]), repr(name), path)
