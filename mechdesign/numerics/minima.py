@@ -45,7 +45,7 @@ def lowest(function: Callable[[Floats], Floats], low: Floats, high: Floats) -> t
 
 
 def dips(
-    function: Callable[[Ints, Floats], Floats], x: Floats, values: Floats, enough: Floats
+    function: Callable[[Ints, Floats], Floats], x: Floats, values: Floats, enough: Floats, steps: int = PARABOLAS
 ) -> tuple[Floats, Floats]:
     """Lowest places of many functions by successive parabolas, and their values; only so low as is `enough`.
 
@@ -61,7 +61,7 @@ def dips(
         Value below which a place is low enough; minus infinity where the lowest place is wanted.
     """
     x, values, left = x.copy(), values.copy(), np.arange(x.shape[1])
-    for _ in range(PARABOLAS):
+    for _ in range(steps):
         (a, b, c), (fa, fb, fc) = x[:, left], values[:, left]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             fall, rise = (fa - fb) / (b - a), (fc - fb) / (c - b)

@@ -12,6 +12,7 @@ from mechdesign.numerics.minima import dips
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9
 ROUNDING = 1e-12
+STEPS = 8
 # Directions in which the region is widest: right, left, up, down.
 _TURNS = np.array([1, -1, -1j, 1j])
 
@@ -76,4 +77,4 @@ def _climb(
 
     rays = np.stack([low, middle, high])[:, which]
     depths = np.stack([depth(np.arange(len(which)), theta) for theta in rays])
-    return -dips(depth, rays, depths, np.full(len(which), -np.inf))[1]
+    return -dips(depth, rays, depths, np.full(len(which), -np.inf), STEPS)[1]
