@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.optimize.designs import best, grid, normalised
+from mechdesign.analyses.optimize.goals import goal
+from mechdesign.analyses.optimize.judge import Designs
+from mechdesign.analyses.optimize.tables import Comparison
+from mechdesign.analyses.optimize.variables import grid
 from mechdesign.errors import AssemblyError, StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -44,16 +47,26 @@ def test_an_empty_grid_says_so() -> None:
         mechdesign.optimize(study)
 
 
+def compare(values: list[float], *, smallest: bool = False, feasible: int | None = None) -> Comparison:
+    """Designs of one goal, of which the first so many are feasible."""
+    one, count = goal("kinematics.P.x", smallest=smallest), len(values)
+    codes = np.where(np.arange(count) < (count if feasible is None else feasible), 0, 1).astype(np.int32)
+    study = mechdesign.load(CONFIGS / "two_link_arm.yaml")
+    designs = Designs({"r1": np.arange(count) + 1.0}, (one,), (), {one: np.array(values)}, {}, codes, ["", "lost"])
+    return Comparison(study, designs, np.ones((1, 1)), {})
+
+
 def test_normalisation_over_feasible_designs() -> None:
-    values, feasible = np.array([3.0, 1.0, 2.0, 9.0]), np.array([True, True, True, False])
-    assert normalised(values, feasible, smallest=False)[:3] == pytest.approx([1, 0, 0.5])
-    assert normalised(values, feasible, smallest=True)[:3] == pytest.approx([0, 1, 0.5])
-    assert np.isnan(normalised(values, feasible, smallest=False)[3])
-    assert normalised(np.ones(4), feasible, smallest=True)[:3] == pytest.approx([0, 0, 0])
+    for smallest, shares in ((False, [1, 0, 0.5]), (True, [0, 1, 0.5])):
+        compared = compare([3.0, 1.0, 2.0, 9.0], smallest=smallest, feasible=3)
+        assert compared.cpi[:3] == pytest.approx(shares)
+        assert np.isnan(compared.cpi[3])
+        assert compared.winners.tolist() == [shares.index(1)]
+    assert compare([1.0] * 4, smallest=True).cpi == pytest.approx([0, 0, 0, 0])
 
 
 def test_ties_go_to_the_first_design() -> None:
-    assert best(np.array([np.nan, 1.0, 2.0, 2.0])) == 2
+    assert compare([1.0, 2.0, 2.0, 9.0], feasible=3).winners.tolist() == [1]
 
 
 def test_scores_are_weighted_sums_of_normalised_indices() -> None:

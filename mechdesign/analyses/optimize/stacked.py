@@ -42,12 +42,8 @@ TABLES: Mapping[str, Collection[str]] = {
     "stiffness": ("stiffness", "compliance", "deflections"),
     "reliability": ("moments", "reliability", "contributions"),
 }
-# Sections whose numbers a command reads.
-READ: Mapping[str, Collection[str]] = {
-    "kinematics": ("kinematics", "workspace"),
-    "stiffness": ("stiffness", "kinematics"),
-    "reliability": ("reliability", "kinematics"),
-}
+# Sections beside a command's own whose numbers it reads.
+ALSO_READ: Mapping[str, str] = {"kinematics": "workspace", "stiffness": "kinematics", "reliability": "kinematics"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,40 +74,54 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
 
     They are not where more than the geometry of the poses depends on them.
     """
-    mechanism = study.mechanism
+    mechanism, section = study.mechanism, getattr(study, command)
+    graph, joints, links = mechanism.graph, mechanism.description.joints, mechanism.description.links
     places = places_of(study, names)
-    if command not in TABLES or follows(_without_poses(study), names, READ[command]):
+    if follows(_without_poses(study), names, (command, ALSO_READ[command])):
         return False
-    graph = mechanism.graph
     # Angles of slides and clamps in a ring may contradict each other, which is found design by design.
-    if len(graph.ties) > len(graph.bodies) - graph.classes and _turned(study, places):
+    turned = any(place.rpartition(".")[0] in joints or place.endswith((".x", ".y")) for place in places)
+    if turned and len(graph.ties) > len(graph.bodies) - graph.classes:
         return False
-    if _poses_from_limits(study, command) and any(place.startswith("limits.") for place in places):
+    asked_of = [each for each in (section, study.kinematics) if each is not None]
+    # Without poses the drive moves between its limits.
+    given = any(each.poses or each.sweep or each.path for each in asked_of)
+    if not given and any(place.startswith("limits.") for place in places):
         return False
-    if any(s is not None and s.at_nodes for s in (getattr(study, command), study.kinematics)):
-        return False  # The nodes follow each design's own boundary.
-    if any(mechanism.plan(group.names).change_points for group in study.poses(command).groups):
+    # The nodes of a workspace follow each design's own boundary, change points its own motion.
+    if any(each.at_nodes for each in asked_of) or any(
+        mechanism.plan(group.names).change_points for group in study.poses(command).groups
+    ):
         return False
     if command == "reliability":
         return _first_order(study, names)
-    if command == "stiffness" and study.stiffness is not None:
-        # The order of the points along an elastic link is found once.
-        links = [name for name in study.stiffness.elastic if len(mechanism.description.links[name].points) > 2]
-        return not any(place.startswith(f"{link}.") for link in links for place in places)
-    return True
+    # The order of the points along an elastic link is found once.
+    elastic = section.elastic if command == "stiffness" and section is not None else ()
+    bent = tuple(f"{name}." for name in elastic if len(links[name].points) > 2)
+    return not any(place.startswith(bent) for place in places)
 
 
 def _without_poses(study: Study) -> Study:
     """The study without its listed poses, whose numbers may differ from design to design."""
-    return dataclasses.replace(
-        study,
-        resolved={
-            name: {k: v for k, v in part.items() if k != "poses" or v == "workspace"}
-            if isinstance(part, dict)
-            else part
-            for name, part in study.resolved.items()
-        },
-    )
+    resolved = dict(study.resolved)
+    for name, part in resolved.items():
+        if isinstance(part, dict) and part.get("poses", "workspace") != "workspace":
+            resolved[name] = {key: value for key, value in part.items() if key != "poses"}
+    return dataclasses.replace(study, resolved=resolved)
+
+
+def _first_order(study: Study, names: Collection[str]) -> bool:
+    """Whether only the first order is asked, and what a source moves does not depend on parameters or places."""
+    section = study.reliability
+    if section is None or set(section.methods) != {"analytic"}:
+        return False
+    reached = {name for name in section.dimensions if name in study.parameters.nominal}
+    for name, formula in {**study.parameters.formulas, **study.parameters.dependent}.items():
+        if formula.names & reached:
+            if not is_linear(formula) or name in names:
+                return False
+            reached.add(name)
+    return True
 
 
 def formulas_of(study: Study, command: str) -> Formulas:
@@ -134,8 +144,7 @@ def poses_of(
     formulas: Formulas,
 ) -> Poses:  # fmt: skip
     """Poses of a command for designs whose places and parameters have the given values, of shape (designs,)."""
-    one = study.poses(command)
-    poses = stacked(one, designs, places, parameters)
+    poses = stacked(study.poses(command), designs, places, parameters)
     values: Mapping[str, Any] = {**study.parameters.nominal, **parameters}
     for group in poses.groups if formulas else ():
         which = group.rows.reshape(designs, -1)[0]
@@ -144,33 +153,6 @@ def poses_of(
                 if (k, name) in formulas:
                     group.values[name].reshape(designs, -1)[:, column] = formulas[k, name].evaluate(values)
     return poses
-
-
-def _first_order(study: Study, names: Collection[str]) -> bool:
-    """Whether only the first order is asked, and what a source moves does not depend on parameters or places."""
-    section = study.reliability
-    if section is None or set(section.methods) != {"analytic"}:
-        return False
-    formulas = {**study.parameters.formulas, **study.parameters.dependent}
-    reached = {name for name in section.dimensions if name in study.parameters.nominal}
-    for name, formula in formulas.items():
-        if formula.names & reached:
-            if not is_linear(formula) or name in names:
-                return False
-            reached.add(name)
-    return True
-
-
-def _turned(study: Study, places: Collection[str]) -> bool:
-    """Whether angles of slides and clamps change."""
-    joints = study.mechanism.description.joints
-    return any(place.rpartition(".")[0] in joints or place.endswith((".x", ".y")) for place in places)
-
-
-def _poses_from_limits(study: Study, command: str) -> bool:
-    """Whether the study gives no poses, and so moves its drive between its limits."""
-    sections = [getattr(study, name) for name in dict.fromkeys((command, "kinematics"))]
-    return not any(s is not None and (s.poses or s.sweep or s.path) for s in sections)
 
 
 def size(study: Study, command: str) -> int:
@@ -196,7 +178,6 @@ def tables(
     graded : bool
         Whether the assembly margins are wanted, too.
     """
-    one = study.poses(command)
     poses = poses_of(study, command, designs, places, parameters, formulas or {})
     torn = np.zeros(designs, dtype=bool)
     solved: list[SolvedPoses] = []
@@ -209,10 +190,10 @@ def tables(
         held = stiffness.solve(study, question, poses)
         found, reason = stiffness.tables(study, question, poses, held), held.reason
         found = {name: table for name, table in found.items() if name in TABLES[command]}
-    reason = reason.reshape(designs, one.count)
+    reason = reason.reshape(designs, -1)
     opened = {"loops": torn | reason.any(axis=1), "extremes": torn}
     margins = assembly_margins(study, poses, solved) if solved else None
-    return Stack(Result(command, found), reason, one.listed, opened, margins)
+    return Stack(Result(command, found), reason, poses.listed, opened, margins)
 
 
 def _motion(
@@ -222,12 +203,8 @@ def _motion(
     """Tables, reasons, and the designs whose motion ends where no limit is known."""
     question = dataclasses.replace(asked(study), poses=poses)
     motion = move(question, also=also)
-    made = {name: make for name, make in _OF_MOTION.items() if name in wanted}
-    if not motion.errors:
-        made.pop("targets", None)
-    if not question.square:
-        made.pop("jacobian", None)
-    found = {name: make(motion) for name, make in made.items()}
+    known = {"motion": True, "targets": bool(motion.errors), "jacobian": question.square}
+    found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
     torn = np.zeros(poses.designs, dtype=bool)
     if "extremes" in wanted:
         found["extremes"], torn = kinematics.extremes_table(motion, names=outputs)
