@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.continuity import continuous
+from mechdesign.analyses.region.nodes import workspace_nodes
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
@@ -20,7 +22,8 @@ from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
+from mechdesign.study.pose_models import PoseSection
+from mechdesign.study.poses import Poses, default, expand
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 CHUNK = 65536
@@ -44,6 +47,28 @@ class SolvedPoses:
     given: tuple[str, ...]
     configuration: Configuration
     drives: tuple[Value, ...]
+
+
+def study_poses(study: Study, section: str) -> Poses:
+    """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
+
+    A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.
+
+    Raises
+    ------
+    StudyError
+        Where nothing sensible can be assumed.
+    """
+    turn = TURN / study.units.angle_factor
+    for name in dict.fromkeys((section, "kinematics")):
+        asked: PoseSection | None = getattr(study, name)
+        if asked is not None and asked.at_nodes:
+            return workspace_nodes(study)
+        if asked is not None:
+            found = expand(asked, study.path.parent if study.path else Path(), turn)
+            if found is not None:
+                return found
+    return default(study.mechanism.description, turn)
 
 
 def radians(study: Study, coordinate: Coordinate, value: Value) -> Value:

@@ -20,7 +20,7 @@ from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study import checks, overrides, pose_checks, poses
+from mechdesign.study import checks, overrides, pose_checks
 from mechdesign.study.build import build
 from mechdesign.study.builder import Builder
 from mechdesign.study.document import Document, plain, read
@@ -28,7 +28,6 @@ from mechdesign.study.models import MechanismSection, UnitsSection
 from mechdesign.study.numbers import LOST, Context, check_parameter_name, read_number, shown
 from mechdesign.study.optimize_models import OptimizeSection
 from mechdesign.study.parameters import Parameters
-from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter, unknown_key
 from mechdesign.study.sections import KinematicsSection, Requirement, StudyFile
@@ -96,13 +95,6 @@ class Study:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
 
-    @cached_property
-    def _nodes(self) -> poses.Poses:
-        # Here, for these poses are themselves the answer to a question.
-        from mechdesign.analyses.workspace.nodes import workspace_nodes
-
-        return workspace_nodes(self)
-
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text as long as the file is what was read."""
         content = self.path.read_bytes() if self.path is not None and self.path.is_file() else b""
@@ -113,28 +105,6 @@ class Study:
         reporter = Reporter(document)
         reporter.report(keys, message)
         return reporter.problems[-1]
-
-    def poses(self, section: str) -> poses.Poses:
-        """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
-
-        A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.
-
-        Raises
-        ------
-        StudyError
-            Where nothing sensible can be assumed.
-        """
-        turn = 2.0 * math.pi / self.units.angle_factor
-        for name in dict.fromkeys((section, "kinematics")):
-            asked: PoseSection | None = getattr(self, name)
-            if asked is not None and asked.at_nodes:
-                return self._nodes
-            if asked is not None:
-                folder = self.path.parent if self.path else pathlib.Path()
-                found = poses.expand(asked, folder, turn)
-                if found is not None:
-                    return found
-        return poses.default(self.mechanism.description, turn)
 
 
 def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:

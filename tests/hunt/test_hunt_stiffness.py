@@ -19,7 +19,7 @@ from helpers.random_mechanisms import Made
 from helpers.random_stiffness import Sprung
 from helpers.studies import study_of
 
-from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.stiffness.analysis import ask, stiffness
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.analyses.stiffness.serial import hold_by_legs
@@ -51,7 +51,7 @@ def drawn(seed: int) -> Sprung:
 
 def posed(text: str) -> tuple[Study, Configuration]:
     study = study_of(text)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     return study, solved.configuration
 
 

@@ -15,7 +15,7 @@ from helpers.studies import study_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.stiffness.analysis import ask
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.analyses.stiffness.serial import hold_by_legs
@@ -28,7 +28,7 @@ NOTHING = 1e-15
 
 def posed(text: str) -> tuple[Study, Configuration]:
     study = study_of(text)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     return study, solved.configuration
 
 

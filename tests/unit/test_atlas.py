@@ -7,7 +7,8 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.workspace.region import BRISK, answer, questions
+from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.workspace.question import answer, questions
 
 # A platform on three legs, each a crank and a rod; its angle is asked for as it is, or by a measure.
 PLATFORM = """
@@ -85,12 +86,12 @@ def test_designs_of_other_sizes_have_their_own_poses() -> None:
     rods = np.array([0.25, 0.3, 0.45])
     (question,) = questions(study_of(text), wanted=("area", "GII"))
     places = {f"rod_{k}.length": rods for k in (1, 2, 3)}
-    together = answer(question, places, 3, BRISK)
+    together = answer(question, places, 3, BATCH)
     (closed,) = questions(study_of(PLATFORM.format(held=BY_ANGLE, assembly="any")), wanted=("area", "GII"))
-    exact = answer(closed, places, 3, BRISK)
+    exact = answer(closed, places, 3, BATCH)
     for k, rod in enumerate(rods.tolist()):
         (own,) = questions(study_of(text, f"mechanism.parameters.rod={rod}"), wanted=("area", "GII"))
-        alone = answer(own, {}, 1, BRISK)
+        alone = answer(own, {}, 1, BATCH)
         for name in ("area", "GII"):
             assert together.values[name][k] == pytest.approx(alone.values[name][0], rel=1e-6)
             assert together.values[name][k] == pytest.approx(exact.values[name][k], rel=1e-6)
@@ -114,5 +115,5 @@ def test_grip_is_linear_through_a_fold() -> None:
 
 def test_a_region_between_folds_has_its_area() -> None:
     (question,) = questions(study_of(PLATFORM.format(held="lead: [0.45]", assembly="any")), wanted=("area",))
-    found = answer(question, {}, 1, BRISK)
+    found = answer(question, {}, 1, BATCH)
     assert found.values["area"][0] == pytest.approx(reached(0.45), rel=1e-6)

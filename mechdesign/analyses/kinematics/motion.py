@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.targets import Error, needed
-from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns
+from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, study_poses
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
@@ -90,7 +90,7 @@ def asked(study: Study) -> Asked:
         If no poses are given and none can be assumed.
     """
     section = study.kinematics or KinematicsSection()
-    mechanism, poses = study.mechanism, study.poses("kinematics")
+    mechanism, poses = study.mechanism, study_poses(study, "kinematics")
     listed = expand_outputs(study, section.outputs or default_outputs(mechanism))
     shown = {output.name: output for output in listed}
     for target in study.targets.values():

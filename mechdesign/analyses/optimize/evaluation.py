@@ -15,8 +15,9 @@ from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.assembling import assembly_margins, shortfall
 from mechdesign.analyses.optimize.goals import Goal, bounds_of, goals_of
-from mechdesign.analyses.poses import solve_poses
-from mechdesign.analyses.workspace.region import BRISK, GRID_TOLERANCE, Question, answer, questions, split
+from mechdesign.analyses.poses import solve_poses, study_poses
+from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, questions, split
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -113,7 +114,7 @@ class Evaluator:
         # By command of which every pose must be valid: the number of its assembly margins.
         clear: dict[str, int] = {}
         for command, tables in self._together.items() if graded else ():
-            poses = study.poses(command)
+            poses = study_poses(study, command)
             if poses.listed or any(table not in SOME for table in tables):
                 clear[command] = assembly_margins(study, poses).shape[1]
         self.layout = Layout(self.goals, self._rows, clear)
@@ -211,7 +212,7 @@ class Evaluator:
         if not len(rows):
             return
         try:
-            given = answer(question, batch.take(places, rows), len(rows), BRISK)
+            given = answer(question, batch.take(places, rows), len(rows), BATCH)
         except AssemblyError as error:
             # One design's workspace has no end; the others are still to be told.
             if len(rows) == 1:
@@ -302,7 +303,7 @@ class Evaluator:
         """Why poses of one design fail, empty where none does; notes how far they are from assembling."""
         if command == "workspace":
             return EMPTY
-        poses = study.poses(command)
+        poses = study_poses(study, command)
         solved = list(solve_poses(study, poses))
         if self._graded:
             batch.table[k, self.layout.shortfall] = shortfall(assembly_margins(study, poses, solved))[0]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.region import COLUMNS, batched, split
+from mechdesign.analyses.workspace.question import COLUMNS, batched, split
 from mechdesign.commands import COMMANDS
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result

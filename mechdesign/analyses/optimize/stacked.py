@@ -15,7 +15,7 @@ from mechdesign.analyses.kinematics.motion import Motion, asked
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.kinematics.transmission import transmission_table
 from mechdesign.analyses.optimize.assembling import assembly_margins
-from mechdesign.analyses.poses import SolvedPoses
+from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
 from mechdesign.expressions import Expression
@@ -90,7 +90,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
         return False
     # The nodes of a workspace follow each design's own boundary, change points its own motion.
     if any(each.at_nodes for each in asked_of) or any(
-        mechanism.plan(group.names).change_points for group in study.poses(command).groups
+        mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
     ):
         return False
     if command == "reliability":
@@ -144,7 +144,7 @@ def poses_of(
     formulas: Formulas,
 ) -> Poses:  # fmt: skip
     """Poses of a command for designs whose places and parameters have the given values, of shape (designs,)."""
-    poses = stacked(study.poses(command), designs, places, parameters)
+    poses = stacked(study_poses(study, command), designs, places, parameters)
     values: Mapping[str, Any] = {**study.parameters.nominal, **parameters}
     for group in poses.groups if formulas else ():
         which = group.rows.reshape(designs, -1)[0]
@@ -157,7 +157,7 @@ def poses_of(
 
 def size(study: Study, command: str) -> int:
     """Number of designs that are solved together."""
-    return max(1, BLOCK // study.poses(command).count)
+    return max(1, BLOCK // study_poses(study, command).count)
 
 
 def tables(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.rates import drive_rates
-from mechdesign.analyses.poses import SolvedPoses, in_study_units, judge_failures, solve_poses
+from mechdesign.analyses.poses import SolvedPoses, in_study_units, judge_failures, solve_poses, study_poses
 from mechdesign.analyses.reliability import sobol, tables
 from mechdesign.analyses.reliability.allocation import Allocated, allocate
 from mechdesign.analyses.reliability.answer import Answer
@@ -75,7 +75,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     section = study.reliability
     assert section is not None
     question = ask(study, section)
-    poses = study.poses("reliability")
+    poses = study_poses(study, "reliability")
     nominal, elastic, doubts = loaded(study, NominalPoses.solve(study, poses, question), question)
     warnings += [*doubts, *unsaid(study, question)]
     failures, failed = judge_failures(study, poses, nominal.reason)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.poses import judge_failures, pose_in_words, solve_poses
+from mechdesign.analyses.poses import judge_failures, pose_in_words, solve_poses, study_poses
 from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.compliance import Held
 from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
@@ -92,7 +92,7 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
         If no pose at all can be assembled.
     """
     asked = ask(study)
-    poses = study.poses("stiffness")
+    poses = study_poses(study, "stiffness")
     progress.start(poses.count, "poses")
     found = solve(study, asked, poses, jobs, progress)
     warnings, failed = judge_failures(study, poses, found.reason)

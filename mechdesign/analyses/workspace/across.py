@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.field import Field, Places
-from mechdesign.analyses.workspace.rays import Designs, trace
+from mechdesign.analyses.region.field import Field, Places
+from mechdesign.analyses.region.rays import Designs, trace
 from mechdesign.analyses.workspace.slices import VALUE, Sliced
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.analyses.workspace.panels import Panels
-from mechdesign.analyses.workspace.rays import Designs, trace
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.rays import Designs, trace
 from mechdesign.numerics.arrays import Floats, Ints
 
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.

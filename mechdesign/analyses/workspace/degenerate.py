@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.workspace.field import Field
-from mechdesign.analyses.workspace.panels import Effort, find_panels
-from mechdesign.analyses.workspace.rays import Designs, trace
-from mechdesign.analyses.workspace.region import BRISK, Answer, Question, answer
+from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.region.panels import BATCH, Effort, find_panels
+from mechdesign.analyses.region.rays import Designs, trace
+from mechdesign.analyses.workspace.question import Answer, Question, answer
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.numerics.arrays import Complexes
 
@@ -27,12 +27,12 @@ def singular_everywhere(question: Question) -> bool:
     if (at_sketch > REGULAR).all():
         return False
     designs = Designs(field, {}, 1, question.about)
-    panels = find_panels(designs, question.scan, BRISK)
+    panels = find_panels(designs, question.scan, BATCH)
     if not panels.closes[0]:
         return False
     theta = 0.5 * (panels.low + panels.high)
     none = np.zeros(len(theta), dtype=np.intp)
-    found = trace(designs, none, theta, panels.reach[none], BRISK.samples)
+    found = trace(designs, none, theta, panels.reach[none], BATCH.samples)
     z = question.about + 0.5 * (found.inner + found.outer) * np.exp(1j * theta[found.ray])
     return singular(field, z)
 

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.workspace.curves import GRID, Patch
-from mechdesign.analyses.workspace.field import Field
+from mechdesign.analyses.region.curves import GRID, Patch
+from mechdesign.analyses.region.field import Field
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 

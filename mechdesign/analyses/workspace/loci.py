@@ -12,12 +12,12 @@ from itertools import groupby
 
 import numpy as np
 
+from mechdesign.analyses.region.curves import Patch
+from mechdesign.analyses.region.field import Field
 from mechdesign.analyses.workspace.chains import joined
 from mechdesign.analyses.workspace.contours import zero_curves
-from mechdesign.analyses.workspace.curves import Patch
 from mechdesign.analyses.workspace.degenerate import singular
 from mechdesign.analyses.workspace.ends import Ends
-from mechdesign.analyses.workspace.field import Field
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.structure import Group

@@ -19,11 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.rays import Designs, trace
+from mechdesign.analyses.region.rules import Rule, cubic, spread
+from mechdesign.analyses.workspace.indices import Local
 from mechdesign.analyses.workspace.integrands import Integrand
-from mechdesign.analyses.workspace.panels import Panels
 from mechdesign.analyses.workspace.radial import BLOCK, RADII, along, evaluate, pieces
-from mechdesign.analyses.workspace.rays import Designs, trace
-from mechdesign.analyses.workspace.rules import Rule, cubic, spread
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 ANGLES = Rule.of(20, 4, 6.0)
@@ -239,7 +240,7 @@ def simple_means(
         r = intervals.inner[at] + fractions[:, None] * (intervals.outer - intervals.inner)[at]
         z = designs.about + r * np.exp(1j * angle[intervals.ray[at]])
         weight = r / r.sum(axis=0) if by_area else np.full(r.shape, 1 / len(fractions))
-        local = designs.field.local(z, designs.of(owner[at]))
+        local = Local.at(designs.field, z, designs.of(owner[at]))
         for index, integrand in enumerate(integrands):
             total[index, at] = (integrand.values(local) * weight).sum(axis=0)
     area = np.bincount(owner, sector, designs.count)

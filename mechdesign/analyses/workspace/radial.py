@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.analyses.region.rays import Designs, Intervals, clearances
+from mechdesign.analyses.region.rules import Rule, cosine
+from mechdesign.analyses.workspace.indices import Local
 from mechdesign.analyses.workspace.integrands import Integrand
-from mechdesign.analyses.workspace.rays import Designs, Intervals, clearances
-from mechdesign.analyses.workspace.rules import Rule, cosine
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
@@ -173,7 +174,7 @@ def _refined(designs: Designs, design: Ints, theta: Floats, parts: Pieces, share
     around = at[ridges] + step * np.array([-1.0, 0.0, 1.0])[:, None]
     z = designs.about + parts.pick(ridges).radius(around)[0] * np.exp(1j * theta[ridges])
     with np.errstate(divide="ignore", invalid="ignore"):
-        local = designs.field.local(z, designs.of(design[ridges]))
+        local = Local.at(designs.field, z, designs.of(design[ridges]))
         low, middle, high = local.roundness
         shift = 0.5 * (low - high) / (low + high - 2 * middle)
         low, middle, high = np.broadcast_to(1 / local.determinant, z.shape)
@@ -198,7 +199,7 @@ def evaluate(
         measure = np.where(high - low > 100 * NEAREST * high, r * slope * half, 0.0)
         gap = np.minimum(NEAREST * high, 0.5 * (high - low))
         z = designs.about + np.clip(r, low + gap, high - gap) * np.exp(1j * theta[at])
-        local = designs.field.local(z, designs.of(design[at]))
+        local = Local.at(designs.field, z, designs.of(design[at]))
         ridge: _Ridge | None = None
         for j, integrand in enumerate(integrands):
             value, kink = integrand(local)

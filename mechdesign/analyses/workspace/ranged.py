@@ -15,11 +15,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from mechdesign.analyses.region.curves import SLACK
+from mechdesign.analyses.region.field import Field, Places
+from mechdesign.analyses.region.rays import Designs, Intervals, trace
 from mechdesign.analyses.workspace.across import Across
-from mechdesign.analyses.workspace.curves import SLACK
 from mechdesign.analyses.workspace.extremes import Starts, extended
-from mechdesign.analyses.workspace.field import Field, Places
-from mechdesign.analyses.workspace.rays import Designs, Intervals, trace
 from mechdesign.analyses.workspace.slices import VALUE, Lanes, Misses, Sliced, Stretches, as_intervals, merged
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 

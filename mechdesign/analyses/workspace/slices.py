@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.workspace.field import Field, Places
-from mechdesign.analyses.workspace.rays import Intervals
+from mechdesign.analyses.region.field import Field, Places
+from mechdesign.analyses.region.rays import Intervals
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # The name among the dimensions by which a value of the range is given.

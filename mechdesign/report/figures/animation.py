@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
+from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import framed
@@ -31,7 +32,7 @@ _DPI = 100  # 800 pixels wide
 
 def animation(study: Study) -> bytes:
     """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
-    if not is_motion(study.poses("kinematics")):
+    if not is_motion(study_poses(study, "kinematics")):
         return b""
     sweep = solve_sweep(study)
     return gif(sweep) if len(sweep.valid) else b""

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import pose_in_words, solve_poses
+from mechdesign.analyses.poses import pose_in_words, solve_poses, study_poses
 from mechdesign.analyses.stiffness.analysis import Asked, ask
 from mechdesign.analyses.stiffness.beams import course_of
 from mechdesign.analyses.stiffness.force_method import load, twists_of
@@ -33,7 +33,7 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
 
 def first_pose(study: Study) -> tuple[Configuration, int] | None:
     """The first pose that can be assembled, and its row."""
-    for solved in solve_poses(study, study.poses("stiffness")):
+    for solved in solve_poses(study, study_poses(study, "stiffness")):
         valid = np.flatnonzero(solved.configuration.valid)
         if len(valid):
             return solved.configuration.take(valid[:1]), int(solved.rows[valid[0]])
@@ -65,7 +65,9 @@ def deflections(study: Study) -> Figure | None:
         axes.plot([], [], color=color, linewidth=1.8, label=_in_words(study, tuple(each), scale))
         _mark(axes, lines, asked, color)
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(f"deflections, enlarged, at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
+    axes.set_title(
+        f"deflections, enlarged, at {pose_in_words(study, study_poses(study, 'stiffness'), row)}", loc="left"
+    )
     return figure
 
 
@@ -149,7 +151,7 @@ def free_motion(study: Study, result: Result) -> Figure | None:
     if not len(rows) or section is None:
         return None
     row = int(rows[0])
-    for solved in solve_poses(study, study.poses("stiffness")):
+    for solved in solve_poses(study, study_poses(study, "stiffness")):
         if row in solved.rows:
             configuration = solved.configuration.take(np.flatnonzero(solved.rows == row))
     scene = pose(study.mechanism, configuration)
@@ -175,7 +177,7 @@ def free_motion(study: Study, result: Result) -> Figure | None:
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(f"free motion at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
+    axes.set_title(f"free motion at {pose_in_words(study, study_poses(study, 'stiffness'), row)}", loc="left")
     return figure
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures.curves import curves_figure
 from mechdesign.report.figures.modes import modes_figure
 from mechdesign.report.figures.paths import paths_figure
@@ -19,7 +20,7 @@ def figures(study: Study, result: Result) -> Gallery:
     Lists and grids of poses have neither curves nor paths.
     """
     found = Gallery()
-    if is_motion(study.poses("kinematics")):
+    if is_motion(study_poses(study, "kinematics")):
         found.add("motion", curves_figure, study, result)
         found.add("paths", _paths, study)
     if "modes" in result.tables:

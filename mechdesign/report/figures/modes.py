@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.poses import study_poses
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
@@ -24,7 +25,7 @@ _TURNED = 0.6  # size of symbols in the smallest panels, next to 1 for one as wi
 
 def modes_figure(study: Study) -> Figure:
     """A panel an assembly that has a valid pose, at most `MOST`, on one scale; the sketch's own is named so."""
-    names = study.poses("kinematics").groups[0].names
+    names = study_poses(study, "kinematics").groups[0].names
     found: list[tuple[str, Sweep]] = []
     for assembly in assemblies(study.mechanism, names):
         title = f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.optimize.goals import goal
+from mechdesign.analyses.poses import study_poses
 from mechdesign.analyses.workspace.analysis import workspace
 from mechdesign.report.figures.designs import Designs
 from mechdesign.report.figures.mechanism import mechanism_figure
@@ -35,7 +36,7 @@ def optimum_figure(study: Study, designs: Designs) -> Figure:
         result = workspace(plain)
         if "local" in result.tables:
             return workspace_figure(plain, regions(plain, result)[0], f"the best design, {words}")
-    if "kinematics" in asked and is_motion(best.poses("kinematics")):
+    if "kinematics" in asked and is_motion(study_poses(best, "kinematics")):
         figure = paths_figure(solve_sweep(best), above=0.4)
         figure.axes[0].set_title(f"The best design, {words}", loc="left")
         return figure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.poses import pose_in_words, study_poses
 from mechdesign.report.figures.densities import density_figures
 from mechdesign.report.figures.errors.allocation import allocation_figure
 from mechdesign.report.figures.errors.contributions import contributions_figure
@@ -23,7 +23,7 @@ from mechdesign.study.poses import Poses
 
 def figures(study: Study, result: Result) -> Gallery:
     """Whatever the result holds enough of to draw."""
-    poses, tables = study.poses("reliability"), result.tables
+    poses, tables = study_poses(study, "reliability"), result.tables
     swept, over = along(study, poses), plane(study, poses, study.reliability)
     found = Gallery()
     if swept is not None:

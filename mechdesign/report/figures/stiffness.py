@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.poses import pose_in_words, study_poses
 from mechdesign.analyses.stiffness.analysis import ask, evaluate
 from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
@@ -32,7 +32,7 @@ def figures(study: Study, result: Result) -> Gallery:
     found.add("deflections", deflections, study)
     found.add("free", free_motion, study, result)
     found.add("directions", _directions, study, result)
-    poses = study.poses("stiffness")
+    poses = study_poses(study, "stiffness")
     if not poses.listed and poses.count > 2:
         over = plane(study, poses, study.stiffness)
         if over is not None:
@@ -53,7 +53,7 @@ def _springs(study: Study) -> Figure | None:
         return None
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
     figure, axes = equal_canvas(places, study.units.label("length"))
-    axes.set_title(f"equivalent springs at {pose_in_words(study, study.poses('stiffness'), row)}", loc="left")
+    axes.set_title(f"equivalent springs at {pose_in_words(study, study_poses(study, 'stiffness'), row)}", loc="left")
     draw_mechanism(axes, study.mechanism, configuration, labels=False, drives=False)
     draw_coils(axes, coils)
     points = [label for label in name_labels(scene, link_colors(study.mechanism), (), style.INK) if not label.italic]
@@ -95,7 +95,7 @@ def _directions(study: Study, result: Result) -> Figure | None:
     if not len(known):
         return None
     rows = known[np.unique(np.linspace(0, len(known) - 1, MOST_DIRECTIONS).astype(int))]
-    unit, poses, factor = study.units.label("stiffness"), study.poses("stiffness"), study.units.angle_factor
+    unit, poses, factor = study.units.label("stiffness"), study_poses(study, "stiffness"), study.units.angle_factor
     figure = style.new_figure(style.WIDTH, 4.2)
     axes = figure.add_subplot()
     for k, row in enumerate(rows):
@@ -121,7 +121,7 @@ def _directions(study: Study, result: Result) -> Figure | None:
 
 def _curves(study: Study, result: Result) -> Figure | None:
     """Stiffnesses to a force and to a moment along a path; what is rigid or free everywhere has no curve."""
-    table, poses, units = result.tables["stiffness"], study.poses("stiffness"), study.units
+    table, poses, units = result.tables["stiffness"], study_poses(study, "stiffness"), study.units
     moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
     along = poses.values[moving[0]] if len(moving) == 1 else np.arange(poses.count)
     forces = {"k_x": ("-", None), "k_y": ("-", None), "k_min": ("--", style.INK), "k_max": (":", style.INK)}

@@ -10,7 +10,7 @@ from mechdesign.analyses.workspace.indices.local import Local
 from mechdesign.mechanism.algebra import Value, quiet
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.workspace.field import Field
+    from mechdesign.analyses.region.field import Field
     from mechdesign.study import Study
 
 Evaluate = Callable[[Local], Value]

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from functools import cached_property
 
 import numpy as np
 
 from mechdesign.analyses import jacobians
+from mechdesign.analyses.region.field import Field, Places
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.numerics.arrays import Floats
+from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.rates import Rates
+from mechdesign.numerics.arrays import Complexes, Floats
 
 Entries = Sequence[Sequence[Value]]
 
@@ -36,7 +40,14 @@ class Local:
     configuration: Configuration
     jacobian: Entries
     homogeneous: Entries
-    found: dict[str, Value] = field(default_factory=dict)
+    found: dict[str, Value] = dataclass_field(default_factory=dict)
+
+    @staticmethod
+    def at(field: Field, z: Complexes, places: Places) -> Local:
+        """What local indices at points `z` are computed from."""
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            configuration = field.configuration(z, places)
+            return Local(configuration, *_jacobians(field, configuration))
 
     @cached_property
     @quiet
@@ -91,3 +102,19 @@ class Local:
 def _matrix(entries: Entries) -> Floats:
     shape = np.broadcast_shapes(*(np.shape(entry) for row in entries for entry in row))
     return np.stack([np.stack([np.broadcast_to(e, shape) for e in row], axis=-1) for row in entries], axis=-2)
+
+
+def _jacobians(field: Field, configuration: Configuration) -> tuple[Entries, Entries]:
+    """The Jacobian per radian, and with angles as lengths where there is a characteristic length."""
+    mechanism, outputs, length = field.mechanism, field.outputs, field.length
+    linear = mechanism.linearize(configuration)
+    rest = [0.0] * len(linear.structure.edges)
+    drives = linear.structure.given
+    columns: list[Rates] = [linear.solve([float(j == k) for j in range(len(drives))], rest) for k in range(len(drives))]
+    jacobian: list[list[Value]] = [[first(configuration, out, rates) for rates in columns] for out in outputs]
+    if length is None:
+        return jacobian, jacobian
+    rows = [length if out.quantity == "angle" else 1.0 for out in outputs]
+    scale = [1 / length if drive.quantity == "angle" else 1.0 for drive in drives]
+    return jacobian, [[entry * r * c for entry, c in zip(row, scale, strict=True)]
+                      for row, r in zip(jacobian, rows, strict=True)]  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.analyses.workspace.rays import Designs
+from mechdesign.analyses.region.rays import Designs
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.model import Term
 from mechdesign.numerics.arrays import Complexes, Flags, Floats

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.workspace.panels import Panels
-from mechdesign.analyses.workspace.pieces import Pieces
-from mechdesign.analyses.workspace.rays import SAME, Designs, Intervals, trace
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.pieces import Pieces
+from mechdesign.analyses.region.rays import SAME, Designs, Intervals, trace
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 SLACK = 1e-9

@@ -1,4 +1,4 @@
-"""What is known of a mechanism at a point of the plane: margins (positive inside its region) and local indices."""
+"""What is known of a mechanism at a point of the plane: margins, positive inside its region."""
 
 from __future__ import annotations
 
@@ -10,15 +10,12 @@ from typing import ClassVar
 import numpy as np
 
 from mechdesign.analyses.workspace.atlas import Atlas, hidden
-from mechdesign.analyses.workspace.indices.local import Entries, Local
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import determinants
-from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.rates import Rates
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 Places = Mapping[str, Value]
@@ -181,25 +178,3 @@ class Field:
 
     def _determinants(self, configuration: Configuration) -> list[Value]:
         return determinants(self.mechanism.linearize(configuration))
-
-    def local(self, z: Complexes, places: Places) -> Local:
-        """What local indices at points `z` are computed from."""
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            configuration = self.configuration(z, places)
-            return Local(configuration, *self._jacobian(configuration))
-
-    def _jacobian(self, configuration: Configuration) -> tuple[Entries, Entries]:
-        """The Jacobian per radian, and with angles as lengths where there is a characteristic length."""
-        linear = self.mechanism.linearize(configuration)
-        rest = [0.0] * len(linear.structure.edges)
-        drives = linear.structure.given
-        columns: list[Rates] = [
-            linear.solve([float(j == k) for j in range(len(drives))], rest) for k in range(len(drives))
-        ]
-        jacobian: list[list[Value]] = [[first(configuration, out, rates) for rates in columns] for out in self.outputs]
-        if self.length is None:
-            return jacobian, jacobian
-        rows = [self.length if out.quantity == "angle" else 1.0 for out in self.outputs]
-        scale = [1 / self.length if drive.quantity == "angle" else 1.0 for drive in drives]
-        return jacobian, [[entry * r * c for entry, c in zip(row, scale, strict=True)]
-                          for row, r in zip(jacobian, rows, strict=True)]  # fmt: skip

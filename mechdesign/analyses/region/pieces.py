@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.workspace.panels import Panels
-from mechdesign.analyses.workspace.rays import SAME, Designs, Intervals, trace
-from mechdesign.analyses.workspace.rules import cubic, spread
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.rays import SAME, Designs, Intervals, trace
+from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.mechanism.variant import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 

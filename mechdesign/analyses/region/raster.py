@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.rays import Designs, Intervals
-from mechdesign.analyses.workspace.reach import box
+from mechdesign.analyses.region.rays import Designs, Intervals
+from mechdesign.analyses.region.reach import box
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Cells looked at at once.

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.breaks import TOGETHER, Search, signatures
-from mechdesign.analyses.workspace.raster import Raster
-from mechdesign.analyses.workspace.rays import Designs, Intervals, curved, trace
+from mechdesign.analyses.region.breaks import TOGETHER, Search, signatures
+from mechdesign.analyses.region.raster import Raster
+from mechdesign.analyses.region.rays import Designs, Intervals, curved, trace
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
@@ -44,6 +44,12 @@ class Effort:
     samples: int
     cells: int
     closer: int | None = None
+
+
+# One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it, and
+# looked at more closely where limits of angles may leave thin parts.
+SINGLE = Effort(128, 48, 192)
+BATCH = Effort(16, 12, 24, 64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.meetings import Meetings
-from mechdesign.analyses.workspace.rays import Designs, Intervals, trace
+from mechdesign.analyses.region.meetings import Meetings
+from mechdesign.analyses.region.rays import Designs, Intervals, trace
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Floats, Ints
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from mechdesign.analyses.workspace.field import Places
-from mechdesign.analyses.workspace.rays import Designs, Intervals
+from mechdesign.analyses.region.field import Places
+from mechdesign.analyses.region.rays import Designs, Intervals
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 

@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.jacobians import mixes
+from mechdesign.analyses.region.field import Places
+from mechdesign.analyses.region.panels import Effort, Panels, find_panels
+from mechdesign.analyses.region.pieces import Pieces
+from mechdesign.analyses.region.rays import Designs
+from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.bounding import bounding_box
-from mechdesign.analyses.workspace.field import Field, Places
 from mechdesign.analyses.workspace.indices import INDICES, OF_JACOBIAN, Prepared, prepare
 from mechdesign.analyses.workspace.integrands import Integrand
-from mechdesign.analyses.workspace.panels import Effort, Panels, find_panels
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
-from mechdesign.analyses.workspace.pieces import Pieces
-from mechdesign.analyses.workspace.quadrature import Integral, integrate, simple_means
-from mechdesign.analyses.workspace.rays import Designs
-from mechdesign.errors import MechanismError, StudyError
+from mechdesign.analyses.workspace.quadrature import integrate, simple_means
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import Over, WorkspaceSection
 
-# One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it, and
-# looked at more closely where limits of angles may leave thin parts.
-CLOSE, BRISK = Effort(128, 48, 192), Effort(16, 12, 24, 64)
 SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
-# Rays of the tables of local indices and of the boundary, unless the study says how many.
-RAYS = 181
 RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6
@@ -44,31 +36,20 @@ STATISTICS = ("mean", "min", "max", "std")
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
-    """What the workspace section asks, in radians.
+class Question(Region):
+    """What the workspace section asks of a region.
 
     Parameters
     ----------
-    held : mapping of str to float
-        Values of the coordinates of ``at``, in the study's units.
-    scan : (float, float)
-        First and last angle of the rays.
     counted : (float, float)
-        Range of angle that the means are taken over.
-    rays : int or None
-        As the study asks.
+        Range of angle that the means are taken over (radians).
     indices : tuple of Prepared
         Local indices: those that the study asks for, and what `wanted` needs.
     wanted : tuple of str
         Columns of the answer.
     """
 
-    field: Field
-    held: dict[str, float]
-    about: complex
-    scan: tuple[float, float]
     counted: tuple[float, float]
-    rays: int | None
     rule: str
     tolerance: float
     nodes: int | None
@@ -128,70 +109,22 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     StudyError
         If the section lacks what cannot be assumed.
     """
-    section = study.workspace
-    if section is None or section.point is None:
-        raise _problem(study, "workspace.point", "the point whose workspace is asked for is needed, e.g. {point: C}")
-    mechanism, unit = study.mechanism, study.units.angle_factor
-    outputs = (f"{section.point}.x", f"{section.point}.y")
-    if mechanism.mobility < 2:
-        raise _problem(
-            study, "workspace.point",
-            f"the mobility is {mechanism.mobility}: point {section.point} moves on a curve, not in a region; "
-            "use kinematics",
-        )  # fmt: skip
-    if len(section.at) != mechanism.mobility - 2:
-        raise _problem(
-            study, "workspace.at",
-            f"the mobility is {mechanism.mobility}: beside {section.point}.x and {section.point}.y "
-            f"{mechanism.mobility - 2 or 'no'} coordinates are held, not {len(section.at)}",
-        )  # fmt: skip
-    held = [values for values in section.at.values() if not isinstance(values, Over)]
-    if len(held) < len(section.at):
-        raise _problem(study, "workspace.at", "over a range of a coordinate only the command 'workspace' is answered")
-    try:
-        plan = mechanism.plan((*outputs, *section.at))
-    except MechanismError as error:
-        raise _problem(study, "workspace.point", str(error)) from None
-    field = Field(mechanism, plan, (), section.assembly == "same", section.characteristic_length)
-    if section.characteristic_length is None and mixes(plan.structure.given, mechanism.forward.structure.given):
-        raise _problem(
-            study, "workspace.characteristic_length",
-            "the Jacobian mixes lengths and angles: name the length by which a radian counts, e.g. "
-            "{characteristic_length: 0.1}",
-        )  # fmt: skip
-    sketch = mechanism.sketch_configuration
-    at_sketch = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
-    about = at_sketch if section.scan.about is None else complex(*section.scan.about)
-    start, stop = _scan(section, unit)
-    margin = section.margin * unit
+    found, section = regions(study), study.workspace
+    assert section is not None
+    (start, stop), margin = found[0].scan, section.margin * study.units.angle_factor
     if stop - start <= 2 * margin:
-        raise _problem(study, "workspace.margin", "the margin leaves nothing of the scan")
-    factors = [unit if c.quantity == "angle" else 1.0 for c in plan.structure.given[2:]]
+        raise problem(study, "margin", "the margin leaves nothing of the scan")
     integrate_by = section.integrate
-    asked = OF_JACOBIAN if section.indices is None else section.indices
-    wanted = columns(asked) if wanted is None else tuple(wanted)
+    if "tolerance" in integrate_by.model_fields_set:
+        tolerance = integrate_by.tolerance
+    wanted = columns(OF_JACOBIAN if section.indices is None else section.indices) if wanted is None else tuple(wanted)
     indices = prepare(study, list(dict.fromkeys(filter(None, (split(column)[0] for column in wanted)))))
+    counted = (start + margin, stop - margin)
     return [
-        Question(
-            replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True))),
-            dict(zip(section.at, values, strict=True)), about, (start, stop), (start + margin, stop - margin),
-            section.scan.rays, integrate_by.rule,
-            integrate_by.tolerance if "tolerance" in integrate_by.model_fields_set else tolerance, integrate_by.nodes,
-            indices, wanted,
-        )
-        for values in itertools.product(*held)
+        Question(**vars(region), counted=counted, rule=integrate_by.rule, tolerance=tolerance,
+                 nodes=integrate_by.nodes, indices=indices, wanted=wanted)
+        for region in found
     ]  # fmt: skip
-
-
-def _scan(section: WorkspaceSection, unit: float) -> tuple[float, float]:
-    if section.scan.from_ is None or section.scan.to is None:
-        return 0.0, 2 * np.pi
-    start, stop = section.scan.from_ * unit, section.scan.to * unit
-    return start, min(stop, start + 2 * np.pi)
-
-
-def _problem(study: Study, key: str, message: str) -> StudyError:
-    return StudyError((study.problem(message, *key.split(".")),))
 
 
 def answer(question: Question, places: Places, count: int, effort: Effort) -> Answer:
@@ -334,9 +267,3 @@ def _simple(
     return simple_means(
         designs, integrands, panels.reach, samples, theta, fractions, by_area=question.rule == "midpoint"
     )
-
-
-__all__ = [
-    "BRISK", "CLOSE", "COLUMNS", "RAYS", "Answer", "Integral", "Question", "answer", "areas_of_pieces", "batched",
-    "columns", "questions", "split",
-]  # fmt: skip

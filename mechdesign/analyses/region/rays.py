@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.workspace.dips import Brackets, hidden_places, rounded, sign_changes
-from mechdesign.analyses.workspace.field import Field, Places
+from mechdesign.analyses.region.dips import Brackets, hidden_places, rounded, sign_changes
+from mechdesign.analyses.region.field import Field, Places
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 
