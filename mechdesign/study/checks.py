@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mechdesign.commands import COMMANDS
+from mechdesign.indices import index_names, needed_section
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study import pose_checks, reliability_checks, targets
 from mechdesign.study.checker import Checker
@@ -21,10 +22,10 @@ from mechdesign.study.reliability_models import ReliabilitySection
 from mechdesign.study.reporter import Reporter
 from mechdesign.study.sections import KinematicsSection
 from mechdesign.study.stiffness_models import StiffnessSection
-from mechdesign.study.workspace_models import INDEX_NAMES, NEEDED, Over, WorkspaceSection
+from mechdesign.study.workspace_models import Over, WorkspaceSection
 
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
-_STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))
+_STATISTICS = ("mean", "min", "max", "std")
 # Commands whose section no default can replace.
 _UNASSUMED = ("reliability", "stiffness")
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
@@ -94,8 +95,8 @@ def _workspace(checker: Checker, section: WorkspaceSection) -> None:
             if quantity in ("length", "angle"):
                 checker.kind((*path, index), quantity)
     for index, name in enumerate(section.indices or ()):
-        needed = NEEDED.get(name)
-        if needed is not None and checker.reporter.raw((needed,)) is None:
+        needed = needed_section(name)
+        if needed and checker.reporter.raw((needed,)) is None:
             message = f"the index {name!r} needs the {needed} section, and the study has none"
             checker.reporter.report(("workspace", "indices", index), message)
     scan = section.scan
@@ -161,15 +162,15 @@ def _conditions(checker: Checker, path: Path, conditions: Iterable[Condition]) -
 def _result(checker: Checker, name: str, path: Path, *, dotted: bool = False) -> None:
     command, _, rest = name.partition(".")
     if not rest:
-        known = (*INDICES, *_STATISTICS)
+        known = (*INDICES, *(f"{index}_{kind}" for index in index_names() for kind in _STATISTICS))
         if dotted or name not in known:
             hint = suggestion(name, known) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
             checker.reporter.report(path, f"there is no result {name!r}{hint}")
     else:
         checker.known(command, COMMANDS, "command", path)
     column = name.rpartition(".")[2]
-    needed = command if command in _UNASSUMED else NEEDED.get(column.rpartition("_")[0])
-    if not dotted and needed is not None and checker.reporter.raw((needed,)) is None:
+    needed = command if command in _UNASSUMED else needed_section(column.rpartition("_")[0])
+    if not dotted and needed and checker.reporter.raw((needed,)) is None:
         checker.reporter.report(path, f"{name!r} needs the {needed} section, and the study has none")
 
 

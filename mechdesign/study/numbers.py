@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -287,21 +287,25 @@ def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *forms: dict[str
 
 @dataclass(frozen=True)
 class Choice:
-    """Annotation of a word out of a list."""
+    """Annotation of a word out of a list, or of what a function lists when it is asked."""
 
-    words: tuple[str, ...]
+    words: tuple[str, ...] | Callable[[], tuple[str, ...]]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self._validate)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"enum": list(self.words)}
+        return {"enum": list(self._listed())}
+
+    def _listed(self) -> tuple[str, ...]:
+        return self.words() if callable(self.words) else self.words
 
     def _validate(self, raw: Any) -> str:
-        if isinstance(raw, str) and raw in self.words:
+        words = self._listed()
+        if isinstance(raw, str) and raw in words:
             return raw
-        known = ", ".join(self.words)
-        hint = suggestion(raw, self.words) if isinstance(raw, str) else ""
+        known = ", ".join(words)
+        hint = suggestion(raw, words) if isinstance(raw, str) else ""
         raise failure(f"expected one of {known}, not {shown(raw)}{hint}")
 
 

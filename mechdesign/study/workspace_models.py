@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
+from mechdesign.indices import index_names
 from mechdesign.study.lists import Numbers, as_list
 from mechdesign.study.models import Model
 from mechdesign.study.numbers import (
@@ -22,17 +23,6 @@ from mechdesign.study.numbers import (
     Whole,
     failure,
 )
-
-INDEX_NAMES = (
-    "inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max", "k_min", "k_direction",
-    "deflection", "sigma_position", "reliability",
-)  # fmt: skip
-# The section of the study that an index needs beside the workspace.
-NEEDED = {
-    "k_min": "stiffness", "k_direction": "stiffness", "deflection": "stiffness", "sigma_position": "reliability",
-    "reliability": "reliability",
-}  # fmt: skip
-
 
 # A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
 WHOLE = 3e-6
@@ -99,4 +89,4 @@ class WorkspaceSection(Model):
     margin: NonNegativeAngle = 0.0
     assembly: Annotated[str, Choice(("same", "any"))] = "same"
     characteristic_length: PositiveLength | None = None
-    indices: Annotated[tuple[Annotated[str, Choice(INDEX_NAMES)], ...], BeforeValidator(as_list)] | None = None
+    indices: Annotated[tuple[Annotated[str, Choice(index_names)], ...], BeforeValidator(as_list)] | None = None

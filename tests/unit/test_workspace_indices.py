@@ -12,9 +12,11 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.poses import study_poses
 from mechdesign.analyses.region.panels import BATCH
-from mechdesign.analyses.workspace.indices import OF_JACOBIAN, Local, prepare
+from mechdesign.analyses.workspace.index import prepare
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import StudyError
+from mechdesign.indices import USUAL
 from mechdesign.study import Study
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -57,7 +59,7 @@ ELASTIC = (
 def local(study: Study, *places: complex) -> dict[str, np.ndarray]:
     """The Jacobian's indices and its determinant at points."""
     found = Local.at(questions(study)[0].field, np.array(places), {})
-    values = {index.name: np.asarray(index.values(found)) for index in prepare(study, OF_JACOBIAN)}
+    values = {index.name: np.asarray(index.values(found)) for index in prepare(study, USUAL)}
     return values | {"det_J": np.asarray(found.determinant)}
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.indices import Local, Prepared
+from mechdesign.analyses.workspace.index import Prepared
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.numerics.arrays import Floats
 

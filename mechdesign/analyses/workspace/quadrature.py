@@ -22,8 +22,8 @@ import numpy as np
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import Designs, trace
 from mechdesign.analyses.region.rules import Rule, cubic, spread
-from mechdesign.analyses.workspace.indices import Local
 from mechdesign.analyses.workspace.integrands import Integrand
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.radial import BLOCK, RADII, along, evaluate, pieces
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 

@@ -13,10 +13,11 @@ from mechdesign.analyses.region.pieces import Pieces
 from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.bounding import bounding_box
-from mechdesign.analyses.workspace.indices import INDICES, OF_JACOBIAN, Prepared, prepare
+from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.integrands import Integrand
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.quadrature import integrate, simple_means
+from mechdesign.indices import USUAL, index_names, needed_section
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
@@ -86,12 +87,14 @@ def split(column: str) -> tuple[str, str]:
     if column in MEANS:
         return MEANS[column], "mean"
     name, _, kind = column.rpartition("_")
-    return (name, kind) if name in INDICES and kind in STATISTICS else ("", "")
+    known = kind in STATISTICS and (name in USUAL or name in index_names())
+    return (name, kind) if known else ("", "")
 
 
 def batched(column: str) -> bool:
     """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
-    return column in COLUMNS or split(column)[0] in OF_JACOBIAN
+    name = split(column)[0]
+    return column in COLUMNS or bool(name and not needed_section(name))
 
 
 def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:
@@ -117,7 +120,7 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     integrate_by = section.integrate
     if "tolerance" in integrate_by.model_fields_set:
         tolerance = integrate_by.tolerance
-    wanted = columns(OF_JACOBIAN if section.indices is None else section.indices) if wanted is None else tuple(wanted)
+    wanted = columns(USUAL if section.indices is None else section.indices) if wanted is None else tuple(wanted)
     indices = prepare(study, list(dict.fromkeys(filter(None, (split(column)[0] for column in wanted)))))
     counted = (start + margin, stop - margin)
     return [

@@ -9,8 +9,8 @@ import numpy as np
 
 from mechdesign.analyses.region.rays import Designs, Intervals, clearances
 from mechdesign.analyses.region.rules import Rule, cosine
-from mechdesign.analyses.workspace.indices import Local
 from mechdesign.analyses.workspace.integrands import Integrand
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 

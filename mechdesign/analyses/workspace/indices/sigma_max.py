@@ -1,26 +1,11 @@
 """Largest singular value of the Jacobian: the output's rate per unit of drive rates in the fastest direction."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from mechdesign.analyses.workspace.indices.index import Index, of_jacobian, singular_value_unit
-from mechdesign.analyses.workspace.indices.local import Local
-from mechdesign.mechanism.algebra import Value
+from mechdesign.analyses.workspace.index import Index, of_jacobian, singular_value_unit
 
-
-def evaluate(local: Local) -> Value:
-    """sigma_max."""
-    return local.singular_values[1]
-
-
-def kink(local: Local) -> Value:
-    """sigma_max = a + a sqrt(w) with a = (sigma_max + sigma_min)/2."""
-    least, largest = local.singular_values
-    return 0.5 * np.add(least, largest)
-
-
+# sigma_max = a + a sqrt(w) with a = (sigma_max + sigma_min)/2.
 INDEX = Index(
-    "sigma_max", "largest singular value of the Jacobian", of_jacobian(evaluate), singular_value_unit,
-    crossing=float("inf"), kink=kink,
+    "largest singular value of the Jacobian", of_jacobian(lambda local: local.singular_values[1]),
+    singular_value_unit, crossing=float("inf"), kink=lambda local: 0.5 * np.add(*local.singular_values),
 )  # fmt: skip
