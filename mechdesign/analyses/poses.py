@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.continuity import continuous
-from mechdesign.analyses.region.nodes import workspace_nodes
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
@@ -22,8 +21,8 @@ from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Study
-from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.poses import Poses, default, expand
+from mechdesign.study.schema.poses import PoseSection
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 CHUNK = 65536
@@ -63,6 +62,9 @@ def study_poses(study: Study, section: str) -> Poses:
     for name in dict.fromkeys((section, "kinematics")):
         asked: PoseSection | None = getattr(study, name)
         if asked is not None and asked.at_nodes:
+            # Here, for regions need SciPy, which is slow to import.
+            from mechdesign.analyses.region.nodes import workspace_nodes
+
             return workspace_nodes(study)
         if asked is not None:
             found = expand(asked, study.path.parent if study.path else Path(), turn)

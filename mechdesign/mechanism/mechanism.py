@@ -141,9 +141,7 @@ class Mechanism(Core):
         guess = roots_as_drawn(self.graph, self.geometry, plan.structure, self.sketch) if plan.iterative else None
         values = [np.asarray(g) for g in given]
         state = plan.run(values, self.geometry.nominal, guess)
-        reached = None
-        if plan.iterative:
-            reached = np.asarray(all(bool(np.all(c)) for c in state.converged))
+        reached = state.solved(()) if plan.iterative else None
         configuration = plan.configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
         if not configuration.valid:
             pose = list(zip(plan.structure.given, given, strict=True))

@@ -12,7 +12,7 @@ from mechdesign.mechanism import chunks
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
-from mechdesign.mechanism.continuation import Start, follow, unknowns_of
+from mechdesign.mechanism.continuation import Start, follow, guess_of, unknowns_of
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
@@ -20,7 +20,7 @@ from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.mechanism.structure import Structure
-from mechdesign.numerics.arrays import Flags, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
@@ -80,7 +80,8 @@ class Plan:
         size = self.core.size if self.iterative else 1.0
         return run(state, self.modes if modes is None else modes, guess, given, size, steps, enough)
 
-    def _start(self, at: Configuration | None) -> Start:
+    def start(self, at: Configuration | None) -> Start:
+        """A solved pose to continue from; the sketch where left out."""
         at = self.core.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
         guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides, at.nodes)
@@ -153,19 +154,26 @@ class Plan:
         reached: Flags | None = None
         guess: Guess | None = None
         if self.iterative:
-            begin = self._start(start)
+            begin = self.start(start)
             guess, reached = self._follow(values, dims, shape, begin)
         state = self.run(values, vectors, guess, self.modes_at(values))
         if reached is not None:
             # What the path came near to must be a pose, and of the same assembly.
-            for converged, determinant, sign in zip(state.converged, state.determinants, begin.signs, strict=True):
-                reached = reached & converged & (np.sign(determinant) == sign)
+            reached &= state.solved(shape, begin.signs)
         return self.configuration(state, shape, dims, vectors, reached, limits, values)
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """What angles are told near where no motion says more: those given as given, drives within their limits."""
         near = self.core.turns(dims)
         return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+
+    @cached_property
+    def _drawn_angles(self) -> dict[str, float]:
+        return self.core.drawn_angles()
+
+    def near_sketch(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
+        """What angles are told near where no motion says more, the others near those of the sketch."""
+        return self._drawn_angles | self.turns(given, dims)
 
     @cached_property
     def counted(self) -> frozenset[str]:
@@ -189,7 +197,7 @@ class Plan:
         begin = begin.map(flat)
         places = {name: flat(v) for name, v in dims.items()}
 
-        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Guess, Flags]:
+        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Floats, Flags]:
             def some(value: Value) -> Value:
                 return value if rows is None or np.ndim(value) == 0 else value[rows]
 
@@ -219,13 +227,8 @@ class Plan:
         rows = np.flatnonzero(turned & ~reached)
         if len(rows):
             better, there = solve(nearest, rows)
-            for k, kinds in better.items():
-                for kind, kept in zip(kinds, found[k], strict=True):
-                    for new, old in zip(kind, kept, strict=True):
-                        old[rows[there]] = new[there]
-            reached[rows] = there
-        guess = {k: ([v.reshape(shape) for v in a], [v.reshape(shape) for v in s]) for k, (a, s) in found.items()}
-        return guess, reached.reshape(shape)
+            found[:, rows[there]], reached[rows] = better[:, there], there
+        return guess_of(self.structure, found.reshape(len(found), *shape)), reached.reshape(shape)
 
     def configuration(
         self,
@@ -258,9 +261,7 @@ class Plan:
         reason = np.zeros(shape, dtype=np.int8)
         reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
         if reached is not None:
-            solved = np.ones(shape, dtype=bool)
-            for converged in state.converged:
-                solved &= converged
+            solved = state.solved(shape)
             reason[~reached & solved & (reason == Reason.OK)] = Reason.OTHER_ASSEMBLY
             reason[~reached & ~solved] = Reason.NOT_CLOSED
         nodes, rotations, slides = state.nodes, state.rotations[: graph.classes], state.slides

@@ -52,7 +52,8 @@ def run(
     return state
 
 
-def _closed_form(state: State, group: Group, mode: Value) -> None:
+def loop_vectors(state: State, group: Group) -> tuple[Value, dict[int, Value], dict[int, Value]]:
+    """Around a dyad's loop: the known vector k, and by its unknowns the vectors z that turn and the directions d."""
     structure = state.structure
     loop = group.loops[0]
     k: Value = ZERO if loop.start == loop.end else loop_gap(state, loop.start, loop.end)
@@ -73,6 +74,11 @@ def _closed_form(state: State, group: Group, mode: Value) -> None:
             k = plus(k, sign, state.turned(arm, edge.frame))
             if unknown_slide:
                 d[edge.slide or 0] = sign * state.turned(state.vectors.d[index], edge.frame)
+    return k, z, d
+
+
+def _closed_form(state: State, group: Group, mode: Value) -> None:
+    k, z, d = loop_vectors(state, group)
     if group.form == "two angles":
         first, second = group.angles
         u1, u2, closures = dyads.two_angles(k, z[first], z[second], mode)

@@ -44,6 +44,15 @@ class State:
     converged: list[Flags] = field(default_factory=list)
     determinants: list[Value] = field(default_factory=list)
 
+    def solved(self, shape: tuple[int, ...], signs: Sequence[Value] | None = None) -> Flags:
+        """Which poses of a batch converged in all groups, with determinants of these signs."""
+        found = np.ones(shape, dtype=bool)
+        for converged in self.converged:
+            found &= converged
+        for determinant, sign in zip(self.determinants, signs or (), strict=False):
+            found &= np.sign(determinant) == sign
+        return found
+
     def arm(self, k: int) -> Value:
         """Vector w + s d of an edge in the frame of its class."""
         slide = self.structure.edges[k].slide

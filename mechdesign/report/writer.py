@@ -136,7 +136,7 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[di
         }
         drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study))
         if animate:
-            from mechdesign.report.figures.animation import animation
+            from mechdesign.report.figures.kinematics.animation import animation
 
             drawings[ANIMATION] = lambda: animation(study)
         drawn, failed = render(drawings)

@@ -20,21 +20,22 @@ from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study import checks, overrides, pose_checks
-from mechdesign.study.build import build
-from mechdesign.study.builder import Builder
-from mechdesign.study.document import Document, plain, read
-from mechdesign.study.models import MechanismSection, UnitsSection
-from mechdesign.study.numbers import LOST, Context, check_parameter_name, read_number, shown
-from mechdesign.study.optimize_models import OptimizeSection
-from mechdesign.study.parameters import Parameters
-from mechdesign.study.reliability_models import ReliabilitySection
-from mechdesign.study.reporter import Reporter, unknown_key
-from mechdesign.study.sections import KinematicsSection, Requirement, StudyFile
-from mechdesign.study.stiffness_models import StiffnessSection
-from mechdesign.study.targets import Target
-from mechdesign.study.units import Units, units_from
-from mechdesign.study.workspace_models import WorkspaceSection
+from mechdesign.study import overrides
+from mechdesign.study.build.build import build
+from mechdesign.study.build.builder import Builder
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.build.section import MechanismSection, UnitsSection
+from mechdesign.study.schema import checks, pose_checks
+from mechdesign.study.schema.optimize import OptimizeSection
+from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.sections import KinematicsSection, Requirement, StudyFile
+from mechdesign.study.schema.stiffness import StiffnessSection
+from mechdesign.study.schema.targets import Target
+from mechdesign.study.schema.workspace import WorkspaceSection
+from mechdesign.study.text.document import Document, plain, read
+from mechdesign.study.text.numbers import LOST, Context, check_parameter_name, read_number, shown
+from mechdesign.study.text.reporter import Reporter, unknown_key
+from mechdesign.study.text.units import Units, units_from
 from mechdesign.threads import one_thread
 
 

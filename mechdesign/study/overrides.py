@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from mechdesign.errors import Problem, StudyError
-from mechdesign.study.document import Document, Mark, Path, dotted, parse_value
-from mechdesign.study.numbers import suggestion
-from mechdesign.study.reporter import LIST_FORM, schema_keys
-from mechdesign.study.sections import StudyFile
+from mechdesign.study.schema.sections import StudyFile
+from mechdesign.study.text.document import Document, Mark, Path, dotted, parse_value
+from mechdesign.study.text.numbers import suggestion
+from mechdesign.study.text.reporter import LIST_FORM, schema_keys
 
 MAX_LENGTH = 1000
 """Longest dotted name accepted: nothing that a person writes comes near it."""

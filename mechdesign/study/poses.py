@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.study import courses
-from mechdesign.study.path_models import Path as PathModel
-from mechdesign.study.pose_models import PoseSection, Sweep
+from mechdesign.study.schema import courses
+from mechdesign.study.schema.paths import Path as PathModel
+from mechdesign.study.schema.poses import PoseSection, Sweep
 
 MAX_POSES = 10_000_000
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from mechdesign.errors import StudyError
-from mechdesign.study import document
+from mechdesign.study.text import document
 
 if TYPE_CHECKING:
     from mechdesign.study.loading import Study

@@ -18,11 +18,11 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.model import Fixed
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study.document import Document, Mark, plain
+from mechdesign.study.build.names import GROUND
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.build.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document
-from mechdesign.study.models import LINK_KEYS
-from mechdesign.study.names import GROUND
-from mechdesign.study.parameters import Parameters
+from mechdesign.study.text.document import Document, Mark, plain
 
 # Sections whose numbers are read once, when the study is loaded.
 SECTIONS = (*(name for name in COMMANDS if name != "optimize"), "requirements")

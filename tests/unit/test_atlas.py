@@ -97,15 +97,15 @@ def test_designs_of_other_sizes_have_their_own_poses() -> None:
             assert together.values[name][k] == pytest.approx(exact.values[name][k], rel=1e-6)
 
 
-def test_grip_is_linear_through_a_fold() -> None:
+def test_fold_distance_is_linear_through_a_fold() -> None:
     """With B3.x held the angle has a fold where P.x is 0.2 beside it: squared determinant 0.2^2 - (x - lead)^2."""
     lead = 0.45
     (question,) = questions(study_of(PLATFORM.format(held=f"lead: [{lead}]", assembly="any")), wanted=("area",))
-    x = lead - 0.2 + np.array([-1e-3, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.05, 0.2])
+    x = lead - 0.2 + np.array([-1e-4, -1e-5, -1e-8, 1e-8, 1e-5, 1e-3, 0.05, 0.2])
     margins = question.field.margins(x + 0.34j, {})
-    grip = margins[[label for _, label in question.field.labels].index("continuation")]
-    assert grip[3:] == pytest.approx(0.04 - (x[3:] - lead) ** 2, rel=1e-7)
-    assert grip[:3] == pytest.approx(0.4 * (x[:3] - lead + 0.2), rel=2e-3)
+    fold_distance = margins[[label for _, label in question.field.labels].index("continuation")]
+    assert fold_distance[3:] == pytest.approx(0.04 - (x[3:] - lead) ** 2, rel=1e-7)
+    assert fold_distance[:3] == pytest.approx(0.4 * (x[:3] - lead + 0.2), rel=2e-3)
     # Before it the pose is exact; all margins are known on both sides.
     turn = question.field.configuration(x + 0.34j, {}).rotation("platform")
     assert turn[3:].imag == pytest.approx((x[3:] - lead) / 0.2, abs=1e-9)

@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 import mechdesign
 from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.allocation import allocation_figure
-from mechdesign.report.figures.errors.contributions import contributions_figure
-from mechdesign.report.figures.errors.looks import LOOKS
-from mechdesign.report.figures.errors.panels import number
+from mechdesign.report.figures.panels import number
 from mechdesign.report.figures.planes import Plane
 from mechdesign.report.figures.reliability import figures
+from mechdesign.report.figures.reliability.allocation import allocation_figure
+from mechdesign.report.figures.reliability.contributions import contributions_figure
+from mechdesign.report.figures.reliability.looks import LOOKS
 from mechdesign.results import Column, Table
-from mechdesign.study.reliability_models import METHODS
+from mechdesign.study.schema.reliability import METHODS
 
 SLIDER = """
 units: {length: mm}

@@ -11,7 +11,7 @@ from mechdesign.analyses import poses
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
-from mechdesign.study.reliability_models import METHODS
+from mechdesign.study.schema.reliability import METHODS
 
 SLIDER_CRANK = """
 mechanism:

@@ -10,7 +10,7 @@ import mechdesign
 from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import StudyError
 from mechdesign.study import schema, template, template_path, templates
-from mechdesign.study.document import read
+from mechdesign.study.text.document import read
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from mechdesign.study import units as unit_rules
-from mechdesign.study.units import QuantityError, Units, units_from
+from mechdesign.study.text import units as unit_rules
+from mechdesign.study.text.units import QuantityError, Units, units_from
 
 MM = units_from("mm", "deg", "s", "N")[0]
 SI = units_from("m", "rad", "s", "N")[0]

@@ -22,7 +22,7 @@ from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Poses, Study
-from mechdesign.study.sections import KinematicsSection
+from mechdesign.study.schema.sections import KinematicsSection
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:

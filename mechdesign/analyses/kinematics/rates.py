@@ -17,8 +17,8 @@ from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.reliability_models import ReliabilitySection
-from mechdesign.study.sections import KinematicsSection
+from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.sections import KinematicsSection
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from mechdesign.commands import COMMANDS
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
-from mechdesign.study.optimize_models import Condition, OptimizeSection
+from mechdesign.study.schema.optimize import Condition, OptimizeSection
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
-from mechdesign.study.units import QUANTITY
+from mechdesign.study.text.units import QUANTITY
 from mechdesign.study.variants import follows, places_of
 
 Formulas = Mapping[tuple[int, str], Expression]

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from mechdesign.analyses.workspace.atlas import Atlas, hidden
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import determinants
@@ -62,21 +62,15 @@ class Field:
         """
         given: list[Value] = [z.real, z.imag, *self.held]
         if self.plan.iterative:
-            found, grip = self._atlas.solve(z, places)
-            return found if (grip > 0).all() else hidden(found, ~(grip > 0))
+            return self._atlas.solve(z, places)[0]
         vectors = self.mechanism.geometry.vectors(places)
         state = self.plan.run(given, vectors, None)
         graph = self.mechanism.graph
         return Configuration(
             graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros((), dtype=np.int8), places,
-            self._drawn | self.plan.turns(given, places),
+            self.plan.near_sketch(given, places),
         )  # fmt: skip
-
-    @cached_property
-    def _drawn(self) -> dict[str, float]:
-        """Angles of the sketch: others lie within half a turn of them."""
-        return self.mechanism.drawn_angles()
 
     @property
     def rootless(self) -> bool:
@@ -94,21 +88,24 @@ class Field:
         """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             if self.plan.iterative:
-                configuration, grip = self._atlas.solve(z, places)
+                configuration, fold_distance = self._atlas.solve(z, places, beyond=True)
             else:
                 configuration = self.configuration(z, places)
             found = [*configuration.closures]
             found += [configuration.slides[slide] for slide in self.mechanism.graph.telescopic]
             found += [margin for _, margin in self.mechanism.margins(configuration)]
             if self.plan.iterative:
-                found.append(grip)
+                found.append(fold_distance)
             if self.same_assembly and assembly:
                 signs = self._signs
                 found += [s * d for s, d in zip(signs, self._determinants(configuration), strict=True)]
         if self.plan.iterative:
             # Where nothing is reached one margin says so, and the others have no end of their own there.
-            lost = np.isnan(grip)
-            found = [margin if margin is grip else np.where(lost & np.isnan(margin), 1.0, margin) for margin in found]
+            lost = np.isnan(fold_distance)
+            found = [
+                margin if margin is fold_distance else np.where(lost & np.isnan(margin), 1.0, margin)
+                for margin in found
+            ]
         stacked = np.empty((len(found), *z.shape))
         for row, margin in zip(stacked, found, strict=True):
             row[...] = margin
@@ -118,8 +115,7 @@ class Field:
     def labels(self) -> tuple[tuple[str, str], ...]:
         """Kind (``singularity`` or ``limit``) and name of each margin."""
         mechanism = self.mechanism
-        at = np.asarray(complex(*(float(mechanism.sketch_configuration.value(c)) for c in self.outputs[:2])))
-        configuration = self.configuration(at, {})
+        configuration = self.configuration(self.surroundings[0], {})
         found = [("singularity", name) for name in self._closure_names()]
         found += [("singularity", f"{mechanism.graph.slides[s]} length") for s in mechanism.graph.telescopic]
         found += [("limit", label) for label, _ in mechanism.margins(configuration)]
@@ -150,14 +146,17 @@ class Field:
         return names
 
     @cached_property
-    def closing(self) -> int:
-        """Number of leading margins that say whether the mechanism can be assembled at all."""
-        return sum(1 for kind, name in self.labels if kind == "singularity" and not name.startswith("assembly"))
-
-    @cached_property
     def _signs(self) -> list[float]:
         sketch = self.mechanism.sketch_configuration
         return [float(np.sign(d)) for d in self._determinants(sketch)]
+
+    @cached_property
+    def surroundings(self) -> Complexes:
+        """The point's place in the sketch, and places at some distances from it."""
+        turn, share = np.meshgrid(np.exp(1j * np.linspace(0, 2 * np.pi, 24, endpoint=False)), SHARES)
+        drawn = self.mechanism.sketch_configuration
+        at = complex(*(float(drawn.value(c)) for c in self.outputs[:2]))
+        return np.append(at, at + self.mechanism.size * (turn * share).ravel())
 
     @cached_property
     def rounding(self) -> Floats:
@@ -168,11 +167,7 @@ class Field:
         """
         found = np.zeros(len(self.labels))
         if self.same_assembly:
-            turn, share = np.meshgrid(np.exp(1j * np.linspace(0, 2 * np.pi, 24, endpoint=False)), SHARES)
-            drawn = self.mechanism.sketch_configuration
-            at = complex(*(float(drawn.value(c)) for c in self.outputs[:2]))
-            around = np.append(at, at + self.mechanism.size * (turn * share).ravel())
-            sizes = np.abs(Field.margins(self, around, {}))[-len(self._signs) :]
+            sizes = np.abs(Field.margins(self, self.surroundings, {}))[-len(self._signs) :]
             found[-len(self._signs) :] = ROUNDING * np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
         return found
 

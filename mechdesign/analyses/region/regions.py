@@ -11,7 +11,7 @@ from mechdesign.analyses.jacobians import mixes
 from mechdesign.analyses.region.field import Field
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import Over, WorkspaceSection
+from mechdesign.study.schema.workspace import Over, WorkspaceSection
 
 # Rays of the tables of local indices and of the boundary, unless the study says how many.
 RAYS = 181

@@ -16,9 +16,9 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.study import Study
-from mechdesign.study.lists import as_list
-from mechdesign.study.pin_links import others
-from mechdesign.study.reliability_models import ReliabilitySection, split_order
+from mechdesign.study.schema.lists import as_list
+from mechdesign.study.schema.pin_links import others
+from mechdesign.study.schema.reliability import ReliabilitySection, split_order
 
 
 @dataclass(frozen=True, eq=False)

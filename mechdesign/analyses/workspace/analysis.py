@@ -10,13 +10,13 @@ import numpy as np
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.panels import SINGLE
 from mechdesign.analyses.region.regions import RAYS
-from mechdesign.analyses.workspace.degenerate import singular_everywhere, without_indices
 from mechdesign.analyses.workspace.index import determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
 from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
 from mechdesign.analyses.workspace.question import COLUMNS, Answer, Question, answer, areas_of_pieces, questions, split
+from mechdesign.analyses.workspace.singularities import singular_everywhere
 from mechdesign.analyses.workspace.tables import (
     PIECE,
     held_columns,
@@ -32,7 +32,7 @@ from mechdesign.indices import index
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import Over
+from mechdesign.study.schema.workspace import Over
 from mechdesign.threads import one_thread
 
 # An error of the area beyond this part of it is told.
@@ -76,9 +76,11 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     several = False
     warnings: list[str] = []
     for question in asked:
-        if singular_everywhere(question):
+        if singular_everywhere(question.field):
             question = replace(question, field=replace(question.field, same_assembly=False))
-            given = without_indices(question, SINGLE)
+            given = answer(replace(question, indices=(), wanted=("SUI", "area", "box_area")), {}, 1, SINGLE)
+            nothing = {name: np.full(1, np.nan) for name in question.wanted}
+            given = replace(given, values=nothing | given.values, errors=nothing | given.errors)
             warnings.append(f"every pose{where(question)} is a forward singularity: indices have no value")
         else:
             given = answer(question, {}, 1, SINGLE)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch
 from mechdesign.analyses.workspace.inscribed import Circle, Rectangle
-from mechdesign.analyses.workspace.loci import around, causes, inside
 from mechdesign.analyses.workspace.question import Question
+from mechdesign.analyses.workspace.singularities import around, causes, inside
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from mechdesign.errors import StudyError
-from mechdesign.study.numbers import suggestion
+from mechdesign.study.text.numbers import suggestion
 
 _FOLDER = Path(__file__).parent
 
