@@ -9,7 +9,7 @@ import pytest
 
 import mechdesign
 from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.optimize.judge import Designs
+from mechdesign.analyses.optimize.judge import JudgedDesigns
 from mechdesign.analyses.optimize.tables import Comparison
 from mechdesign.analyses.optimize.variables import grid
 from mechdesign.errors import AssemblyError, StudyError
@@ -52,7 +52,9 @@ def compare(values: list[float], *, smallest: bool = False, feasible: int | None
     one, count = goal("kinematics.P.x", smallest=smallest), len(values)
     codes = np.where(np.arange(count) < (count if feasible is None else feasible), 0, 1).astype(np.int32)
     study = mechdesign.load(CONFIGS / "two_link_arm.yaml")
-    designs = Designs({"r1": np.arange(count) + 1.0}, (one,), (), {one: np.array(values)}, {}, codes, ["", "lost"])
+    designs = JudgedDesigns(
+        {"r1": np.arange(count) + 1.0}, (one,), (), {one: np.array(values)}, {}, codes, ["", "lost"]
+    )
     return Comparison(study, designs, np.ones((1, 1)), {})
 
 
@@ -131,7 +133,8 @@ def test_a_goal_that_no_result_has() -> None:
 
 
 def test_threads_do_not_change_a_bit() -> None:
-    study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.variables.l_min.step=0.09"])
+    steps = ("optimize.variables.l_min.step=0.09", "optimize.variables.l_a.step=0.06")
+    study = mechdesign.load(CONFIGS / "two_rrr.yaml", steps)
     one, two = (mechdesign.optimize(study, jobs=jobs).tables["designs"] for jobs in (1, 2))
     assert len(one) > 512
     for column in one.columns:

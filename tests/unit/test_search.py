@@ -12,7 +12,7 @@ from helpers.syntheses import OPEN, PROBLEMS, held_height, timed_path, tray
 import mechdesign
 from mechdesign.analyses.optimize.analysis import _doubts
 from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.explorer import Explorer, Objective, Outcome, Part, Spent
+from mechdesign.analyses.optimize.explorer import Explorer, Part, Scores, Spent
 from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.optimize.lockstep import side_by_side
 from mechdesign.analyses.optimize.search import Ending, search
@@ -35,7 +35,7 @@ optimize:
   minimize: kinematics.P.x
   subject_to: [{result: kinematics.P.y, at_least: 12}]
 """
-FIRST = Objective(np.ones(1))
+FIRST = np.ones(1)
 C30, S30 = np.sqrt(3) / 2, 0.5
 
 
@@ -53,7 +53,7 @@ def rastrigin(u):
 
 def explorer(function, dimensions, margins=None, budget=3000):
     return Explorer(
-        lambda u: Outcome(
+        lambda u: Scores(
             function(u).reshape(len(u), -1),
             np.empty((len(u), 0)) if margins is None else margins(u),
             np.empty((len(u), 0)),
@@ -115,7 +115,7 @@ def worst_of(rows, dimensions, margins=None):
     def outcome(u):
         found = rows(u)
         values = np.abs(found).max(axis=1, keepdims=True)
-        return Outcome(values, np.empty((len(u), 0)) if margins is None else margins(u), found)
+        return Scores(values, np.empty((len(u), 0)) if margins is None else margins(u), found)
 
     places = slice(0, rows(np.zeros((1, dimensions))).shape[1])
     known = Explorer(outcome, dimensions, 5000, [Part(0, 1.0, True, places)])
@@ -150,13 +150,13 @@ def test_two_worst_rows_weighed_under_a_condition_that_is_one():
     def outcome(u):
         off = u - 0.5
         rows = np.concatenate([off, -off, u], axis=1)
-        return Outcome(np.abs(off), 0.4 - u.max(axis=1, keepdims=True), rows)
+        return Scores(np.abs(off), 0.4 - u.max(axis=1, keepdims=True), rows)
 
     parts = [Part(0, 1.0, False, slice(0, 3, 2)), Part(1, 1.0, False, slice(1, 4, 2)),
              Part(2, 1.0, False, slice(4, 6), bound=0.4)]  # fmt: skip
     known = Explorer(outcome, 2, 5000, parts)
     assert search(known, [True, True], [[1.0, 3.0]], 0).checked
-    best = int(np.argmin(known.known.merit(Objective(np.array([1.0, 3.0])))))
+    best = int(np.argmin(known.known.merit(np.array([1.0, 3.0]))))
     assert known.known.u[best] == pytest.approx([0.4, 0.4], abs=1e-8)
 
 

@@ -18,20 +18,21 @@ from mechdesign.threads import one_thread
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 
-def texts(command, study, **options):
-    result = getattr(mechdesign, command)(mechdesign.load(study), **options)
+def texts(command, study, changes, **options):
+    result = getattr(mechdesign, command)(mechdesign.load(study, changes), **options)
     return {name: to_csv(table) for name, table in result.tables.items()} | dict(result.files)
 
 
 @pytest.mark.parametrize(
-    ("command", "name", "jobs"), [("workspace", "two_rpr", 1), ("optimize", "gallery/path_synthesis", 2)]
+    ("command", "name", "changes", "jobs"),
+    [("workspace", "two_rpr", [], 1), ("optimize", "gallery/path_synthesis", ["optimize.evaluations=500"], 2)],
 )
-def test_tables_do_not_depend_on_threads(command, name, jobs):
+def test_tables_do_not_depend_on_threads(command, name, changes, jobs):
     study = CONFIGS / f"{name}.yaml"
     found = []
     for threads in (1, 2):
         with threadpool_limits(threads, user_api="blas"):
-            found.append(texts(command, study, jobs=jobs))
+            found.append(texts(command, study, changes, jobs=jobs))
     assert found[0] == found[1]
 
 

@@ -65,11 +65,11 @@ def local(study: Study, *places: complex) -> dict[str, np.ndarray]:
 
 def arm_statistics() -> dict[str, float]:
     """Over the ring of a two-link arm, for indices of q2 alone: the area element is l1 l2 |sin q2| dq1 dq2."""
-    nodes, weights = np.polynomial.legendre.leggauss(4000)
-    # Split at isotropy, where the singular values meet.
+    nodes, weights = np.polynomial.legendre.leggauss(300)
+    # Split at isotropy, where the singular values meet; largest and smallest values lie there or at the ends.
     edges = [0.0, 0.75 * np.pi, np.pi]
-    q = np.concatenate([0.5 * (b + a) + 0.5 * (b - a) * nodes for a, b in pairwise(edges)])
-    w = np.concatenate([0.5 * (b - a) * weights for a, b in pairwise(edges)])
+    q = np.concatenate([edges, *(0.5 * (b + a) + 0.5 * (b - a) * nodes for a, b in pairwise(edges))])
+    w = np.concatenate([np.zeros(3), *(0.5 * (b - a) * weights for a, b in pairwise(edges))])
     jacobian = np.empty((len(q), 2, 2))
     jacobian[:, 0, 1] = jacobian[:, 1, 1] = 0.0
     jacobian[:, 0] = np.stack([-L2 * np.sin(q), -L2 * np.sin(q)], axis=-1)

@@ -11,7 +11,7 @@ from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer
 from mechdesign.analyses.optimize.files import optimum_files
-from mechdesign.analyses.optimize.judge import Designs, Judge, judged_of
+from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns, judged_of
 from mechdesign.analyses.optimize.sensitivity import active_bounds, sensitivity_table
 from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
 from mechdesign.analyses.optimize.variables import grid, in_words
@@ -25,8 +25,9 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.threads import one_thread
 
-# Numbers of rows that a search keeps.
+# Numbers that a search keeps of the rows behind its goals.
 MOST_KEPT = 10_000_000
+# Reasons of infeasible designs that are told one by one.
 MOST_REASONS = 10
 
 
@@ -72,7 +73,7 @@ def optimize(
     evaluator = Evaluator(study, (*goals, *conditions), graded=section.method != "grid")
     meanings = index_meanings(study, evaluator.question) if evaluator.question is not None else {}
     budget = section.evaluations or (
-        pareto.ALLOWANCE * len(goals)
+        pareto.DEFAULT_EVALUATIONS * len(goals)
         if section.method == "pareto"
         else searching.allowance(len(section.variables), len(weights), len(goals), slow=evaluator.slow)
     )
@@ -122,14 +123,14 @@ def _ask(
     judge.progress.start(budget, "designs")
     # Values of a workspace are known to a tolerance only.
     rough = evaluator.question is not None
-    explorer = Explorer(judge.outcome, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
+    explorer = Explorer(judge.scores, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
     if section.method == "search":
-        patient = section.evaluations is not None
-        return tuple(_doubts(searching.search(explorer, smallest, weights.tolist(), seed, patient=patient), budget))
+        use_all = section.evaluations is not None
+        return tuple(_doubts(searching.search(explorer, smallest, weights.tolist(), seed, use_all=use_all), budget))
     # The ends of the front, and what is best on the whole, are searched for; between them it is spread.
     explorer.left = budget // 2
     ones = np.ones((1, len(smallest)))
-    searching.search(explorer, smallest, [*np.eye(len(smallest)).tolist(), *ones.tolist()], seed, patient=False)
+    searching.search(explorer, smallest, [*np.eye(len(smallest)).tolist(), *ones.tolist()], seed, use_all=False)
     explorer.left += budget - budget // 2
     pareto.spread(explorer, np.where(smallest, 1.0, -1.0), seed)
     return ()
@@ -142,17 +143,17 @@ def _doubts(ending: searching.Ending, budget: int) -> Iterator[str]:
         yield f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
     for row, (ends, rounding) in enumerate(zip(ending.ends, ending.rounding, strict=True)):
         found = ends[np.isfinite(ends)]
-        far = max(searching.AGREE * np.abs(found).min(initial=np.inf), rounding)
+        far = max(searching.AGREEMENT * np.abs(found).min(initial=np.inf), rounding)
         agree = np.abs(found - found.min(initial=np.inf)) <= far
         if len(ends) > 1 and agree.sum() < len(ends):
             of = f" for row {row + 1} of the weights" if len(ending.ends) > 1 else ""
             lost = f", {len(ends) - len(found)} found no feasible design" if len(found) < len(ends) else ""
             spread = f"between {abs(found).min():.6g} and {abs(found).max():.6g}" if len(found) else "nowhere"
             yield (f"the {len(ends)} starts of the search{of} ended {spread}, {agree.sum()} of them within "
-                   f"{100 * searching.AGREE:g} % of the best{lost}; {more}")  # fmt: skip
+                   f"{100 * searching.AGREEMENT:g} % of the best{lost}; {more}")  # fmt: skip
 
 
-def _none_feasible(designs: Designs) -> str:
+def _none_feasible(designs: JudgedDesigns) -> str:
     reasons = designs.counted()
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
@@ -160,13 +161,13 @@ def _none_feasible(designs: Designs) -> str:
     return f"no design of {len(designs)} is feasible: {told}"
 
 
-def _finished_part(study: Study, designs: Designs, meanings: Mapping[str, tuple[str, str]]) -> Result:
+def _finished_part(study: Study, designs: JudgedDesigns, meanings: Mapping[str, tuple[str, str]]) -> Result:
     table = designs_table(Comparison(study, designs, np.ones((1, len(designs.goals))), meanings))
     told = f"interrupted after {len(designs)} designs; --resume goes on"
     return Result("optimize", {table.name: table}, (told,), {"designs": len(designs)}, interrupted=told)
 
 
-def _warnings(study: Study, evaluator: Evaluator, designs: Designs) -> Iterator[str]:
+def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Iterator[str]:
     reasons = designs.counted()
     for reason, count, first in reasons[:MOST_REASONS]:
         row = {name: float(column[first]) for name, column in designs.variables.items()}

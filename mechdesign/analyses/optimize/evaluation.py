@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -22,15 +23,17 @@ from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyErro
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Result
-from mechdesign.rows import UnknownColumnError, choose
+from mechdesign.rows import Chosen, UnknownColumnError, choose
 from mechdesign.study import Study
 from mechdesign.study.variants import faults, follows, variant
 
-EMPTY = "nothing of the workspace can be reached"
-# Tables that may be of some poses only.
-SOME = ("extremes",)
+# Poses of all designs that are solved together: their arrays fit the cache.
+BLOCK = 65536
+NO_REGION = "nothing of the workspace can be reached"
+# Tables that may be of some of the poses only.
+OF_SOME_POSES = ("extremes",)
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
-# By `mechdesign.mechanism.Reason`.
+# Why a pose fails, by `mechdesign.mechanism.Reason`.
 FAILED = np.array([
     "",
     "a pose cannot be assembled",
@@ -110,13 +113,13 @@ class Evaluator:
         problems = [problem for command in commands for problem in self._look(command)]
         if problems:
             raise StudyError(problems)
-        self._formulas = {command: stacked.formulas_of(study, command) for command in self._together}
+        self._poses = {command: stacked.poses_of(study, command) for command in self._together}
         # By command of which every pose must be valid: the number of its assembly margins.
         clear: dict[str, int] = {}
         for command, tables in self._together.items() if graded else ():
-            poses = study_poses(study, command)
-            if poses.listed or any(table not in SOME for table in tables):
-                clear[command] = assembly_margins(study, poses).shape[1]
+            poses = self._poses[command](1, {}, {})
+            if poses.listed or any(table not in OF_SOME_POSES for table in tables):
+                clear[command] = assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
         self.layout = Layout(self.goals, self._rows, clear)
         if not graded:
             self.limit_rows(0)
@@ -139,46 +142,43 @@ class Evaluator:
             yield self.study.problem("an optimisation cannot judge itself", *self._key(goals[0]))
             return
         assert self.study.optimize is not None
+        together = command in stacked.TABLES and stacked.possible(self.study, command, self.study.optimize.variables)
         if command in stacked.TABLES:
-            result = stacked.tables(self.study, command, stacked.TABLES[command], 1, {}, {}).result
-            together = stacked.possible(self.study, command, self.study.optimize.variables)
+            poses = stacked.poses_of(self.study, command)(1, {}, {})
+            result = stacked.tables(self.study, command, stacked.TABLES[command], poses).result
             for each in list(goals):
-                try:
-                    chosen = choose(result, each.column, dict(each.where))
-                    self._count(each, result)
-                except UnknownColumnError:
-                    continue
-                goals.remove(each)
-                table = chosen.table.name
-                if table == "extremes":
-                    self._outputs.update(chosen.table["output"][chosen.counts].tolist())
-                if together:
-                    self._together.setdefault(command, {}).setdefault(table, []).append(each)
-                else:
-                    self._alone.setdefault(command, []).append(each)
+                with suppress(UnknownColumnError):
+                    chosen = self._count(each, result)
+                    goals.remove(each)
+                    if chosen.table.name == "extremes":
+                        self._outputs.update(chosen.table["output"][chosen.counts].tolist())
+                    if together:
+                        self._together.setdefault(command, {}).setdefault(chosen.table.name, []).append(each)
+                    else:
+                        self._alone.setdefault(command, []).append(each)
         if not goals:
             return
         self._alone.setdefault(command, []).extend(goals)
-        try:
+        # Where the study's own design has no such result, others tell.
+        with suppress(AssemblyError):
             result = look(self.study, command)
-        except AssemblyError:
-            # The study's own design has no such result; others tell.
-            return
-        for each in goals:
-            try:
-                self._count(each, result)
-            except UnknownColumnError as error:
-                yield self.study.problem(str(error), *self._key(each))
+            for each in goals:
+                try:
+                    self._count(each, result)
+                except UnknownColumnError as error:
+                    yield self.study.problem(str(error), *self._key(each))
 
-    def _count(self, each: Goal, result: Result) -> None:
+    def _count(self, each: Goal, result: Result) -> Chosen:
         """Note how many rows a goal is the worst of, or the root mean square, by the study's own design."""
-        if missing := choose(result, each.column, dict(each.where)).missing:
-            raise UnknownColumnError(missing)
+        chosen = choose(result, each.column, dict(each.where))
+        if chosen.missing:
+            raise UnknownColumnError(chosen.missing)
         _, rows, squares = each.judge(result)
         if squares:
             self.squares.add(each)
         if rows is not None and (squares or rows.size > 1):
             self._rows[each] = rows.size
+        return chosen
 
     def _key(self, wanted: Goal) -> tuple[str | int, ...]:
         """Where the study names a goal."""
@@ -196,7 +196,7 @@ class Evaluator:
         if self.question is not None and self._regions_together:
             self._regions(batch, batch.feasible, self.question, batch.places)
         for command, tables in self._together.items():
-            rows, size = batch.feasible, stacked.size(self.study, command)
+            rows, size = batch.feasible, max(1, BLOCK // self._poses[command](1, {}, {}).count)
             for begin in range(0, len(rows), size):
                 self._tables(batch, command, tables, rows[begin : begin + size])
         alone = bool(self._alone) or not self._regions_together
@@ -226,20 +226,23 @@ class Evaluator:
             batch.table[rows, column] = given.values[each.column]
             if split(each.column)[1] == "mean":
                 batch.table[rows, len(self.goals) + column] = given.errors[each.column]
-        batch.note(rows, ~(given.panels.closes & (given.values["area"] > 0)), EMPTY)
+        batch.note(rows, ~(given.panels.closes & (given.values["area"] > 0)), NO_REGION)
 
     def _tables(self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints) -> None:
-        places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
+        poses = self._poses[command](len(rows), batch.take(batch.places, rows), batch.take(batch.parameters, rows))
         wanted = {*tables, "motion"} if self.squares.intersection(*tables.values()) else set(tables)
-        stack = stacked.tables(self.study, command, wanted, len(rows), places, parameters, self._outputs,
-                               self._formulas[command], graded=self._graded)  # fmt: skip
+        stack = stacked.tables(self.study, command, wanted, poses, self._outputs)
         failed = FAILED[_first(stack.reason)]
         wrong = stack.reason != 0
         # The errors of the poses that are left would be the smaller the more of them are lost.
-        whole = stack.listed or "targets" in tables
+        whole = poses.listed or "targets" in tables
         batch.note(rows, wrong.any(axis=1) if whole else wrong.all(axis=1), failed)
-        if self._graded:
-            self._grade(batch, command, rows, stack.assembly_margins)
+        clear = self.layout.assembly.get(command)
+        if self._graded and (clear is not None or (batch.reasons[rows] != "").any()):
+            margins = assembly_margins(self.study, poses, stack.solved or solve_poses(self.study, poses))
+            batch.table[rows, self.layout.shortfall] = shortfall(margins)
+            if clear is not None:
+                batch.table[rows, clear] = margins
         for table, goals in tables.items():
             left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
             for each in goals:
@@ -247,20 +250,6 @@ class Evaluator:
                 batch.note(rows, lost & (failed != ""), failed)
             for k in rows[left].tolist():
                 batch.left.setdefault(k, {}).setdefault(command, []).extend(goals)
-
-    def _grade(self, batch: _Batch, command: str, rows: Ints, margins: Floats | None) -> None:
-        """Note how far some designs are from assembling; where that is not known, of those whose poses are needed."""
-        clear = self.layout.assembly.get(command)
-        if margins is None:
-            rows = rows if clear is not None else rows[batch.reasons[rows] != ""]
-            if not len(rows):
-                return
-            places, parameters = batch.take(batch.places, rows), batch.take(batch.parameters, rows)
-            poses = stacked.poses_of(self.study, command, len(rows), places, parameters, self._formulas[command])
-            margins = assembly_margins(self.study, poses)
-        batch.table[rows, self.layout.shortfall] = shortfall(margins)
-        if clear is not None:
-            batch.table[rows, clear] = margins
 
     def _needed(self, study: Study) -> Study:
         """The study without what no goal asks and costs much more than the goals: tolerances, Sobol' indices."""
@@ -302,7 +291,7 @@ class Evaluator:
     def _pose_reason(self, batch: _Batch, k: int, study: Study, command: str) -> str:
         """Why poses of one design fail, empty where none does; notes how far they are from assembling."""
         if command == "workspace":
-            return EMPTY
+            return NO_REGION
         poses = study_poses(study, command)
         solved = list(solve_poses(study, poses))
         if self._graded:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
-from mechdesign.analyses.optimize.explorer import ASSEMBLY, Outcome, Part
+from mechdesign.analyses.optimize.explorer import ASSEMBLY, Part, Scores
 from mechdesign.analyses.optimize.goals import Goal, bounds_of, goals_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube
 from mechdesign.journal import Journal, digest
@@ -19,13 +19,14 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.progress import Progress
 from mechdesign.study import Study
 
-# Designs evaluated together: enough that arrays are long, few enough that the workers end together; and where designs
-# cost much and few are asked at once.
-CHUNK, SMALL_CHUNK = 384, 16
+# Designs evaluated together: enough that arrays are long, few enough that the workers end together.
+CHUNK = 384
+# The same where designs cost much and a search asks for few at once.
+SMALL_CHUNK = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Designs:
+class JudgedDesigns:
     """Designs and what was found of them.
 
     Parameters
@@ -115,7 +116,7 @@ class Judge:
             found.append(Part(ASSEMBLY, -1.0, False, slice(margins.start - head, margins.stop - head)))
         return found
 
-    def outcome(self, u: Floats) -> Outcome:
+    def scores(self, u: Floats) -> Scores:
         """Evaluate points of the unit cube."""
         designs, given = from_cube(self.study, u)
         found = np.full((len(u), self.layout.width), np.nan)
@@ -123,7 +124,7 @@ class Judge:
             found[given] = self.evaluate({name: column[given] for name, column in designs.items()})
         values = np.where(found[:, [self.layout.code]] > 0, np.nan, found[:, self.layout.values])
         margins = [each.margin(values[:, self.layout.column[each]]) for each in self.conditions]
-        return Outcome(
+        return Scores(
             values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
             found[:, self.layout.head :], found[:, self.layout.shortfall],
         )  # fmt: skip
@@ -159,13 +160,13 @@ class Judge:
         found.table[:, self.layout.code] = codes
         return found.table
 
-    def designs(self) -> Designs:
+    def designs(self) -> JudgedDesigns:
         """Everything evaluated so far."""
         head = self.layout.head
         found = np.concatenate([np.empty((0, head)), *(rows[:, :head] for rows in self._found)])
         asked = np.concatenate([np.empty((0, len(self._names))), *self._asked])
         errors = zip(self.layout.column, found[:, self.layout.errors].T, strict=True)
-        return Designs(
+        return JudgedDesigns(
             dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
             dict(zip(self.layout.column, found[:, self.layout.values].T, strict=True)),
             {each: column for each, column in errors if not np.isnan(column).all()},

@@ -10,11 +10,14 @@ from mechdesign.analyses.optimize.tables import Comparison
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table
 
-# Evaluations for each goal where the study says none, and how many generations a population is given of them.
-ALLOWANCE, GENERATIONS = 1200, 25
+# Evaluations for each goal where the study says none.
+DEFAULT_EVALUATIONS = 1200
+# Generations that a population is given of those that are left.
+GENERATIONS = 25
+SMALLEST_POPULATION = 8
+LARGEST_POPULATION = 200
 # Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ.
-CLOSE = 1e-4
-SMALLEST_POPULATION, LARGEST_POPULATION = 8, 200
+SAME_DESIGN = 1e-4
 
 
 def spread(explorer: Explorer, signs: Floats, seed: int) -> None:
@@ -99,11 +102,11 @@ def normalised(values: Floats) -> Floats:
 
 
 def distinct(values: Floats) -> Ints:
-    """Rows of a front, its ends among them, of which no two are closer than `CLOSE` in every goal."""
+    """Rows of a front, its ends among them, of which no two are closer than `SAME_DESIGN` in every goal."""
     share = normalised(values)
     kept: list[int] = []
     for k in (*_ends(share), *range(len(share))):
-        if (np.abs(share[kept] - share[k]).max(axis=1, initial=0.0) > CLOSE).all():
+        if (np.abs(share[kept] - share[k]).max(axis=1, initial=0.0) > SAME_DESIGN).all():
             kept.append(k)
     return np.sort(np.array(kept, dtype=np.intp))
 
@@ -139,13 +142,9 @@ def crowding(values: Floats) -> Floats:
 
     Infinite at the ends [Deb et al., 2002].
     """
-    share = normalised(values)
-    distance = np.zeros(len(share))
-    for column in share.T:
-        order = np.argsort(column, kind="stable")
-        distance[order[[0, -1]]] = np.inf
-        distance[order[1:-1]] += column[order[2:]] - column[order[:-2]]
-    return distance
+    from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
+
+    return np.asarray(calc_crowding_distance(values) * values.shape[1])
 
 
 def pareto_table(compared: Comparison) -> tuple[Table, int]:

@@ -12,7 +12,7 @@ from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
 # How near a bound is at it, as a fraction of the variable's range, or of a condition's bound.
-AT = 1e-4
+AT_BOUND = 1e-4
 
 
 def active_bounds(study: Study, compared: Comparison) -> list[str]:
@@ -27,14 +27,14 @@ def active_bounds(study: Study, compared: Comparison) -> list[str]:
     held: list[list[str]] = [[] for _ in rows]
     for name in at:
         low, high = bounds(study, at, name, len(rows))
-        near = AT * (high - low) + ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        near = AT_BOUND * (high - low) + ROUNDING * np.maximum(np.abs(low), np.abs(high))
         above = np.maximum(near, step[name] * (1 - 1e-6)) if study.optimize.method == "grid" else near
         for k, words in enumerate(held):
             sides = ["from"] * bool(at[name][k] - low[k] <= near[k]) + ["to"] * bool(high[k] - at[name][k] <= above[k])
             words += [f"{name} {' and '.join(sides)}"] if sides else []
     for each in designs.conditions:
         values = designs.values[each]
-        far = AT * max(abs(each.bound), np.ptp(values[designs.feasible]))
+        far = AT_BOUND * max(abs(each.bound), np.ptp(values[designs.feasible]))
         for words, value in zip(held, values[rows].tolist(), strict=True):
             words += [each.name] if abs(value - each.bound) <= far else []
     return [", ".join(words) for words in held]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,23 +13,17 @@ from mechdesign.analyses.kinematics import analysis as kinematics
 from mechdesign.analyses.kinematics.motion import Motion, asked
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.kinematics.transmission import transmission_table
-from mechdesign.analyses.optimize.assembling import assembly_margins
 from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
 from mechdesign.expressions import Expression
 from mechdesign.linearity import is_linear
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Flags
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
 from mechdesign.study.text.units import QUANTITY
 from mechdesign.study.variants import follows, places_of
-
-Formulas = Mapping[tuple[int, str], Expression]
-
-# Poses of all designs that are solved together: their arrays fit the cache.
-BLOCK = 65536
 
 _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
     "motion": kinematics.motion_table,
@@ -46,27 +39,23 @@ TABLES: Mapping[str, Collection[str]] = {
 ALSO_READ: Mapping[str, str] = {"kinematics": "workspace", "stiffness": "kinematics", "reliability": "kinematics"}
 
 
-@dataclass(frozen=True, eq=False)
-class Stack:
+class Stack(NamedTuple):
     """Tables of some designs.
 
     Parameters
     ----------
     reason : int8 array, shape (designs, poses)
         See `mechdesign.mechanism.Reason`.
-    listed : bool
-        Whether a person listed the poses, so that each of them must be valid.
     open : mapping of str to bool array, shape (designs,)
         By table, the designs that it does not answer for.
-    assembly_margins : ndarray, shape (designs, margins), or None
-        As `assembling.assembly_margins` gives them; None where they were not asked for, or would have to be solved for.
+    solved : list of SolvedPoses
+        The poses, where the command solves them as they are; else empty.
     """
 
     result: Result
     reason: NDArray[np.int8]
-    listed: bool
     open: Mapping[str, Flags]
-    assembly_margins: Floats | None = None
+    solved: list[SolvedPoses]
 
 
 def possible(study: Study, command: str, names: Collection[str]) -> bool:
@@ -124,7 +113,27 @@ def _first_order(study: Study, names: Collection[str]) -> bool:
     return True
 
 
-def formulas_of(study: Study, command: str) -> Formulas:
+def poses_of(
+    study: Study, command: str
+) -> Callable[[int, Mapping[str, ArrayLike], Mapping[str, ArrayLike]], Poses]:  # fmt: skip
+    """A function of a number of designs and their places and parameters, of shape (designs,), to a command's poses."""
+    one, formulas = study_poses(study, command), _formulas(study, command)
+
+    def of(designs: int, places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> Poses:
+        poses = stacked(one, designs, places, parameters)
+        values: Mapping[str, Any] = {**study.parameters.nominal, **parameters}
+        for group in poses.groups if formulas else ():
+            which = group.rows.reshape(designs, -1)[0]
+            for column, k in enumerate(which.tolist()):
+                for name in group.names:
+                    if (k, name) in formulas:
+                        group.values[name].reshape(designs, -1)[:, column] = formulas[k, name].evaluate(values)
+        return poses
+
+    return of
+
+
+def _formulas(study: Study, command: str) -> Mapping[tuple[int, str], Expression]:
     """Expressions of a command's listed poses, by the pose's number and the coordinate."""
     for name in dict.fromkeys((command, "kinematics")):
         section = getattr(study, name)
@@ -139,50 +148,22 @@ def formulas_of(study: Study, command: str) -> Formulas:
     return {}
 
 
-def poses_of(
-    study: Study, command: str, designs: int, places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike],
-    formulas: Formulas,
-) -> Poses:  # fmt: skip
-    """Poses of a command for designs whose places and parameters have the given values, of shape (designs,)."""
-    poses = stacked(study_poses(study, command), designs, places, parameters)
-    values: Mapping[str, Any] = {**study.parameters.nominal, **parameters}
-    for group in poses.groups if formulas else ():
-        which = group.rows.reshape(designs, -1)[0]
-        for column, k in enumerate(which.tolist()):
-            for name in group.names:
-                if (k, name) in formulas:
-                    group.values[name].reshape(designs, -1)[:, column] = formulas[k, name].evaluate(values)
-    return poses
-
-
-def size(study: Study, command: str) -> int:
-    """Number of designs that are solved together."""
-    return max(1, BLOCK // study_poses(study, command).count)
-
-
 def tables(
-    study: Study, command: str, wanted: Collection[str], designs: int,
-    places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike], outputs: Collection[str] | None = None,
-    formulas: Formulas | None = None, *, graded: bool = False,
+    study: Study, command: str, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None = None
 ) -> Stack:  # fmt: skip
-    """Answers of a command for designs whose places and parameters have the given values, of shape (designs,).
+    """Answers of a command for the poses of several designs.
 
     Parameters
     ----------
     wanted : collection of str
         Names of tables.
-    formulas : mapping, optional
-        As `formulas_of` gives them.
     outputs : collection of str, optional
         Of the extremes; all where left out.
-    graded : bool
-        Whether the assembly margins are wanted, too.
     """
-    poses = poses_of(study, command, designs, places, parameters, formulas or {})
-    torn = np.zeros(designs, dtype=bool)
+    torn = np.zeros(poses.designs, dtype=bool)
     solved: list[SolvedPoses] = []
     if command == "kinematics":
-        found, reason, torn = _motion(study, wanted, poses, outputs, solved.append if graded else None)
+        found, reason, torn = _motion(study, wanted, poses, outputs, solved.append)
     elif command == "reliability":
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
@@ -190,15 +171,13 @@ def tables(
         held = stiffness.solve(study, question, poses)
         found, reason = stiffness.tables(study, question, poses, held), held.reason
         found = {name: table for name, table in found.items() if name in TABLES[command]}
-    reason = reason.reshape(designs, -1)
-    opened = {"loops": torn | reason.any(axis=1), "extremes": torn}
-    margins = assembly_margins(study, poses, solved) if solved else None
-    return Stack(Result(command, found), reason, poses.listed, opened, margins)
+    reason = reason.reshape(poses.designs, -1)
+    return Stack(Result(command, found), reason, {"loops": torn | reason.any(axis=1), "extremes": torn}, solved)
 
 
 def _motion(
     study: Study, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None,
-    also: Callable[[SolvedPoses], object] | None,
+    also: Callable[[SolvedPoses], object],
 ) -> tuple[dict[str, Table], NDArray[np.int8], Flags]:  # fmt: skip
     """Tables, reasons, and the designs whose motion ends where no limit is known."""
     question = dataclasses.replace(asked(study), poses=poses)

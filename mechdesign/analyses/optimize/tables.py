@@ -7,14 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from mechdesign.analyses.optimize.goals import Goal
-from mechdesign.analyses.optimize.judge import Designs
+from mechdesign.analyses.optimize.judge import JudgedDesigns
 from mechdesign.analyses.optimize.variables import steps
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
-# How many of the best designs are told, and how far apart they are, as a fraction of each variable's range.
-BEST, APART = 10, 0.05
+# Best designs that are told for each row of weights, and how far apart they are in parts of each variable's range.
+MOST_BEST = 10
+APART = 0.05
 
 
 class Comparison:
@@ -36,7 +37,7 @@ class Comparison:
     """
 
     def __init__(
-        self, study: Study, designs: Designs, weights: Floats, meanings: Mapping[str, tuple[str, str]]
+        self, study: Study, designs: JudgedDesigns, weights: Floats, meanings: Mapping[str, tuple[str, str]]
     ) -> None:
         self.study, self.designs, self.weights, self.meanings = study, designs, weights, meanings
         self.values = np.stack([designs.values[each] for each in designs.goals], axis=1)
@@ -150,7 +151,7 @@ def best_table(compared: Comparison) -> Table:
     chosen: list[tuple[int, int, int, float]] = []
     for row, weights in enumerate(compared.weights):
         score = np.where(designs.feasible, compared.score(weights), -np.inf)
-        for rank in range(BEST):
+        for rank in range(MOST_BEST):
             k = int(np.argmax(score))
             if score[k] == -np.inf:
                 break
