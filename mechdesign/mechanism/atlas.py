@@ -122,7 +122,7 @@ class Atlas:
         places : mapping of str to array_like
             Dimensions that differ from the nominal ones; they broadcast against `z`.
         beyond : bool
-            Whether beyond a fold the pose at the fold is told.
+            Whether beyond a fold the pose at the fold is told, and beyond a leg's reach that with the leg stretched.
 
         Returns
         -------
@@ -144,15 +144,20 @@ class Atlas:
         within = np.where(far, near + way * (reach / np.maximum(np.abs(way), reach)), goal)
         with np.errstate(all="ignore"):
             ahead = slopes[0] * way.real + slopes[1] * way.imag
-            state, fold_distance = self._solved(goal, sizes, table, ahead, within)
+            state, fold_distance = self._solved(goal, sizes, table, ahead, within, beyond)
             fold_distance[lost | (far & ~self._open(state, flat.shape))] = np.nan
-        fold_distance = fold_distance.reshape(shape)
         lost = np.isnan(fold_distance) if beyond else ~(fold_distance > 0)
-        return self._configuration(state, places, lost), fold_distance
+        return self._configuration(state, places, lost.reshape(shape)), fold_distance.reshape(shape)
 
     def _solved(
-        self, z: Complexes, sizes: Mapping[str, Floats], table: Floats, ahead: Value, within: Complexes
-    ) -> tuple[State, Floats]:
+        self,
+        z: Complexes,
+        sizes: Mapping[str, Floats],
+        table: Floats,
+        ahead: Value,
+        within: Complexes,
+        beyond: bool = False,
+    ) -> tuple[State, Floats]:  # fmt: skip
         """The mechanism near known poses, and its distances from a fold (see `solve`).
 
         Parameters
@@ -165,7 +170,7 @@ class Atlas:
         # Beside a fold the unknowns change too fast for their slopes to tell.
         scale = scale_of(self.plan.structure, self.plan.core.size, table)
         guess = table + np.where((np.abs(ahead) <= MAX_CHANGE * scale).all(axis=0), ahead, 0.0)
-        state = self._run(z, sizes, guess, CORRECTIONS)
+        state = self._run(z, sizes, guess, CORRECTIONS, beyond)
         fold_distance = np.prod(_determinants(state, z.shape) ** 2, axis=0)
         rows = np.flatnonzero(~state.solved(z.shape, self.signs.tolist()))
         if not len(rows):
@@ -174,7 +179,7 @@ class Atlas:
         own = {name: value[rows] for name, value in sizes.items()}
         found[:, rows], fold_distance[rows] = self._beside_fold(within[rows], own, table[:, rows])
         z[rows] = within[rows]
-        return self._run(z, sizes, found, 0), fold_distance
+        return self._run(z, sizes, found, 0, beyond), fold_distance
 
     def _beside_fold(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats) -> tuple[Floats, Floats]:
         """Unknowns and distances from a fold, by single corrections until a pose is solved or seen to be beyond.
@@ -215,11 +220,11 @@ class Atlas:
                 break
         return found, fold_distance
 
-    def _run(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats, steps: int) -> State:
+    def _run(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats, steps: int, beyond: bool = False) -> State:
         """The whole mechanism after some of Newton's corrections."""
         vectors = self.plan.core.geometry.vectors(sizes)
         guess = guess_of(self.plan.structure, table)
-        return self.plan.run([z.real, z.imag, *self.held], vectors, guess, steps=steps)
+        return self.plan.run([z.real, z.imag, *self.held], vectors, guess, steps=steps, beyond=beyond)
 
     def _nearest(self, z: Complexes, sizes: Mapping[str, Floats]) -> tuple[Complexes, Floats, Floats]:
         """Places of the nearest solved poses (nan where there is none), their unknowns and slopes."""

@@ -16,8 +16,8 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.independence import check_independent
+from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.model import Description, Quantity
-from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import assembly_modes, drawn_value, roots_as_drawn
 from mechdesign.mechanism.structure import Undetermined, compile_structure
@@ -122,10 +122,7 @@ class Mechanism(Core):
 
     def jacobian(self, configuration: Configuration, outputs: Sequence[Coordinate]) -> Floats:
         """Derivatives of outputs with respect to the drives, per radian; shape (..., outputs, drives)."""
-        rates = self.linearize(configuration).drives()
-        full = (len(self.drives), *configuration.shape)
-        rows = [np.broadcast_to(first(configuration, output, rates), full) for output in outputs]
-        return np.moveaxis(np.stack(rows), (0, 1), (-2, -1))
+        return Jacobian.of(self.linearize(configuration), outputs).matrix
 
     def _assemble_sketch(self) -> Configuration:
         plan = self.forward

@@ -74,9 +74,12 @@ class Plan:
         modes: Sequence[Value] | None = None,
         steps: int = STEPS,
         enough: float = CONVERGED,
+        *,
+        beyond: bool = False,
     ) -> State:
         """Solve all groups, in the assembly as drawn unless `modes` says another."""
         state = start_state(self.core.graph, self.structure, vectors, given)
+        state.beyond = beyond
         size = self.core.size if self.iterative else 1.0
         return run(state, self.modes if modes is None else modes, guess, given, size, steps, enough)
 

@@ -81,7 +81,7 @@ def _closed_form(state: State, group: Group, mode: Value) -> None:
     k, z, d = loop_vectors(state, group)
     if group.form == "two angles":
         first, second = group.angles
-        u1, u2, closures = dyads.two_angles(k, z[first], z[second], mode)
+        u1, u2, closures = dyads.two_angles(k, z[first], z[second], mode, state.beyond)
         state.turn(first, u1)
         state.turn(second, u2)
     elif group.form == "two slides":
@@ -90,6 +90,6 @@ def _closed_form(state: State, group: Group, mode: Value) -> None:
     else:
         solve = dyads.angle_and_fixed_slide if "fixed" in group.form else dyads.angle_and_turning_slide
         (root,), (slide,) = group.angles, group.slides
-        u, state.slides[slide], closures = solve(k, z[root], d[slide], mode)
+        u, state.slides[slide], closures = solve(k, z[root], d[slide], mode, state.beyond)
         state.turn(root, u)
     state.closures.extend(closures)

@@ -24,6 +24,8 @@ class State:
 
     Parameters
     ----------
+    beyond : bool
+        Whether groups with a closed form are told beyond their reach (see `mechdesign.mechanism.dyads`).
     closures : list
         Of the groups with a closed form: positive where they close (see `mechdesign.mechanism.dyads`).
     unknowns, converged, determinants
@@ -39,6 +41,7 @@ class State:
     rotations: list[Any]
     ties: list[Value]
     slides: list[Any]
+    beyond: bool = False
     closures: list[Value] = field(default_factory=list)
     unknowns: dict[int, tuple[list[Value], list[Value]]] = field(default_factory=dict)
     converged: list[Flags] = field(default_factory=list)

@@ -2,7 +2,7 @@
 
 from mechdesign.study.loading import Study, load
 from mechdesign.study.poses import PoseGroup, Poses
-from mechdesign.study.schema.json_schema import schema
+from mechdesign.study.schema.study_file import schema
 from mechdesign.study.templates import template, template_path, templates
 from mechdesign.study.text.units import Units
 

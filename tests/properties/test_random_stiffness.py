@@ -162,7 +162,7 @@ def test_another_point_of_the_same_body_is_the_same_matrix_seen_from_there(case:
             agree(matrix(there, "K"), transform.T @ matrix(here, "K") @ transform, 1e-6)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_on_serial_legs_reciprocal_wrenches_forces_and_finite_elements_agree(seed: int) -> None:
     try:

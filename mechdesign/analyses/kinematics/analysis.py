@@ -9,8 +9,9 @@ import numpy as np
 
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.extremes import extremes
-from mechdesign.analyses.kinematics.loops import loop_tables
+from mechdesign.analyses.kinematics.extremes import extremes, needed
+from mechdesign.analyses.kinematics.lines import Line
+from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
 from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry
 from mechdesign.analyses.kinematics.motion_limits import motion_limits
 from mechdesign.analyses.kinematics.moving import move
@@ -19,6 +20,7 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
@@ -82,15 +84,13 @@ def kinematics(
         + targets.gaps(study, motion.errors, poses, motion.valid)
     )
     tables = {"motion": motion_table(motion)}
-    swept, limits = swept_of(poses), None
+    swept = swept_of(poses)
     if swept is not None:
-        group, reason = poses.groups[0], motion.reason
-        limits = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
+        limits = motion_limits(motion, swept)
         warnings += limits.warnings
-    tables["extremes"], _ = extremes_table(motion, limits.ends if limits is not None else ())
-    if limits is not None:
         tables["limits"] = limits.table
-    tables |= loop_tables(study, poses, motion.valid, limits)
+    between, _ = tables_between(motion, limits.ends if swept is not None else ())
+    tables = {"motion": tables["motion"], "extremes": between.pop("extremes"), **tables, **between}
     if motion.errors:
         tables["targets"] = targets_table(motion)
     if question.square:
@@ -134,15 +134,39 @@ def motion_table(motion: Motion) -> Table:
     return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
 
 
-def extremes_table(
-    motion: Motion, ends: Sequence[Boundary] = (), names: Collection[str] | None = None
-) -> tuple[Table, Flags]:  # fmt: skip
-    """Smallest and largest values, exact for some outputs or all; see `kinematics.extremes.extremes`."""
-    question, poses = motion.asked, motion.asked.poses
-    return extremes(
-        question.study, question.outputs, motion.errors, motion.arrays, poses, swept_of(poses), motion.reason, ends,
-        names,
-    )  # fmt: skip
+def tables_between(
+    motion: Motion, ends: Sequence[Boundary] = (), wanted: Collection[str] = ("extremes", "loops", "toggles"),
+    names: Collection[str] | None = None,
+) -> tuple[dict[str, Table], Flags]:  # fmt: skip
+    """Tables of what happens between the poses of a sweep, too.
+
+    Parameters
+    ----------
+    ends : sequence of Boundary
+        Limits of motion, of a single design.
+    names : collection of str, optional
+        Outputs and errors whose extremes between the poses are wanted; all where left out.
+
+    Returns
+    -------
+    (dict of str to Table, bool array of shape (designs,))
+        Tables ``extremes``, ``loops`` where there are four-bars and slider-cranks, and of a sweep their ``toggles``;
+        and the designs whose motion ends where no limit is known, so that the tables do not answer for them.
+    """
+    poses, swept, line = motion.asked.poses, swept_of(motion.asked.poses), None
+    loops = four_bars(motion.asked.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
+    torn = np.zeros(poses.designs, dtype=bool)
+    if swept is not None:
+        coordinates = needed(motion, names) if "extremes" in wanted else []
+        line = Line(motion, swept, coordinates, functions(loops), ends)
+    tables = {}
+    if "extremes" in wanted:
+        tables["extremes"] = extremes(motion, swept, line, names)
+    if loops:
+        tables["loops"] = loops_table(motion, loops, line)
+    if loops and line is not None and "toggles" in wanted:
+        tables["toggles"] = toggles_table(motion, loops, line)
+    return tables, torn if line is None else line.torn
 
 
 def targets_table(motion: Motion) -> Table:

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.targets import Error, needed
 from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, study_poses
 from mechdesign.mechanism import Mechanism, Reason
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.jacobians import Jacobian, mixes
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Poses, Study
-from mechdesign.study.schema.sections import KinematicsSection
+from mechdesign.study.schema.kinematics import KinematicsSection
+
+# A place this near to a pose or to zero, as a part of the sweep, is there.
+AT_POSE = 1e-12
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
@@ -129,6 +134,11 @@ class Motion:
     errors: list[Error] = field(default_factory=list)
     smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
+    @cached_property
+    def given(self) -> dict[str, Floats]:
+        """Values of the coordinates that the poses give."""
+        return self.asked.poses.values
+
     @property
     def valid(self) -> Flags:
         """Whether each pose is assembled and within its limits."""
@@ -147,7 +157,7 @@ class Motion:
         for coordinate in self.asked.watched:
             if coordinate.name in solved.given:
                 # As the study gives it, not there and back through radians; also where the pose fails.
-                self.put(coordinate.name, rows, self.asked.poses.values[coordinate.name][rows])
+                self.put(coordinate.name, rows, self.given[coordinate.name][rows])
             else:
                 self.put(coordinate.name, rows, in_study_units(study, coordinate, configuration.value(coordinate)))
         linear = study.mechanism.linearize(configuration)
@@ -176,28 +186,30 @@ class Motion:
                 self.put(f"{output.name}_{order}", solved.rows, value)
 
     def _statics(self, linear: Linearization, rows: Ints, regular: Flags) -> None:
-        mechanism, configuration = self.asked.study.mechanism, linear.configuration
-        rates, drives = linear.drives(), self.asked.drives
+        study, listed, drives = self.asked.study, self.asked.listed, self.asked.drives
+
+        def put(name: str, values: Value) -> None:
+            self.put(name, rows, np.where(regular, values, np.nan))
+
         if self.asked.square:
-            matrix = np.where(regular[:, None, None], jacobian(linear, rates, self.asked.listed), np.nan)
-            for i, output in enumerate(self.asked.listed):
-                for j, drive in enumerate(drives):
-                    self.put(entry(output, drive), rows, matrix[:, i, j])
-            self.put("det_J", rows, determinant(matrix))
-            if mixes(self.asked.listed, drives):
-                length = characteristic_length(self.asked.study)
-                matrix = homogeneous(matrix, self.asked.listed, drives, np.nan if length is None else length)
-            self.put("inverse_condition", rows, inverse_condition(matrix))
-        if self.asked.section.loads:
-            work = np.zeros((len(drives), *configuration.shape))
-            for load in self.asked.section.loads:
-                if load.at is not None and load.force is not None:
-                    for axis, force in zip("xy", load.force, strict=True):
-                        work = work + force * first(configuration, mechanism.coordinate(f"{load.at}.{axis}"), rates)
-                if load.link is not None and load.moment is not None:
-                    work = work + load.moment * first(configuration, mechanism.coordinate(f"{load.link}.angle"), rates)
-            for drive, effort in zip(drives, work, strict=True):
-                self.put(f"{drive.name}_effort", rows, np.where(regular, -effort, np.nan))
+            length = characteristic_length(study)
+            arc = (np.nan if length is None else length) if mixes(listed, drives) else None
+            jacobian = Jacobian.of(linear, listed, arc)
+            for output, line in zip(listed, jacobian.entries, strict=True):
+                for drive, value in zip(drives, line, strict=True):
+                    put(entry(output, drive), value)
+            put("det_J", jacobian.determinant)
+            put("inverse_condition", jacobian.inverse_condition)
+        work: dict[str, float] = {}
+        for load in self.asked.section.loads:
+            if load.at is not None and load.force is not None:
+                work |= {f"{load.at}.{axis}": work.get(f"{load.at}.{axis}", 0.0) + force
+                         for axis, force in zip("xy", load.force, strict=True)}  # fmt: skip
+            if load.link is not None and load.moment is not None:
+                work[f"{load.link}.angle"] = work.get(f"{load.link}.angle", 0.0) + load.moment
+        moved = Jacobian.of(linear, [study.mechanism.coordinate(name) for name in work]).entries
+        for k, drive in enumerate(drives if work else ()):
+            put(f"{drive.name}_effort", -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True)))
 
     def columns(self) -> list[Column]:
         """The columns of the motion table, `valid` last."""
@@ -246,6 +258,24 @@ class Motion:
         far = error.output in study.mechanism.points
         meaning = f"distance of {error.output} from its target" if far else f"{error.output} less its target"
         return Column(error.name, error.values, study.units.label(error.quantity), meaning)
+
+
+def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> Floats:
+    """Places on a sweep in the study's unit; those at a pose as the study gives it, not there and back through radians.
+
+    Parameters
+    ----------
+    places : ndarray
+        In the core's units.
+    positions : ndarray
+        Where they are along the sweep, in rows.
+    """
+    (group,), study = motion.asked.poses.groups, motion.asked.study
+    given = group.values[swept]
+    values = in_study_units(study, study.mechanism.coordinate(swept), places)
+    beside, near = given[np.round(positions).astype(int)], AT_POSE * np.ptp(given)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(beside - values) <= near, beside, np.where(np.abs(values) <= near, 0.0, values))
 
 
 _RATES: Mapping[tuple[Quantity, str], str] = {

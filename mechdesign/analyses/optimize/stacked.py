@@ -12,12 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from mechdesign.analyses.kinematics import analysis as kinematics
 from mechdesign.analyses.kinematics.motion import Motion, asked
 from mechdesign.analyses.kinematics.moving import move
-from mechdesign.analyses.kinematics.transmission import transmission_table
 from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
-from mechdesign.expressions import Expression
-from mechdesign.linearity import is_linear
+from mechdesign.expressions import Expression, is_linear
 from mechdesign.numerics.arrays import Flags
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -184,13 +182,5 @@ def _motion(
     motion = move(question, also=also)
     known = {"motion": True, "targets": bool(motion.errors), "jacobian": question.square}
     found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
-    torn = np.zeros(poses.designs, dtype=bool)
-    if "extremes" in wanted:
-        found["extremes"], torn = kinematics.extremes_table(motion, names=outputs)
-    if "loops" in wanted:
-        failed = np.asarray(motion.reason.reshape(poses.designs, -1).any(axis=1))
-        loops = transmission_table(study, poses, kinematics.swept_of(poses), ~failed)
-        if loops is not None:
-            found["loops"], more = loops
-            torn = torn | more
-    return found, motion.reason, torn
+    between, torn = kinematics.tables_between(motion, (), wanted, outputs)
+    return found | between, motion.reason, torn

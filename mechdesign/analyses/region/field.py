@@ -15,6 +15,7 @@ from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import determinants
+from mechdesign.mechanism.margins import SINGULARITY, Cause, causes
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
@@ -113,37 +114,26 @@ class Field:
 
     @cached_property
     def labels(self) -> tuple[tuple[str, str], ...]:
-        """Kind (``singularity`` or ``limit``) and name of each margin."""
-        mechanism = self.mechanism
-        configuration = self.configuration(self.surroundings[0], {})
-        found = [("singularity", name) for name in self._closure_names()]
-        found += [("singularity", f"{mechanism.graph.slides[s]} length") for s in mechanism.graph.telescopic]
-        found += [("limit", label) for label, _ in mechanism.margins(configuration)]
+        """Kind and name of each margin; see `mechdesign.mechanism.margins.Cause`."""
+        found = [(cause.kind, cause.name) for cause in self._causes]
         if self.plan.iterative:
-            found.append(("singularity", "continuation"))
+            found.append((SINGULARITY, "continuation"))
         if self.same_assembly:
-            found += [("singularity", f"assembly {k}") for k in range(len(self._signs))]
+            found += [(SINGULARITY, f"assembly {k}") for k in range(len(self._signs))]
         return tuple(found)
+
+    @cached_property
+    def _causes(self) -> list[Cause]:
+        """Of the margins that do not depend on the assembly."""
+        slides = self.mechanism.graph.slides
+        found = causes(self.plan, self.mechanism, [slides[k] for k in self.mechanism.graph.telescopic])
+        return [cause for cause in found if cause.role in ("closure", "leg", "limit")]
 
     @cached_property
     def singular(self) -> Flags:
         """Which margins end where a leg is stretched or folded, so that indices have square roots there."""
-        closures = len(self._closure_names())
+        closures = sum(cause.role == "closure" for cause in self._causes)
         return np.arange(len(self.labels)) < closures
-
-    def _closure_names(self) -> list[str]:
-        """What ends the reach of each closed-form group, in the order of `Configuration.closures`."""
-        bodies = self.mechanism.graph.bodies
-        names = []
-        for group in self.plan.structure.groups:
-            links = "-".join(
-                dict.fromkeys(b.removesuffix(":rod") for b, (frame, _) in bodies.items() if frame in group.angles)
-            )
-            if group.form == "two angles":
-                names += [f"{links} stretched", f"{links} folded"]
-            elif group.form not in ("place", "newton", "two slides"):
-                names.append(f"{links} at its reach")
-        return names
 
     @cached_property
     def _signs(self) -> list[float]:

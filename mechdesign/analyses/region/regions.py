@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.jacobians import mixes
 from mechdesign.analyses.region.field import Field
 from mechdesign.errors import MechanismError, StudyError
+from mechdesign.mechanism.jacobians import mixes
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over, WorkspaceSection
 

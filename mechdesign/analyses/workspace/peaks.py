@@ -115,7 +115,7 @@ def _at_ends(
     theta = (panels.low + u * (panels.high - panels.low)).ravel()
     design = np.tile(panels.design, len(u))
     traced = trace(designs, design, theta, panels.reach[design], samples)
-    singular = np.append([kind == "singularity" for kind, _ in designs.field.labels], False)
+    singular = np.append([kind != "limit" for kind, _ in designs.field.labels], False)
     for margin, end, side in ((traced.enters, traced.inner, 1.0), (traced.leaves, traced.outer, -1.0)):
         at = np.flatnonzero(singular[margin])
         if not at.size:

@@ -17,7 +17,7 @@ from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.integrands import Integrand
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.quadrature import integrate, simple_means
-from mechdesign.indices import USUAL, index_names, needed_section
+from mechdesign.indices import INDEX_NAMES, USUAL, needed_section
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
@@ -87,14 +87,13 @@ def split(column: str) -> tuple[str, str]:
     if column in MEANS:
         return MEANS[column], "mean"
     name, _, kind = column.rpartition("_")
-    known = kind in STATISTICS and (name in USUAL or name in index_names())
-    return (name, kind) if known else ("", "")
+    return (name, kind) if kind in STATISTICS and name in INDEX_NAMES else ("", "")
 
 
 def batched(column: str) -> bool:
     """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
     name = split(column)[0]
-    return column in COLUMNS or bool(name and not needed_section(name))
+    return column in COLUMNS or bool(name and needed_section(name) is None)
 
 
 def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:

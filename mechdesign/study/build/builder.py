@@ -9,14 +9,15 @@ from collections.abc import Iterable, Mapping
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.model import Link, Place, Quantity, Term
 from mechdesign.study.build import section as models
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.build.names import GROUND, Names
-from mechdesign.study.text.numbers import Value, suggestion
+from mechdesign.study.text.numbers import StudyNumber
+from mechdesign.errors import suggestion
 from mechdesign.study.build.parameters import Parameters
 from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Units
 
-ROOT: Path = ("mechanism",)
+ROOT: KeyPath = ("mechanism",)
 
 
 class Builder:
@@ -47,12 +48,12 @@ class Builder:
         """Note a problem at a path below ``mechanism``."""
         self.reporter.report((*ROOT, *path), message, at_key=at_key)
 
-    def place(self, name: str, value: Value | float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
+    def place(self, name: str, value: StudyNumber | float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
         """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
         factor = self.units.angle_factor if quantity == "angle" else 1.0
-        nominal = value.nominal if isinstance(value, Value) else value
+        nominal = value.nominal if isinstance(value, StudyNumber) else value
         self.places[name] = Place(name, nominal * factor, quantity)
-        if isinstance(value, Value) and value.expression is not None:
+        if isinstance(value, StudyNumber) and value.expression is not None:
             self.formulas[name] = value.expression
         if measured:
             self.measured.add(name)
@@ -62,11 +63,15 @@ class Builder:
         """Whether a name is known; if not, note it with the nearest one."""
         return self.reporter.known(name, known, what, (*ROOT, *path))
 
-    def check_names(self, names: Iterable[str], known: Iterable[str], what: str, path: Path) -> bool:
-        """Whether all names of a list are known; each that is not is noted."""
-        candidates = list(known)
+    def check_named(self, what: str, names: Iterable[str], path: KeyPath) -> bool:
+        """Whether all names of a list are known links, points, drives or measures; each that is not is noted.
+
+        `what` may be the quantity that they give: an angle is that of links, a distance that of points.
+        """
+        what = {"angle": "link", "distance": "point"}.get(what, what)
+        known: Iterable[str] = self.names.owners if what == "point" else getattr(self.section, f"{what}s")
         # All of them are looked up, so that every mistake is told.
-        found = [self.check_name(name, candidates, what, (*path, k)) for k, name in enumerate(names)]
+        found = [self.check_name(name, known, what, (*path, k)) for k, name in enumerate(names)]
         return all(found)
 
     def check_distinct(self) -> None:
@@ -99,7 +104,7 @@ class Builder:
                 )
                 self.report(("drives", name), message, at_key=True)
 
-    def _where(self, point: str) -> Path:
+    def _where(self, point: str) -> KeyPath:
         link = self.names.owners[point][0]
         section = self.section.links[link]
         end = {section.from_: "from", section.to: "to"}.get(point)
@@ -114,116 +119,102 @@ class Builder:
 
     def build_links(self) -> None:
         """Links with their points, and places for all their numbers."""
-        order = [GROUND] * (GROUND in self.section.links) + [name for name in self.section.links if name != GROUND]
+        order = [GROUND] * (GROUND in self.section.links) + self.names.moving
         for name in order:
-            section = self.section.links[name]
-            if section.from_ is not None and section.to is not None and not self._ground_from_sketch(name, section):
-                self.links[name] = self._binary(name, section, section.from_, section.to)
-            else:
-                self.links[name] = self._frame(name, section)
+            self.links[name] = self._link(name, self.section.links[name])
             if name == GROUND:
                 # What is fixed need not be drawn, and where it is drawn the ground's own numbers count.
                 for point, (x, y) in self.links[name].points.items():
                     self.sketch[point] = complex(self.nominal(x), self.nominal(y))
 
-    @staticmethod
-    def _ground_from_sketch(name: str, section: models.Link) -> bool:
-        """The ground's frame is the world: without a length its two points stay where they are drawn."""
-        return name == GROUND and section.length is None and not section.telescopic
-
     def nominal(self, term: Term) -> float:
         """Nominal value of a term (angles in radians)."""
         return self.places[term].nominal if isinstance(term, str) else term
 
-    def _binary(self, name: str, section: models.Link, start: str, end: str) -> Link:
+    def _link(self, name: str, section: models.Link) -> Link:
+        ends, points = None, {}
+        # The ground's frame is the world: without a length its two points stay where they are drawn.
+        drawn = name == GROUND and section.length is None and not section.telescopic
+        if section.from_ is not None and section.to is not None and not drawn:
+            ends = (section.from_, section.to)
+            points = self._ends(name, section, ends)
+        own = [*section.points] if ends else self.names.points_of(name)
+        given = {point: place for point, place in section.points.items() if place is not None}
+        left_out = [point for point in own if point not in given]
+        local = self._measured(name, left_out, given, ends) if left_out else {}
+        for point in own:
+            at = local.get(point, 0j)
+            x, y = given[point] if point in given else (at.real, at.imag)
+            terms = [self.place(f"{name}.{point}.{axis}", value, measured=point not in given)
+                     for axis, value in (("x", x), ("y", y))]  # fmt: skip
+            points[point] = (terms[0], terms[1])
+        return Link(name, points, ends, section.telescopic)
+
+    def _ends(self, name: str, section: models.Link, ends: tuple[str, str]) -> dict[str, tuple[Term, Term]]:
+        """The ends of a binary link in its frame: at its origin and on its x axis, where it is not telescopic."""
+        start, end = ends
         points: dict[str, tuple[Term, Term]] = {start: (0.0, 0.0)}
         if section.telescopic:
             if name == GROUND:
                 self.report(("links", name), "the ground cannot be telescopic")
-        elif section.length is not None:
-            points[end] = (self.place(f"{name}.length", section.length), 0.0)
-        else:
-            drawn = self._drawn([start, end], ("links", name), "its length")
-            length = abs(drawn[1] - drawn[0]) if drawn else 1.0
+            return points
+        length: StudyNumber | float = section.length or 1.0
+        if section.length is None and (drawn := self._drawn([start, end], ("links", name), "its length")):
+            length = abs(drawn[1] - drawn[0])
             if length == 0.0:
                 self.report(
                     ("links", name), f"{start!r} and {end!r} are at one place in the sketch: no length to measure"
                 )
                 length = 1.0
-            points[end] = (self.place(f"{name}.length", length, measured=True), 0.0)
-        measured = [point for point, place in section.points.items() if place is None]
-        frame: list[complex] | None = None
-        if measured:
-            drawn = self._drawn([start, end, *measured], ("links", name), "the place of its points")
-            frame = _in_frame(drawn, drawn[0], drawn[1]) if drawn else None
-        for point, place in section.points.items():
-            if place is not None:
-                points[point] = self._point(name, point, *place)
-            else:
-                local = frame[2 + measured.index(point)] if frame else 0j
-                points[point] = self._point(name, point, local.real, local.imag)
-        return Link(name, points, (start, end), section.telescopic)
+        points[end] = (self.place(f"{name}.length", length, measured=section.length is None), 0.0)
+        return points
 
-    def _frame(self, name: str, section: models.Link) -> Link:
-        given = {point: place for point, place in section.points.items() if place is not None}
-        ends = [end for end in (section.from_, section.to) if end is not None]
-        measured = ends + [point for point, place in section.points.items() if place is None]
-        local: dict[str, complex] = {}
-        if measured:
-            local = self._measured(name, measured, given)
-        points: dict[str, tuple[Term, Term]] = {}
-        for point in [*ends, *section.points]:
-            place = given.get(point)
-            if place is not None:
-                points[point] = self._point(name, point, *place)
-            else:
-                at = local.get(point, 0j)
-                points[point] = self._point(name, point, at.real, at.imag)
-        return Link(name, points)
-
-    def _measured(self, name: str, measured: list[str], given: Mapping[str, models.PointValues]) -> dict[str, complex]:
+    def _measured(
+        self, name: str, measured: list[str], given: Mapping[str, models.PointValues], ends: tuple[str, str] | None
+    ) -> dict[str, complex]:
         """Local coordinates of the points left out, from the sketch.
 
-        The ground's frame is the world; a frame without given points has its origin at the first point and its x axis
-        towards the second; one with given points is laid on the drawing by them.
+        The ground's frame is the world; that of a binary link has its origin at the first end and its x axis towards
+        the second, and one without given points so by its first two; one with given points is laid on the drawing by
+        them.
         """
-        path: Path = ("links", name)
-        if name != GROUND and len(given) == 1:
+        path: KeyPath = ("links", name)
+        free = not ends and name != GROUND
+        if free and len(given) == 1:
             self.report(path, "one given point does not fix the link's frame on the sketch; give two, or none")
             return {}
-        if name != GROUND and not given and len(measured) < 2:
+        if free and not given and len(measured) < 2:
             return dict.fromkeys(measured, 0j)
-        known = [] if name == GROUND else list(given)
+        known = [*(ends or (given if free else ()))]
         drawn = self._drawn([*known, *measured], path, "the place of its points")
         if drawn is None:
             return {}
-        if name == GROUND:
-            return dict(zip(measured, drawn, strict=True))
-        if not given:
-            if drawn[0] == drawn[1]:
-                self.report(path, f"{measured[0]!r} and {measured[1]!r} are at one place in the sketch: no x axis")
-                return {}
-            return dict(zip(measured, _in_frame(drawn, drawn[0], drawn[1]), strict=True))
-        local = [complex(x.nominal, y.nominal) for x, y in given.values()]
-        turn = rotation(local, drawn[: len(local)])
-        centre, drawn_centre = sum(local) / len(local), sum(drawn[: len(local)]) / len(local)
-        return {
-            point: (at - drawn_centre) / turn + centre for point, at in zip(measured, drawn[len(local) :], strict=True)
-        }
+        places = drawn[len(known) :]
+        if not ends and not free:
+            return dict(zip(measured, places, strict=True))
+        if free and given:
+            local = [complex(x.nominal, y.nominal) for x, y in given.values()]
+            turn = rotation(local, drawn[: len(local)])
+            centre, drawn_centre = sum(local) / len(local), sum(drawn[: len(local)]) / len(local)
+            return {point: (at - drawn_centre) / turn + centre for point, at in zip(measured, places, strict=True)}
+        if drawn[0] == drawn[1]:
+            first, second = [*known, *measured][:2]
+            self.report(path, f"{first!r} and {second!r} are at one place in the sketch: no x axis")
+            return {}
+        turn = (drawn[1] - drawn[0]) / abs(drawn[1] - drawn[0])
+        found = {point: (at - drawn[0]) / turn for point, at in zip(measured, places, strict=True)}
+        if not ends:
+            # Rounding leaves the second point off its own axis.
+            found[measured[1]] = complex(found[measured[1]].real, 0.0)
+        return found
 
-    def _drawn(self, points: list[str], path: Path, what: str) -> list[complex] | None:
+    def _drawn(self, points: list[str], path: KeyPath, what: str) -> list[complex] | None:
         missing = [point for point in points if point not in self.sketch]
         if missing:
             names = ", ".join(repr(point) for point in missing)
             self.report(path, f"{what} is left out and so measured from the sketch, which lacks {names}", at_key=True)
             return None
         return [self.sketch[point] for point in points]
-
-    def _point(self, link: str, point: str, x: Value | float, y: Value | float) -> tuple[Term, Term]:
-        # What the study gives comes as a `Value`, what is measured as a number.
-        measured = not isinstance(x, Value)
-        x_term = self.place(f"{link}.{point}.x", x, measured=measured)
-        return x_term, self.place(f"{link}.{point}.y", y, measured=measured)
 
     def link_direction(self, name: str) -> float | None:
         """Angle of a link's x axis in the sketch (radians), None where the sketch does not tell."""
@@ -239,14 +230,6 @@ class Builder:
             return None
         turn = rotation(local, [self.sketch[point] for point in known])
         return cmath.phase(turn)
-
-
-def _in_frame(drawn: list[complex], origin: complex, towards: complex) -> list[complex]:
-    """Local coordinates in the frame with its x axis from `origin` to `towards`."""
-    turn = (towards - origin) / abs(towards - origin)
-    local = [(at - origin) / turn for at in drawn]
-    # Rounding leaves the second point off its own axis.
-    return [local[0], complex(local[1].real, 0.0), *local[2:]]
 
 
 def rotation(local: list[complex], drawn: list[complex]) -> complex:

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from mechdesign.mechanism.model import Fixed, Line, Prismatic, Slot
 from mechdesign.mechanism.model import Joint as JointModel
 from mechdesign.mechanism.model import Link as LinkModel
 from mechdesign.study.build import section as models
 from mechdesign.study.build.builder import Builder
-from mechdesign.study.text.document import Path
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.build.names import GROUND
-from mechdesign.study.text.numbers import suggestion
+from mechdesign.errors import suggestion
 
 
 def build(builder: Builder) -> dict[str, JointModel]:
     """Build every joint of the section whose names are right."""
-    joints: dict[str, JointModel] = {}
-    for name, section in builder.section.joints.items():
-        joint: JointModel | None = None
-        if section.prismatic is not None:
-            joint = _prismatic(builder, name, section, *section.prismatic)
-        elif section.slot is not None:
-            joint = _slot(builder, name, section, section.slot)
-        elif section.fixed is not None:
-            joint = _fixed(builder, name, section, section.fixed)
-        if joint is not None:
-            joints[name] = joint
-    return joints
+    makers: dict[str, Callable[..., JointModel | None]] = {"prismatic": _prismatic, "slot": _slot, "fixed": _fixed}
+    joints = {
+        name: makers[section.kind](builder, name, section, getattr(section, section.kind))
+        for name, section in builder.section.joints.items()
+    }
+    return {name: joint for name, joint in joints.items() if joint is not None}
 
 
-def _pair(builder: Builder, path: Path, pair: tuple[str, str]) -> bool:
-    if not builder.check_names(pair, builder.section.links, "link", path):
+def _pair(builder: Builder, path: KeyPath, pair: tuple[str, str]) -> bool:
+    if not builder.check_named("link", pair, path):
         return False
     if pair[0] == pair[1]:
         builder.report(path, f"a joint of link {pair[0]!r} with itself")
@@ -37,7 +33,7 @@ def _pair(builder: Builder, path: Path, pair: tuple[str, str]) -> bool:
     return True
 
 
-def _on_link(builder: Builder, link: str, point: str, path: Path) -> bool:
+def _on_link(builder: Builder, link: str, point: str, path: KeyPath) -> bool:
     points = builder.names.points_of(link)
     if point in points:
         return True
@@ -47,7 +43,7 @@ def _on_link(builder: Builder, link: str, point: str, path: Path) -> bool:
 
 
 def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line | None:
-    path: Path = ("joints", name)
+    path: KeyPath = ("joints", name)
     through = section.through or ()
     if not all(_on_link(builder, link, point, (*path, "through", k)) for k, point in enumerate(through)):
         return None
@@ -67,10 +63,11 @@ def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line
     return Line(link, through[0] if through else None, direction)
 
 
-def _prismatic(builder: Builder, name: str, section: models.Joint, guide: str, slider: str) -> Prismatic | None:
-    path: Path = ("joints", name)
-    if not _pair(builder, (*path, "prismatic"), (guide, slider)):
+def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Prismatic | None:
+    path: KeyPath = ("joints", name)
+    if not _pair(builder, (*path, "prismatic"), pair):
         return None
+    guide, slider = pair
     point = section.point
     if point is None:
         points = builder.names.points_of(slider)
@@ -87,7 +84,7 @@ def _prismatic(builder: Builder, name: str, section: models.Joint, guide: str, s
 
 
 def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slot | None:
-    path: Path = ("joints", name)
+    path: KeyPath = ("joints", name)
     if not builder.check_name(guide, builder.section.links, "link", (*path, "slot")):
         return None
     if section.point is None:
@@ -103,7 +100,7 @@ def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slo
 
 
 def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed | None:
-    path: Path = ("joints", name)
+    path: KeyPath = ("joints", name)
     if not _pair(builder, (*path, "fixed"), pair):
         return None
     shared = [point for point in builder.names.points_of(pair[0]) if point in builder.names.points_of(pair[1])]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.build.section import MechanismSection
@@ -49,24 +50,23 @@ class Names:
         """Joints whose displacement is a coordinate."""
         return [name for name, joint in self.section.joints.items() if joint.fixed is None]
 
+    def driven(self, drive: str) -> tuple[Literal["angle", "length", "slide"], str]:
+        """What a drive changes, and of which link, leg or joint."""
+        section = self.section.drives[drive]
+        if section is not None:
+            return section.kind, getattr(section, section.kind)
+        return "slide" if drive in self.slides else "length" if drive in self.legs else "angle", drive
+
     @cached_property
     def drives(self) -> Mapping[str, Quantity]:
         """Drives and the kind of each."""
-        found: dict[str, Quantity] = {}
-        for name, drive in self.section.drives.items():
-            if drive is None:
-                found[name] = "angle" if name in self.moving and name not in self.legs else "length"
-            else:
-                found[name] = "angle" if drive.angle is not None else "length"
-        return found
+        return {name: "angle" if self.driven(name)[0] == "angle" else "length" for name in self.section.drives}
 
     @cached_property
     def measures(self) -> Mapping[str, Quantity]:
         """Measures and the kind of each."""
-        return {
-            name: "angle" if measure.angle is not None else "length" if measure.distance is not None else "none"
-            for name, measure in self.section.measures.items()
-        }
+        quantities: dict[str, Quantity] = {"angle": "angle", "distance": "length", "expression": "none"}
+        return {name: quantities[measure.kind] for name, measure in self.section.measures.items()}
 
     @cached_property
     def coordinates(self) -> Mapping[str, Quantity]:

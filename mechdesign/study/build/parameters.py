@@ -14,26 +14,16 @@ from mechdesign.expressions import Expression, Number
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters of a study and the places of the geometry that depend on them.
+    """Parameters of a study and the places of the geometry that depend on them."""
 
-    Parameters
-    ----------
-    nominal : mapping of str to float
-        Values of the parameters, as the study gives them: numbers without a unit.
-    formulas : mapping of str to Expression
-        Parameters that depend on parameters above them, in the study's order.
-    dependent : mapping of str to Expression
-        Places that depend on parameters.
-    factors : mapping of str to float
-        Every place; radians per study unit for an angle, 1 for a length.
-    measured : frozenset of str
-        Places that the study leaves out and that are so measured from its sketch.
-    """
-
+    # Values of the parameters, as the study gives them: numbers without a unit.
     nominal: Mapping[str, float] = field(default_factory=dict)
+    # Parameters that depend on parameters above them, in the study's order; places that depend on parameters.
     formulas: Mapping[str, Expression] = field(default_factory=dict)
     dependent: Mapping[str, Expression] = field(default_factory=dict)
+    # Every place; radians per study unit for an angle, 1 for a length.
     factors: Mapping[str, float] = field(default_factory=dict)
+    # Places that the study leaves out and that are so measured from its sketch.
     measured: frozenset[str] = frozenset()
 
     def values(self, changed: Mapping[str, ArrayLike]) -> dict[str, Number]:
@@ -71,10 +61,11 @@ class Parameters:
                 raise KeyError(name)
         env = self.values(changed)
         moved = {name for name in env if env[name] is not self.nominal[name]}
-        result: dict[str, Number] = {}
-        for place, formula in self.dependent.items():
-            if formula.names & moved:
-                result[place] = formula.evaluate(env) * self.factors[place]
+        result: dict[str, Number] = {
+            place: formula.evaluate(env) * self.factors[place]
+            for place, formula in self.dependent.items()
+            if formula.names & moved
+        }
         # A place that is set by itself varies alone, whatever gives its nominal value.
         for name in changed:
             if name in self.factors:

@@ -1,4 +1,4 @@
-"""The mechanism's part of the study file, and the whole file, as pydantic models.
+"""The mechanism's part of the study file as pydantic models.
 
 Every short form of the format (a link as a list, drives as a list, a measure as an expression) is brought to the one
 long form before validation, so that no model is a union and every error has one place.
@@ -6,56 +6,19 @@ long form before validation, so that no model is a union and every error has one
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler, model_validator
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic import BeforeValidator, Field, model_validator
 
-from mechdesign.study.text.numbers import (
-    NAME_FORM,
-    NAMES_FORM,
-    NUMBER_FORM,
-    AngleValue,
-    AnyName,
-    AnyValue,
-    Choice,
-    CoordinateName,
-    DriveName,
-    JointName,
-    LengthValue,
-    LinkName,
-    MeasureName,
-    OrShort,
-    PointName,
-    PositiveLengthValue,
-    Value,
-    failure,
-    or_short,
-    shown,
-    suggestion,
-)
-from mechdesign.study.build.target_models import TargetValue
+from mechdesign.expressions import Expression
+from mechdesign.study.text import fields
+from mechdesign.study.text.numbers import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
+from mechdesign.errors import suggestion
+from mechdesign.study.text.units import QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
-
-
-class Model(BaseModel):
-    """Base of all sections: frozen, unknown keys are errors, values come in study units."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
-
-
-def _pair(raw: Any) -> Any:
-    if not isinstance(raw, list) or len(raw) != 2:
-        raise failure(f"expected [x, y], not {shown(raw)}")
-    return raw
-
-
-def _two(raw: Any) -> Any:
-    if not isinstance(raw, list) or len(raw) != 2:
-        raise failure(f"expected a list of two names, not {shown(raw)}")
-    return raw
+TARGET_FORMS = "an expression, a number, {file: path.csv}, a list of numbers, of [x, y] or of [drive, x, y]"
 
 
 def names_to_mapping(raw: Any) -> Any:
@@ -70,20 +33,28 @@ def names_to_mapping(raw: Any) -> Any:
     return dict.fromkeys(raw)
 
 
-Point = Annotated[tuple[LengthValue, LengthValue], BeforeValidator(_pair)]
-PointValues = tuple[Value, Value]
-TwoLinks = Annotated[tuple[LinkName, LinkName], BeforeValidator(_two)]
-TwoPoints = Annotated[tuple[PointName, PointName], BeforeValidator(_two)]
+Point = Annotated[tuple[fields.LengthValue, fields.LengthValue], fields.pair_of("[x, y]")]
+PointValues = tuple[StudyNumber, StudyNumber]
+TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
+TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of("a list of two names")]
 
 
-class Link(Model):
+class Link(fields.Model):
     """A link: binary, telescopic, or its points in its own frame; what is None is measured from the sketch."""
 
-    from_: PointName | None = Field(None, alias="from")
-    to: PointName | None = None
-    length: PositiveLengthValue | None = None
+    short = (
+        {"type": "array", "prefixItems": [fields.NAME_FORM, fields.NAME_FORM, fields.NUMBER_FORM], "minItems": 2, "maxItems": 3},
+        {
+            "type": "object",
+            "additionalProperties": {"anyOf": [fields.PAIR_FORM, {"type": "null"}]},
+            "not": {"anyOf": [{"required": [key]} for key in LINK_KEYS]},
+        },
+    )
+    from_: fields.PointName | None = Field(None, alias="from")
+    to: fields.PointName | None = None
+    length: fields.PositiveLengthValue | None = None
     telescopic: bool = False
-    points: Annotated[dict[PointName, Point | None], BeforeValidator(names_to_mapping), OrShort((NAMES_FORM,))] = {}
+    points: Annotated[dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))] = {}
 
     @model_validator(mode="before")
     @classmethod
@@ -124,17 +95,6 @@ class Link(Model):
                 raise failure(f"point {end!r} is an end of the link; its place in the frame is not given twice")
         return self
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        place = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
-        short = {"type": "array", "prefixItems": [NAME_FORM, NAME_FORM, NUMBER_FORM], "minItems": 2, "maxItems": 3}
-        own_frame = {
-            "type": "object",
-            "additionalProperties": {"anyOf": [place, {"type": "null"}]},
-            "not": {"anyOf": [{"required": [key]} for key in LINK_KEYS]},
-        }
-        return or_short(schema, handler, short, own_frame)
-
 
 def _through(raw: Any) -> Any:
     if isinstance(raw, str):
@@ -144,110 +104,141 @@ def _through(raw: Any) -> Any:
     return raw
 
 
-class Joint(Model):
+class Joint(fields.Model):
     """A joint that is not a revolute: exactly one of prismatic, slot and fixed."""
 
+    one_of = ("a joint is one of prismatic: [a, b], slot: a, fixed: [a, b]", "prismatic", "slot", "fixed")
     prismatic: TwoLinks | None = None
-    slot: LinkName | None = None
+    slot: fields.LinkName | None = None
     fixed: TwoLinks | None = None
-    through: Annotated[tuple[PointName, ...], BeforeValidator(_through), OrShort((NAME_FORM,))] | None = None
-    direction: AngleValue | None = None
-    point: PointName | None = None
-    angle: AngleValue | None = None
+    through: Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort((fields.NAME_FORM,))] | None = None
+    direction: fields.AngleValue | None = None
+    point: fields.PointName | None = None
+    angle: fields.AngleValue | None = None
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Joint:
-        kinds = [kind for kind in ("prismatic", "slot", "fixed") if getattr(self, kind) is not None]
-        if len(kinds) != 1:
-            raise failure("a joint is one of prismatic: [a, b], slot: a, fixed: [a, b]")
-        foreign = {"prismatic": (), "slot": ("angle",), "fixed": ("through", "direction")}[kinds[0]]
-        for key in foreign:
-            if getattr(self, key) is not None:
-                raise failure(f"a {kinds[0]} joint has no {key!r}")
+    def _fitting(self) -> Joint:
+        foreign = {"prismatic": (), "slot": ("angle",), "fixed": ("through", "direction")}
+        for key in self.given(*foreign[self.kind]):
+            raise failure(f"a {self.kind} joint has no {key!r}")
         if self.through is not None and len(self.through) == 2 and self.direction is not None:
             raise failure("'through' two points gives the direction; leave 'direction' out")
         return self
 
 
-class Drive(Model):
+class Drive(fields.Model):
     """A driven coordinate: exactly one of angle, length and slide."""
 
-    angle: LinkName | None = None
-    from_: LinkName | None = Field(None, alias="from")
-    length: LinkName | None = None
-    slide: JointName | None = None
+    one_of = ("a drive is one of angle: link, length: leg, slide: joint", "angle", "length", "slide")
+    angle: fields.LinkName | None = None
+    from_: fields.LinkName | None = Field(None, alias="from")
+    length: fields.LinkName | None = None
+    slide: fields.JointName | None = None
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Drive:
-        given = [key for key in ("angle", "length", "slide") if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise failure("a drive is one of angle: link, length: leg, slide: joint")
+    def _of_an_angle(self) -> Drive:
         if self.from_ is not None and self.angle is None:
             raise failure("'from' belongs to an angle")
         return self
 
 
-class Measure(Model):
+class Measure(fields.Model):
     """A named quantity: exactly one of angle, distance and expression."""
 
+    bare, short = "expression", (fields.NAME_FORM,)
+    one_of = (
+        "a measure is one of {angle: [a, b]}, {distance: [P, Q]} or an expression over coordinates",
+        "angle",
+        "distance",
+        "expression",
+    )
     angle: TwoLinks | None = None
     distance: TwoPoints | None = None
     expression: str | None = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _long_form(cls, raw: Any) -> Any:
-        return {"expression": raw} if isinstance(raw, str) else raw
 
-    @model_validator(mode="after")
-    def _one_kind(self) -> Measure:
-        if sum(item is not None for item in (self.angle, self.distance, self.expression)) != 1:
-            raise failure("a measure is one of {angle: [a, b]}, {distance: [P, Q]} or an expression over coordinates")
-        return self
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return or_short(schema, handler, NAME_FORM)
-
-
-class Limit(Model):
+class Limit(fields.Model):
     """Bounds of a distance, a drive, an angle or a measure."""
 
+    one_of = (
+        "a limit is one of distance: [P, Q], drive: name, angle: [a, b], measure: name",
+        "distance",
+        "drive",
+        "angle",
+        "measure",
+    )
     distance: TwoPoints | None = None
-    drive: DriveName | None = None
+    drive: fields.DriveName | None = None
     angle: TwoLinks | None = None
-    measure: MeasureName | None = None
-    min: AnyValue | None = None
-    max: AnyValue | None = None
+    measure: fields.MeasureName | None = None
+    min: fields.AnyValue | None = None
+    max: fields.AnyValue | None = None
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Limit:
-        given = [key for key in ("distance", "drive", "angle", "measure") if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise failure("a limit is one of distance: [P, Q], drive: name, angle: [a, b], measure: name")
-        if self.min is None and self.max is None:
+    def _bounded(self) -> Limit:
+        if not self.given("min", "max"):
             raise failure("a limit needs 'min', 'max' or both")
         return self
 
 
-class MechanismSection(Model):
+@dataclass(frozen=True)
+class Wanted:
+    """One target as it was written: an expression (a number is one without names), rows, or the name of a file."""
+
+    expression: Expression | None = None
+    rows: tuple[tuple[float, ...], ...] | None = None
+    file: str | None = None
+
+
+def _target(raw: Any, context: Context) -> Wanted:
+    if isinstance(raw, dict) and list(raw) == ["file"] and isinstance(raw["file"], str):
+        return Wanted(file=raw["file"])
+    if isinstance(raw, str) and raw.lower().endswith(FILES):
+        return Wanted(file=raw)
+    if raw is None or isinstance(raw, dict):
+        raise failure(f"expected {TARGET_FORMS}, not {shown(raw)}")
+    if isinstance(raw, list):
+        rule = "every row holds the same one, two or three numbers"
+        return Wanted(rows=read_rows(raw, context, 3, rule, "an empty list: no target"))
+    return Wanted(expression=read_expression(raw, context))
+
+
+TargetValue = Annotated[
+    Wanted, fields.Read(_target, {"type": ["number", "string", "array", "object"], "description": TARGET_FORMS})
+]
+
+
+class MechanismSection(fields.Model):
     """What the study says about the mechanism."""
 
-    parameters: dict[str, AnyValue] = {}
-    links: dict[LinkName, Link]
-    joints: dict[JointName, Joint] = {}
-    drives: Annotated[dict[AnyName, Drive | None], BeforeValidator(names_to_mapping), OrShort((NAMES_FORM,))] = {}
-    branch: Annotated[str, Choice(("side", "follow"))] = "side"
-    sketch: dict[PointName, Point] = {}
-    measures: dict[MeasureName, Measure] = {}
+    parameters: dict[str, fields.AnyValue] = {}
+    links: dict[fields.LinkName, Link]
+    joints: dict[fields.JointName, Joint] = {}
+    drives: Annotated[dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))] = {}
+    branch: Annotated[str, fields.Choice(("side", "follow"))] = "side"
+    sketch: dict[fields.PointName, Point] = {}
+    measures: dict[fields.MeasureName, Measure] = {}
     limits: tuple[Limit, ...] = ()
-    targets: dict[CoordinateName, TargetValue] = {}
+    targets: dict[fields.CoordinateName, TargetValue] = {}
 
 
-class UnitsSection(Model):
+def _unit_of(kind: str) -> fields.Read:
+    def read(raw: Any, context: Context) -> str:
+        if not isinstance(raw, str):
+            raise failure(f"expected a text, not {shown(raw)}")
+        try:
+            check_unit(kind, raw)
+        except QuantityError as error:
+            raise failure(str(error)) from None
+        return raw
+
+    return fields.Read(read, fields.NAME_FORM)
+
+
+class UnitsSection(fields.Model):
     """Units that bare numbers mean."""
 
-    length: str = "mm"
-    angle: str = "deg"
-    time: str = "s"
-    force: str = "N"
+    length: Annotated[str, _unit_of("length")] = "mm"
+    angle: Annotated[str, _unit_of("angle")] = "deg"
+    time: Annotated[str, _unit_of("time")] = "s"
+    force: Annotated[str, _unit_of("force")] = "N"

@@ -6,39 +6,30 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.build.names import Names
+from mechdesign.study.build.builder import Builder
 from mechdesign.study.build.parameters import Parameters
-from mechdesign.study.text.document import Path
-from mechdesign.study.text.reporter import Reporter
-from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, measure
+from mechdesign.study.text.document import KeyPath
+
+# Kinds of a coordinate, its rate and its acceleration.
+ORDERS: dict[Quantity | None, tuple[str, str, str]] = {
+    "length": ("length", "velocity", "acceleration"),
+    "angle": ("angle", "angular_velocity", "angular_acceleration"),
+}
+NO_MOMENT = "a pin carries no moment; name the 'link' of the stiffness section that is loaded"
 
 
 class Checker:
     """Looks names and units up, and notes what is wrong with them."""
 
-    def __init__(self, names: Names, parameters: Parameters, reporter: Reporter, parts: Mapping[str, Any]) -> None:
-        self.names = names
-        self.parts = parts
+    def __init__(self, builder: Builder, parameters: Parameters, parts: Mapping[str, Any]) -> None:
+        self.names, self.places, self.reporter = builder.names, builder.places, builder.reporter
         self.parameters = parameters
-        self.reporter = reporter
+        self.parts = parts
+        self.known, self.kind = builder.reporter.known, builder.reporter.kind
 
-    def known(self, name: str, known: Iterable[str], what: str, path: Path, *, at_key: bool = False) -> bool:
-        """Whether a name is known; if not, it is noted."""
-        return self.reporter.known(name, known, what, path, at_key=at_key)
-
-    def kind(self, path: Path, kind: str) -> None:
-        """Note a quantity whose unit does not fit what its key needs."""
-        raw = self.reporter.raw(path)
-        if not isinstance(raw, str) or not QUANTITY.fullmatch(raw):
-            return
-        try:
-            powers = measure(raw)[1]
-        except QuantityError:
-            return
-        if powers != KINDS[kind] and not (kind == "rotational_stiffness" and powers == KINDS["moment"]):
-            self.reporter.report(path, f"{raw!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected")
-
-    def coordinate(self, name: str, path: Path, *, at_key: bool = False, others: Iterable[str] = ()) -> Quantity | None:
+    def coordinate(
+        self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = ()
+    ) -> Quantity | None:
         """Kind of a coordinate; None, and noted, where there is none of that name.
 
         `others` are names that might have stood there as well.
@@ -56,12 +47,41 @@ class Checker:
                 self.known(name, [*self.names.coordinates, *others], what, path, at_key=at_key)
         return quantity
 
-    def is_angle(self, place: str) -> bool:
-        owner, _, last = place.rpartition(".")
-        if owner.startswith("limits."):
-            index = int(owner.split(".")[1])
-            limit = self.names.section.limits[index]
-            if limit.drive is not None:
-                return self.names.drives.get(limit.drive) == "angle"
-            return limit.angle is not None or self.names.measures.get(limit.measure or "") == "angle"
-        return last in ("direction", "angle")
+    def coordinates(self, names: Iterable[str], path: KeyPath, order: int = 0) -> None:
+        """Check the coordinates that are keys of a mapping, and the units of their values, rates or accelerations."""
+        for name in names:
+            quantity = self.coordinate(name, (*path, name), at_key=True)
+            if quantity in ORDERS:
+                self.kind((*path, name), ORDERS[quantity][order])
+
+    def outputs(self, outputs: Iterable[str] | None, path: KeyPath) -> None:
+        """Check a list of coordinates and points that are asked for."""
+        seen: set[str] = set()
+        for index, name in enumerate(outputs or ()):
+            parts = [f"{name}.x", f"{name}.y"] if name in self.names.owners else [name]
+            if name not in self.names.owners:
+                self.coordinate(name, (*path, index))
+            if seen.intersection(parts):
+                self.reporter.report((*path, index), f"{name!r} is listed twice")
+            seen.update(parts)
+
+    def load(self, load: tuple[float, ...], path: KeyPath, *, on_pin: bool) -> tuple[float, ...]:
+        """A load of the stiffness section's point or link as fx, fy, mz."""
+        if len(load) not in ((2, 3) if on_pin else (3,)):
+            self.reporter.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
+            return 0.0, 0.0, 0.0
+        for place, kind in enumerate(("force", "force", "moment")[: len(load)]):
+            self.kind((*path, place), kind)
+        if on_pin and any(load[2:]):
+            self.reporter.report((*path, 2), NO_MOMENT)
+        return (*load, 0.0)[:3]
+
+    def range(self, low: float | None, high: float | None, path: KeyPath) -> None:
+        """Check that the end of a range is beyond its beginning."""
+        if low is not None and high is not None and high <= low:
+            self.reporter.report((*path, "to"), f"{high:g} is not beyond 'from', {low:g}")
+
+    def needs(self, section: str | None, what: str, path: KeyPath) -> None:
+        """Check that the study has a section that something cannot do without."""
+        if section is not None and self.reporter.raw((section,)) is None:
+            self.reporter.report(path, f"{what} needs the {section} section, and the study has none")

@@ -3,37 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
-from mechdesign.study.build.section import Model
-from mechdesign.study.text.numbers import (
-    NAME_FORM,
-    NUMBER_FORM,
-    Bound,
-    Choice,
-    CoordinateName,
-    Number,
-    OrShort,
-    PositiveNumber,
-    Pure,
-    Whole,
-    failure,
-    suggestion,
-)
+from mechdesign.commands import COMMANDS
+from mechdesign.errors import suggestion
+from mechdesign.indices import INDEX_NAMES, needed_section
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.numbers import failure
+
+# Results of a workspace that a goal or condition may name without its command.
+INDICES = ("GII", "GRI", "SUI", "area", "box_area")
+# Those of a local index follow its name.
+_STATISTICS = ("mean", "min", "max", "std")
+# Commands whose section no default can replace.
+_UNASSUMED = ("reliability", "stiffness")
 
 
-class Variable(Model):
+class Variable(fields.Model):
     """A design variable; its bounds are expressions over parameters and the variables above it.
 
     The step is that of a grid, and of the sensitivities told with an optimum.
     """
 
-    from_: Bound = Field(alias="from")
-    to: Bound
-    step: PositiveNumber | None = None
-    number: Annotated[int, Whole(1, 10_000_000)] | None = None
+    from_: fields.Bound = Field(alias="from")
+    to: fields.Bound
+    step: fields.PositiveNumber | None = None
+    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _spacing(self) -> Variable:
@@ -42,10 +41,12 @@ class Variable(Model):
         return self
 
 
-class Judged(Model):
+class Judged(fields.Model):
     """A result, and the rows of it that count."""
 
-    result: CoordinateName
+    bare = "result"
+    short: ClassVar[tuple[fields.Form, ...]] = (fields.NAME_FORM,)
+    result: fields.CoordinateName
     where: dict[str, str | float | int] = Field(default_factory=dict)
 
     @property
@@ -58,9 +59,10 @@ class Judged(Model):
 class Condition(Judged):
     """A result and its bounds."""
 
+    bare, short = "", ()
     abs: bool = False
-    at_least: Number | None = None
-    at_most: Number | None = None
+    at_least: fields.Number | None = None
+    at_most: fields.Number | None = None
 
     @model_validator(mode="after")
     def _bounded(self) -> Condition:
@@ -96,35 +98,26 @@ def _weights_that_choose(row: tuple[float, ...]) -> tuple[float, ...]:
 
 
 WeightRow = Annotated[
-    tuple[Pure, ...],
+    tuple[fields.Pure, ...],
     BeforeValidator(_weight_row),
     AfterValidator(_weights_that_choose),
-    OrShort(({"type": "object", "additionalProperties": NUMBER_FORM},)),
+    fields.OrShort(({"type": "object", "additionalProperties": fields.NUMBER_FORM},)),
 ]
 
 
-def _goal(raw: Any) -> Any:
-    return {"result": raw} if isinstance(raw, str) else raw
+Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.OrOne()]
 
 
-# Names of results, or with `where` which of their rows count.
-Goals = Annotated[
-    tuple[Annotated[Judged, BeforeValidator(_goal), OrShort((NAME_FORM,))], ...],
-    BeforeValidator(lambda raw: [raw] if isinstance(raw, str | Mapping) else raw),
-    OrShort((NAME_FORM,)),
-]
-
-
-class OptimizeSection(Model):
+class OptimizeSection(fields.Model):
     """Which dimensions are best?"""
 
-    method: Annotated[str, Choice(("grid", "search", "pareto"))] = "grid"
-    variables: dict[CoordinateName, Variable]
+    method: Annotated[str, fields.Choice(("grid", "search", "pareto"))] = "grid"
+    variables: dict[fields.CoordinateName, Variable]
     maximize: Goals = ()
     minimize: Goals = ()
     weights: tuple[WeightRow, ...] | None = None
     subject_to: tuple[Condition, ...] = ()
-    evaluations: Annotated[int, Whole(10, 10_000_000)] | None = None
+    evaluations: Annotated[int, fields.Whole(10, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _goals(self) -> OptimizeSection:
@@ -133,3 +126,53 @@ class OptimizeSection(Model):
         if twice:
             raise failure(f"{twice[0]!r} is named twice among the goals")
         return self
+
+
+def check(checker: Checker, section: OptimizeSection) -> None:
+    """Check the variables of an optimisation, its method, and the results that its goals name."""
+    root: KeyPath = ("optimize",)
+    report = checker.reporter.report
+    if not section.variables:
+        report((*root, "variables"), "an optimisation needs at least one variable")
+    if not section.maximize and not section.minimize:
+        report(root, "say what to 'maximize' or 'minimize'", at_key=True)
+    above = [name for name in checker.parameters.nominal if name not in section.variables]
+    for name, variable in section.variables.items():
+        path: KeyPath = (*root, "variables", name)
+        checker.known(name, checker.parameters.known(), "parameter or dimension", path, at_key=True)
+        if name in checker.parameters.formulas:
+            message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
+            report(path, message, at_key=True)
+        for key, bound in (("from", variable.from_), ("to", variable.to)):
+            for unknown in sorted(bound.names - set(above)):
+                below = " above it" if unknown in section.variables else ""
+                message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
+                report((*path, key), message)
+        if name in checker.places:
+            checker.kind(path, checker.places[name].quantity)
+        above.append(name)
+        if section.method == "grid" and variable.step is None and variable.number is None:
+            report(path, "a variable of a grid needs either 'step' or 'number'")
+    if section.method == "pareto" and len(section.maximize + section.minimize) == 1:
+        report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
+    if section.method == "grid" and section.evaluations is not None:
+        report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
+    for key, goals in (("maximize", section.maximize), ("minimize", section.minimize)):
+        for index, goal in enumerate(goals):
+            check_result(checker, goal.result, (*root, key, index))
+    for index, condition in enumerate(section.subject_to):
+        check_result(checker, condition.result, (*root, "subject_to", index, "result"))
+
+
+def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:
+    """Check the name of a result: a statistic of the workspace, or ``command.column``, as it must be if `required`."""
+    command, _, rest = name.partition(".")
+    known = (*INDICES, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in _STATISTICS))
+    if rest:
+        checker.known(command, COMMANDS, "command", path)
+    elif required or name not in known:
+        hint = suggestion(name, known) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+        checker.reporter.report(path, f"there is no result {name!r}{hint}")
+    if not required:
+        column = name.rpartition(".")[2]
+        checker.needs(command if command in _UNASSUMED else needed_section(column.rpartition("_")[0]), repr(name), path)

@@ -5,33 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple, Protocol
 
-from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo, model_validator
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
-from mechdesign.study.build.section import Model
-from mechdesign.study.schema.lists import CoordinateNames, one_or_many
-from mechdesign.study.schema.paths import Speed
-from mechdesign.study.schema.poses import PoseSection
-from mechdesign.study.text.numbers import (
-    NAME_FORM,
-    NUMBER_FORM,
-    Choice,
-    Context,
-    CoordinateName,
-    LinkName,
-    NonNegative,
-    NonNegativeLength,
-    Number,
-    OrShort,
-    Positive,
-    Reader,
-    Whole,
-    failure,
-    or_short,
-    read_number,
-    shown,
-)
+from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.text import fields
+from mechdesign.study.text.numbers import Context, failure, read_number, shown
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
 PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")
@@ -61,33 +39,26 @@ def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
     return name, 0
 
 
-class _Tolerance:
-    """Annotation of a tolerance: a half-width, or the lowest and the highest deviation."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        pair = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
-        return {"anyOf": [NUMBER_FORM, pair], "description": "a half-width, or the lowest and highest deviation"}
-
-    @staticmethod
-    def _validate(raw: Any, info: ValidationInfo) -> tuple[float, float]:
-        context: Context = info.context or Context()
-        if not isinstance(raw, list):
-            half = read_number(raw, context).nominal
-            if half < 0:
-                raise failure(f"must be at least 0, not {half:g}; two bounds are written [-0.1, 0.3]")
-            return -half, half
-        if len(raw) != 2:
-            raise failure(f"expected a half-width or two bounds such as [-0.1, 0.3], not {shown(raw)}")
-        low, high = (read_number(each, context).nominal for each in raw)
-        if low > high:
-            raise failure(f"the lowest deviation {low:g} is above the highest {high:g}")
-        return low, high
+def _tolerance(raw: Any, context: Context) -> tuple[float, float]:
+    """A half-width, or the lowest and the highest deviation."""
+    if not isinstance(raw, list):
+        half = read_number(raw, context).nominal
+        if half < 0:
+            raise failure(f"must be at least 0, not {half:g}; two bounds are written [-0.1, 0.3]")
+        return -half, half
+    if len(raw) != 2:
+        raise failure(f"expected a half-width or two bounds such as [-0.1, 0.3], not {shown(raw)}")
+    low, high = (read_number(each, context).nominal for each in raw)
+    if low > high:
+        raise failure(f"the lowest deviation {low:g} is above the highest {high:g}")
+    return low, high
 
 
-Tolerance = Annotated[tuple[float, float], _Tolerance()]
+_TOLERANCE = {
+    "anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM],
+    "description": "a half-width, or the lowest and highest deviation",
+}
+Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
 
 
 class Spread(Protocol):
@@ -106,71 +77,48 @@ class Spread(Protocol):
         """One of `DISTRIBUTIONS`."""
 
 
-class Dimension(Model):
+class Dimension(fields.Model):
     """A dimension's variation: nominal +- tolerance, or its standard deviation.
 
     Of a tolerance ``normal`` makes three standard deviations, ``truncated_normal`` the same and cuts there; ``uniform``
     fills it, ``triangular`` peaks at the nominal value, ``lognormal`` has the mean and the deviation of ``normal``.
     """
 
+    bare, short = "tolerance", (fields.NUMBER_FORM, fields.PAIR_FORM)
+    one_of = ("a dimension needs either 'tolerance' or 'sigma'", "tolerance", "sigma")
     tolerance: Tolerance | None = None
-    sigma: NonNegative | None = None
-    distribution: Annotated[str, Choice(DISTRIBUTIONS)] = "normal"
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, raw: Any) -> Any:
-        short = isinstance(raw, int | float | str | list) and not isinstance(raw, bool)
-        return {"tolerance": raw} if short else raw
-
-    @model_validator(mode="after")
-    def _one_width(self) -> Dimension:
-        if (self.tolerance is None) == (self.sigma is None):
-            raise failure("a dimension needs either 'tolerance' or 'sigma'")
-        return self
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        pair = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
-        return or_short(schema, handler, NUMBER_FORM, pair)
+    sigma: fields.NonNegative | None = None
+    distribution: Annotated[str, fields.Choice(DISTRIBUTIONS)] = "normal"
 
 
-class PinModel(Model):
+class PinModel(fields.Model):
     """How a pin lies in its hole, for each method."""
 
-    analytic: Annotated[str, Choice(PIN_MODELS)] = "normal"
-    monte_carlo: Annotated[str, Choice(PIN_MODELS)] = "normal"
+    short = ({"enum": list(PIN_MODELS)},)
+    analytic: Annotated[str, fields.Choice(PIN_MODELS)] = "normal"
+    monte_carlo: Annotated[str, fields.Choice(PIN_MODELS)] = "normal"
 
     @model_validator(mode="before")
     @classmethod
-    def _both(cls, raw: Any) -> Any:
+    def _long_form(cls, raw: Any) -> Any:
         return {"analytic": raw, "monte_carlo": raw} if isinstance(raw, str) else raw
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return or_short(schema, handler, {"enum": list(PIN_MODELS)})
 
-
-class Clearance(Model):
+class Clearance(fields.Model):
     """The clearance of a pin joint; exactly one of radial and diametral, to which the tolerance belongs.
 
     The pin moves in `link` (left out, the last link of the joint that no output is said to be of); the coordinates of
     its point are those of the other links. An output or a limit may name the link that it is about: ``coupler.P.x``.
     """
 
-    radial: NonNegativeLength | None = None
-    diametral: NonNegativeLength | None = None
+    one_of = ("a clearance needs either 'radial' or 'diametral'", "radial", "diametral")
+    radial: fields.NonNegativeLength | None = None
+    diametral: fields.NonNegativeLength | None = None
     tolerance: Tolerance = (0.0, 0.0)
-    distribution: Annotated[str, Choice(DISTRIBUTIONS)] = "normal"
+    distribution: Annotated[str, fields.Choice(DISTRIBUTIONS)] = "normal"
     pin: PinModel = PinModel()
-    link: LinkName | None = None
-    effect: Annotated[str, Choice(("offset", "length"))] = "offset"
-
-    @model_validator(mode="after")
-    def _one_radius(self) -> Clearance:
-        if (self.radial is None) == (self.diametral is None):
-            raise failure("a clearance needs either 'radial' or 'diametral'")
-        return self
+    link: fields.LinkName | None = None
+    effect: Annotated[str, fields.Choice(("offset", "length"))] = "offset"
 
     @property
     def radius(self) -> float:
@@ -187,16 +135,17 @@ class Clearance(Model):
         return Dimension.model_construct(tolerance=(low, high), sigma=None, distribution=self.distribution)
 
 
-class ErrorLimit(Model):
+class ErrorLimit(fields.Model):
     """What an error may be: within [min, max], or (of a point) within a radius."""
 
-    min: Number | None = None
-    max: Number | None = None
-    radius: NonNegative | None = None
+    short = (fields.NUMBER_FORM,)
+    min: fields.Number | None = None
+    max: fields.Number | None = None
+    radius: fields.NonNegative | None = None
 
     @model_validator(mode="before")
     @classmethod
-    def _bare(cls, raw: Any, info: ValidationInfo) -> Any:
+    def _long_form(cls, raw: Any, info: ValidationInfo) -> Any:
         if not isinstance(raw, int | float | str) or isinstance(raw, bool):
             return raw
         size = read_number(raw, info.context or Context()).nominal
@@ -214,66 +163,43 @@ class ErrorLimit(Model):
             raise failure(f"the maximum {self.max:g} is below the minimum {self.min:g}")
         return self
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return or_short(schema, handler, NUMBER_FORM)
 
-
-class Precision(Model):
+class Precision(fields.Model):
     """How precise a failure probability is wanted.
 
     ``relative`` is its coefficient of variation, standard error over value: half of its 99.7 % interval is about three
     times that. ``half_width`` is half the interval itself.
     """
 
-    relative: Annotated[float, Reader("none", 0.0, True)] | None = None
-    half_width: Annotated[float, Reader("none", 0.0, True)] | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, raw: Any) -> Any:
-        return {"relative": raw} if isinstance(raw, int | float | str) and not isinstance(raw, bool) else raw
-
-    @model_validator(mode="after")
-    def _one(self) -> Precision:
-        if (self.relative is None) == (self.half_width is None):
-            raise failure(
-                "give either 'relative', a coefficient of variation, or 'half_width', half the 99.7 % interval"
-            )
-        return self
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return or_short(schema, handler, NUMBER_FORM)
+    bare, short = "relative", (fields.NUMBER_FORM,)
+    one_of = (
+        "give either 'relative', a coefficient of variation, or 'half_width', half the 99.7 % interval",
+        "relative",
+        "half_width",
+    )
+    relative: fields.Positive | None = None
+    half_width: fields.Positive | None = None
 
 
-class Cost(Model):
+class Cost(fields.Model):
     """What a tolerance T costs: a/T^exponent.
 
     T is as the study gives it, in its units: half the width of the tolerance, sigma, or the mean radial clearance.
     """
 
-    a: Positive = 1.0
-    exponent: Positive = 1.0
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, raw: Any) -> Any:
-        return {"a": raw} if isinstance(raw, int | float | str) and not isinstance(raw, bool) else raw
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return or_short(schema, handler, NUMBER_FORM)
+    bare, short = "a", (fields.NUMBER_FORM,)
+    a: fields.Positive = 1.0
+    exponent: fields.Positive = 1.0
 
 
-class Allocate(Model):
+class Allocate(fields.Model):
     """The cheapest tolerances that reach a reliability at every pose, each by itself (not over a cycle).
 
     All dimensions are allocated, random loads and clearances (radius and its tolerance together) where `cost` names
     them; what it does not name costs 1/T.
     """
 
-    reliability: Annotated[float, Reader("none", 0.0, True)]
+    reliability: fields.Positive
     cost: dict[str, Cost] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -291,47 +217,39 @@ class Correlated(NamedTuple):
     coefficient: float
 
 
-class _Correlation:
-    """Annotation of one correlation: [name, name, coefficient]."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"type": "array", "prefixItems": [NAME_FORM, NAME_FORM, NUMBER_FORM], "minItems": 3, "maxItems": 3}
-
-    @staticmethod
-    def _validate(raw: Any, info: ValidationInfo) -> Correlated:
-        if not isinstance(raw, list) or len(raw) != 3 or not all(isinstance(name, str) for name in raw[:2]):
-            raise failure(f"a correlation is [name, name, coefficient], for example [r1, r2, 0.5], not {shown(raw)}")
-        coefficient = read_number(raw[2], info.context or Context(), "none").nominal
-        if not -1.0 < coefficient < 1.0 and coefficient == coefficient:
-            raise failure(
-                f"a correlation lies between -1 and 1, not {coefficient:g}; what is the same is one parameter"
-            )
-        if raw[0] == raw[1]:
-            raise failure(f"{raw[0]!r} is correlated with itself")
-        return Correlated(raw[0], raw[1], coefficient)
+def _correlation(raw: Any, context: Context) -> Correlated:
+    if not isinstance(raw, list) or len(raw) != 3 or not all(isinstance(name, str) for name in raw[:2]):
+        raise failure(f"a correlation is [name, name, coefficient], for example [r1, r2, 0.5], not {shown(raw)}")
+    coefficient = read_number(raw[2], context, "none").nominal
+    if abs(coefficient) >= 1.0:
+        raise failure(f"a correlation lies between -1 and 1, not {coefficient:g}; what is the same is one parameter")
+    if raw[0] == raw[1]:
+        raise failure(f"{raw[0]!r} is correlated with itself")
+    return Correlated(raw[0], raw[1], coefficient)
 
 
-class ReliabilitySection(PoseSection):
+_CORRELATION = {
+    "type": "array",
+    "prefixItems": [fields.NAME_FORM, fields.NAME_FORM, fields.NUMBER_FORM],
+    "minItems": 3,
+    "maxItems": 3,
+}
+
+
+class ReliabilitySection(MotionSection):
     """How precise is it when it is really made?"""
 
     dimensions: dict[str, Dimension] = Field(default_factory=dict)
     clearances: dict[str, Clearance] = Field(default_factory=dict)
-    correlation: tuple[Annotated[Correlated, _Correlation()], ...] = ()
-    outputs: CoordinateNames | None = None
-    rates: dict[CoordinateName, Number] = Field(default_factory=dict)
-    accelerations: dict[CoordinateName, Number] = Field(default_factory=dict)
-    speed: Speed | None = None
-    limits: dict[CoordinateName, ErrorLimit] = Field(default_factory=dict)
-    load: tuple[Number, ...] | None = None
+    correlation: tuple[Annotated[Correlated, fields.Read(_correlation, _CORRELATION)], ...] = ()
+    limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
+    load: tuple[fields.Number, ...] | None = None
     methods: Annotated[
-        tuple[Annotated[str, Choice(METHODS)], ...],
-        BeforeValidator(one_or_many),
-        OrShort(({"enum": list(METHODS)},)),
+        tuple[Annotated[str, fields.Choice(METHODS)], ...],
+        BeforeValidator(fields.as_list),
+        fields.OrOne(),
     ] = DEFAULT_METHODS
-    samples: Annotated[int, Whole(2, 10**15)] = 40_000
+    samples: Annotated[int, fields.Whole(2, 10**15)] = 40_000
     precision: Precision | None = None
-    sobol: Annotated[int, Whole(0, 10**9)] | None = None
+    sobol: Annotated[int, fields.Whole(0, 10**9)] | None = None
     allocate: Allocate | None = None

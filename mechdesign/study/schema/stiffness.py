@@ -5,31 +5,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo, model_validator
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, model_validator
 
-from mechdesign.study.build.section import Model
-from mechdesign.study.schema.lists import as_list
+from mechdesign.mechanism.model import Quantity
+from mechdesign.study.build.names import GROUND
+from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
-from mechdesign.study.text.numbers import (
-    NUMBER_FORM,
-    Angle,
-    AnyName,
-    Context,
-    LinkName,
-    Number,
-    PointName,
-    Positive,
-    PositiveArea,
-    PositiveInertia,
-    PositiveLength,
-    PositiveNumber,
-    PositiveStress,
-    failure,
-    or_short,
-    read_number,
-)
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.numbers import Context, failure, read_number
 
 _ELASTIC = (
     "The section of each link that bends; links not named are rigid. A link given by its ends is a beam from the first "
@@ -39,30 +23,30 @@ _ELASTIC = (
 )
 # Keys of each kind of section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
+_STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
-class Profile(Model):
+class Profile(fields.Model):
     """A cross-section: a rectangle (its height lies in the plane), a bar or a tube, or its area and inertia.
 
     ``shear: true`` adds the compliance of shear by Timoshenko's theory, with the factor of the section's form (Cowper
     1966, with Poisson's ratio 0: 5/6 of a rectangle, 6/7 of a round bar, 1/2 of a thin tube), or a given one.
     """
 
-    E: PositiveStress
-    G: PositiveStress | None = None
-    width: PositiveLength | None = None
-    height: PositiveLength | None = None
-    diameter: PositiveLength | None = None
-    inner_diameter: PositiveLength | None = None
-    area: PositiveArea | None = None
-    inertia: PositiveInertia | None = None
+    E: fields.PositiveStress
+    G: fields.PositiveStress | None = None
+    width: fields.PositiveLength | None = None
+    height: fields.PositiveLength | None = None
+    diameter: fields.PositiveLength | None = None
+    inner_diameter: fields.PositiveLength | None = None
+    area: fields.PositiveArea | None = None
+    inertia: fields.PositiveInertia | None = None
     shear: bool = False
-    shear_factor: Positive | None = None
+    shear_factor: fields.Positive | None = None
 
     @model_validator(mode="after")
     def _one_form(self) -> Profile:
-        keys = dict.fromkeys(key for form in _FORMS for key in form)
-        if tuple(key for key in keys if getattr(self, key) is not None) not in _FORMS:
+        if tuple(self.given(*dict.fromkeys(key for form in _FORMS for key in form))) not in _FORMS:
             raise failure(
                 "a section is {E, width, height}, {E, diameter}, {E, diameter, inner_diameter} or {E, area, inertia}"
             )
@@ -89,58 +73,89 @@ class Profile(Model):
         return area, inertia, self.shear_factor or factor
 
 
-class Bearing(Model):
+class Bearing(fields.Model):
     """Stiffness of a joint itself: across, and of a slide also against turning; what is not given is rigid."""
 
-    radial: PositiveNumber | None = None
-    moment: PositiveNumber | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, raw: Any) -> Any:
-        return {"radial": raw} if isinstance(raw, int | float | str) and not isinstance(raw, bool) else raw
+    bare, short = "radial", (fields.NUMBER_FORM,)
+    radial: fields.PositiveNumber | None = None
+    moment: fields.PositiveNumber | None = None
 
     @model_validator(mode="after")
     def _some(self) -> Bearing:
-        if self.radial is None and self.moment is None:
+        if not self.given("radial", "moment"):
             raise failure("a bearing has a 'radial' stiffness, and that of a slide a 'moment' stiffness too")
         return self
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return or_short(schema, handler, NUMBER_FORM)
+
+def _series(raw: Any, context: Context) -> float:
+    """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
+    parts = [read_number(each, context).nominal for each in fields.as_list(raw)]
+    if not parts:
+        raise failure("expected a stiffness, or a list of those in series")
+    for part in parts:
+        if part <= 0:
+            raise failure(f"must be positive, not {part:g}")
+    return 1.0 / sum(1.0 / part for part in parts)
 
 
-class _Series:
-    """Annotation of a stiffness: a number, or a list of those in series, such as motor, gear and belt."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self._validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"anyOf": [NUMBER_FORM, {"type": "array", "items": NUMBER_FORM, "minItems": 1}],
-                "description": "a stiffness, or those of what is in series"}  # fmt: skip
-
-    @staticmethod
-    def _validate(raw: Any, info: ValidationInfo) -> float:
-        parts = [read_number(each, info.context or Context()).nominal for each in as_list(raw)]
-        if not parts:
-            raise failure("expected a stiffness, or a list of those in series")
-        for part in parts:
-            if part <= 0:
-                raise failure(f"must be positive, not {part:g}")
-        return 1.0 / sum(1.0 / part for part in parts)
+_SERIES = {
+    "anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}],
+    "description": "a stiffness, or those of what is in series",
+}
 
 
 class StiffnessSection(PoseSection):
     """How stiff is it?"""
 
-    link: LinkName | None = None
-    at: PointName = Field(description="the point whose stiffness is asked")
+    link: fields.LinkName | None = None
+    at: fields.PointName = Field(description="the point whose stiffness is asked")
     sections: dict[str, Profile] = Field(default_factory=dict)
-    elastic: dict[LinkName, str] = Field(default_factory=dict, description=_ELASTIC)
-    actuators: dict[AnyName, Annotated[float, _Series()]] = Field(default_factory=dict)
-    bearings: dict[AnyName, Bearing] = Field(default_factory=dict)
-    direction: Angle | None = None
-    loads: tuple[tuple[Number, ...], ...] = ()
-    characteristic_length: PositiveLength | None = None
+    elastic: dict[fields.LinkName, str] = Field(default_factory=dict, description=_ELASTIC)
+    actuators: dict[fields.AnyName, Annotated[float, fields.Read(_series, _SERIES)]] = Field(default_factory=dict)
+    bearings: dict[fields.AnyName, Bearing] = Field(default_factory=dict)
+    direction: fields.Angle | None = None
+    loads: tuple[tuple[fields.Number, ...], ...] = ()
+    characteristic_length: fields.PositiveLength | None = None
+
+
+def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
+    """Check what is named, the units of stiffnesses, and the loads; returns the section with loads of three numbers."""
+    root: KeyPath = ("stiffness",)
+    right = checker.known(section.at, checker.names.owners, "point", (*root, "at"))
+    if right and section.link is None and GROUND in checker.names.owners[section.at]:
+        checker.reporter.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
+    if section.link is not None and checker.known(section.link, checker.names.moving, "moving link", (*root, "link")):
+        points = checker.names.points_of(section.link)
+        if right and section.at not in points:
+            message = f"link {section.link!r} has no point {section.at!r}; it has {', '.join(points)}"
+            checker.reporter.report((*root, "at"), message)
+    for link, profile in section.elastic.items():
+        path: KeyPath = (*root, "elastic", link)
+        checker.known(link, checker.names.moving, "moving link", path, at_key=True)
+        checker.known(profile, section.sections, "section", path)
+    for profile in section.sections:
+        if profile not in section.elastic.values():
+            others = [other for other in section.sections if other != profile]
+            checker.reporter.unused((*root, "sections", profile), "section", others)
+    for drive in section.actuators:
+        path = (*root, "actuators", drive)
+        if checker.known(drive, checker.names.drives, "drive", path, at_key=True):
+            checker.kind(path, _STIFFNESS_KINDS[checker.names.drives[drive]])
+    slides = [*checker.names.slides, *checker.names.legs]
+    clamped = [set(other.fixed) for other in checker.names.section.joints.values() if other.fixed is not None]
+    pins = [p for p, owners in checker.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
+    for joint, bearing in section.bearings.items():
+        path = (*root, "bearings", joint)
+        if not checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
+            continue
+        if bearing.radial is not None:
+            checker.kind((*path, "radial"), "stiffness")
+        if bearing.moment is not None:
+            checker.kind((*path, "moment"), "rotational_stiffness")
+            if joint not in slides:
+                checker.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
+    loads = [
+        checker.load(load, (*root, "loads", index), on_pin=section.link is None)
+        for index, load in enumerate(section.loads)
+    ]
+    return section.model_copy(update={"loads": tuple(loads)})

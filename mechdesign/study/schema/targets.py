@@ -11,13 +11,14 @@ import numpy as np
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.build.target_models import Wanted
-from mechdesign.study.poses import Poses, read_table
+from mechdesign.study.build.section import Wanted
+from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.text.document import Path
+from mechdesign.study.schema.paths import read_table
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.reporter import Reporter
 
-ROOT: Path = ("mechanism", "targets")
+ROOT: KeyPath = ("mechanism", "targets")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,35 +60,32 @@ def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) 
     found: dict[str, Target] = {}
     seen: dict[str, str] = {}
     for owner, value in wanted.items():
-        path: Path = (*ROOT, owner)
+        path: KeyPath = (*ROOT, owner)
         point = owner in checker.names.owners
         if not point and checker.coordinate(owner, path, at_key=True) is None:
             continue
         coordinates = (f"{owner}.x", f"{owner}.y") if point else (owner,)
-        twice = next((name for name in coordinates if name in seen), None)
-        if twice is not None:
-            message = f"{twice} has a target already, by {seen[twice]!r}"
-            checker.reporter.report(path, message, at_key=True)
+        for name in [name for name in coordinates if name in seen][:1]:
+            checker.reporter.report(path, f"{name} has a target already, by {seen[name]!r}", at_key=True)
         seen.update(dict.fromkeys(coordinates, owner))
-        if value.expression is not None:
-            right = _check_expression(checker, owner, value.expression, path, point)
-            table = None
-        else:
-            table = _table(checker, owner, value, path, folder, len(coordinates))
-            right = table is not None
-        if right:
-            found[owner] = Target(owner, coordinates, value.expression, table)
+        quantity = "length" if point else checker.names.coordinates[owner]
+        if value.expression is None:
+            table = _table(checker, owner, value, path, folder, len(coordinates), quantity)
+            if table is not None:
+                found[owner] = Target(owner, coordinates, table=table)
+        elif _right(checker, owner, value.expression, path, point):
+            if quantity != "none":
+                checker.kind(path, quantity)
+            found[owner] = Target(owner, coordinates, value.expression)
     return found
 
 
-def _check_expression(checker: Checker, owner: str, expression: Expression, path: Path, point: bool) -> bool:
+def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, point: bool) -> bool:
+    """Whether the target of a coordinate is an expression over others."""
     if point:
         message = f"the target of a point is a path; give {owner}.x and {owner}.y their expressions"
         checker.reporter.report(path, message)
         return False
-    quantity = checker.names.coordinates[owner]
-    if quantity != "none":
-        checker.kind(path, quantity)
     right = True
     for name in sorted(expression.names):
         if name == owner:
@@ -98,7 +96,10 @@ def _check_expression(checker: Checker, owner: str, expression: Expression, path
     return right
 
 
-def _table(checker: Checker, owner: str, value: Wanted, path: Path, folder: pathlib.Path, count: int) -> Floats | None:
+def _table(
+    checker: Checker, owner: str, value: Wanted, path: KeyPath, folder: pathlib.Path, count: int, quantity: str
+) -> Floats | None:
+    """The target's table, where its rows have `count` numbers or one more."""
     try:
         table = np.array(value.rows) if value.file is None else read_table(folder / value.file, most=3)
     except StudyError as error:
@@ -109,11 +110,9 @@ def _table(checker: Checker, owner: str, value: Wanted, path: Path, folder: path
         what = "[x, y] or [drive, x, y]" if count == 2 else "[value] or [drive, value]"
         checker.reporter.report(path, f"a row of the target of {owner!r} is {what}, not {columns} numbers")
         return None
-    quantity = "length" if count == 2 else checker.names.coordinates[owner]
-    if value.rows is not None and quantity != "none":
-        for index, row in enumerate(value.rows):
-            for place in range(len(row) - count, len(row)):
-                checker.kind((*path, index, place) if columns > 1 else (*path, index), quantity)
+    if value.file is None and quantity != "none":
+        for index, place in np.ndindex(len(table), count):
+            checker.kind((*path, index, place + columns - count), quantity)
     if columns == count:
         return table
     table = table[np.argsort(table[:, 0], kind="stable")]

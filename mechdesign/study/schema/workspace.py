@@ -7,34 +7,23 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from mechdesign.indices import index_names
-from mechdesign.study.build.section import Model
-from mechdesign.study.schema.lists import Numbers, as_list
-from mechdesign.study.text.numbers import (
-    Angle,
-    Choice,
-    CoordinateName,
-    Length,
-    NonNegativeAngle,
-    Number,
-    PointName,
-    Positive,
-    PositiveLength,
-    Whole,
-    failure,
-)
+from mechdesign.indices import INDEX_NAMES, needed_section
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.numbers import failure
 
 # A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
 WHOLE = 3e-6
 
 
-class Scan(Model):
+class Scan(fields.Model):
     """Rays about a point; angles in the study's unit."""
 
-    about: tuple[Length, Length] | None = None
-    from_: Angle | None = Field(None, alias="from")
-    to: Angle | None = None
-    rays: Annotated[int, Whole(2, 1_000_000)] | None = None
+    about: tuple[fields.Length, fields.Length] | None = None
+    from_: fields.Angle | None = Field(None, alias="from")
+    to: fields.Angle | None = None
+    rays: Annotated[int, fields.Whole(2, 1_000_000)] | None = None
 
     @field_validator("to")
     @classmethod
@@ -50,12 +39,12 @@ class Scan(Model):
         return to
 
 
-class Integrate(Model):
+class Integrate(fields.Model):
     """The rule of integration over the workspace."""
 
-    rule: Annotated[str, Choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
-    tolerance: Positive = 1e-5
-    nodes: Annotated[int, Whole(1, 100_000)] | None = None
+    rule: Annotated[str, fields.Choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
+    tolerance: fields.Positive = 1e-5
+    nodes: Annotated[int, fields.Whole(1, 100_000)] | None = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Integrate:
@@ -64,11 +53,11 @@ class Integrate(Model):
         return self
 
 
-class Over(Model):
+class Over(fields.Model):
     """A range of a held coordinate: the region in which some value of it is reached, or every one."""
 
-    from_: Number = Field(alias="from")
-    to: Number
+    from_: fields.Number = Field(alias="from")
+    to: fields.Number
     all: bool = False
 
 
@@ -76,17 +65,40 @@ def _form(raw: Any) -> str:
     return "over" if isinstance(raw, dict | Over) else "values"
 
 
-At = Annotated[Annotated[Over, Tag("over")] | Annotated[Numbers, Tag("values")], Discriminator(_form)]
+At = Annotated[Annotated[Over, Tag("over")] | Annotated[fields.Numbers, Tag("values")], Discriminator(_form)]
 
 
-class WorkspaceSection(Model):
+class WorkspaceSection(fields.Model):
     """Where can it work?"""
 
-    point: PointName
-    at: dict[CoordinateName, At] = Field(default_factory=dict)
+    point: fields.PointName
+    at: dict[fields.CoordinateName, At] = Field(default_factory=dict)
     scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
     integrate: Integrate = Integrate()
-    margin: NonNegativeAngle = 0.0
-    assembly: Annotated[str, Choice(("same", "any"))] = "same"
-    characteristic_length: PositiveLength | None = None
-    indices: Annotated[tuple[Annotated[str, Choice(index_names)], ...], BeforeValidator(as_list)] | None = None
+    margin: fields.NonNegativeAngle = 0.0
+    assembly: Annotated[str, fields.Choice(("same", "any"))] = "same"
+    characteristic_length: fields.PositiveLength | None = None
+    indices: (
+        Annotated[tuple[Annotated[str, fields.Choice(INDEX_NAMES)], ...], BeforeValidator(fields.as_list)] | None
+    ) = None
+
+
+def check(checker: Checker, section: WorkspaceSection) -> None:
+    """Check the names, units and ranges of a workspace."""
+    root: KeyPath = ("workspace",)
+    checker.known(section.point, checker.names.owners, "point", (*root, "point"))
+    checker.coordinates(section.at, (*root, "at"))
+    ranges = [name for name, values in section.at.items() if isinstance(values, Over)]
+    if len(ranges) > 1:
+        checker.reporter.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
+    for name, values in section.at.items():
+        if isinstance(values, Over):
+            checker.range(values.from_, values.to, (*root, "at", name))
+        elif not values:
+            checker.reporter.report((*root, "at", name), "an empty list of values")
+    for index, name in enumerate(section.indices or ()):
+        checker.needs(needed_section(name), f"the index {name!r}", (*root, "indices", index))
+    scan = section.scan
+    if (scan.from_ is None) != (scan.to is None):
+        checker.reporter.report((*root, "scan"), "'from' and 'to' belong together")
+    checker.range(scan.from_, scan.to, (*root, "scan"))

@@ -6,17 +6,16 @@ before anything is built. Scalars follow YAML 1.2: ``1e-3`` is a number, ``on`` 
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import yaml
 
 from mechdesign.errors import Problem, StudyError
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 MAX_DEPTH = 40
 MAX_NODES = 200_000
@@ -33,11 +32,16 @@ _WORDS_BOOLEAN = {"true": True, "True": True, "TRUE": True, "false": False, "Fal
 
 @dataclass(frozen=True)
 class Mark:
-    """A place in a text, counted from 1; line 0 where there is no text (an override)."""
+    """A place in a text, counted from 1; line 0 where there is no text (an override).
+
+    `start` and `end` are those of the value there, in characters of the text from 0.
+    """
 
     file: str
     line: int = 0
     column: int = 0
+    start: int = 0
+    end: int = 0
 
     def problem(self, message: str, key: str = "") -> Problem:
         """Build a problem that stands here."""
@@ -46,27 +50,20 @@ class Mark:
 
 @dataclass
 class Document:
-    """Plain data (dict, list, str, int, float, bool, None) and where each part of it stands.
+    """Plain data (dict, list, str, int, float, bool, None) and where its keys and values stand.
 
-    Parameters
-    ----------
-    keys, values : mapping of path to Mark
-        Where a mapping's key, and a value, stands; a path is the sequence of keys and indices from the root.
-    problems : list of Problem
-        Mistakes of writing that leave the rest readable: duplicate keys, expressions split at a comma.
-    spoiled : set of paths
-        Parts in which such a mistake was found, where further complaints would only repeat it.
-    added : set of paths
-        Entries that the text does not have: an override made them.
+    A path is the sequence of keys and indices from the root.
     """
 
     name: str
     data: Any
-    keys: dict[Path, Mark] = field(default_factory=dict)
-    values: dict[Path, Mark] = field(default_factory=dict)
+    keys: dict[KeyPath, Mark] = field(default_factory=dict)
+    values: dict[KeyPath, Mark] = field(default_factory=dict)
+    # Mistakes of writing that leave the rest readable, and the parts where complaints would only repeat them.
     problems: list[Problem] = field(default_factory=list)
-    spoiled: set[Path] = field(default_factory=set)
-    added: set[Path] = field(default_factory=set)
+    spoiled: set[KeyPath] = field(default_factory=set)
+    # Entries that the text does not have: an override made them.
+    added: set[KeyPath] = field(default_factory=set)
 
 
 def dotted(path: Sequence[str | int]) -> str:
@@ -156,7 +153,8 @@ class _Builder:
             yield loader.get_event()
 
     def _mark(self, event: Any) -> Mark:
-        return Mark(self.name, event.start_mark.line + 1, event.start_mark.column + 1)
+        begin, end = event.start_mark, event.end_mark
+        return Mark(self.name, begin.line + 1, begin.column + 1, begin.index, end.index)
 
     def _node(self, event: Any, events: Iterator[Any], depth: int, in_flow: bool) -> _Node:
         mark = self._mark(event)
@@ -178,6 +176,7 @@ class _Builder:
             children: list[_Node] = []
             while not isinstance(child := next(events), yaml.CollectionEndEvent):
                 children.append(self._node(child, events, depth + 1, inside))
+            node.mark = replace(node.mark, end=self._mark(child).end)
             if isinstance(event, yaml.SequenceStartEvent):
                 node.items = children
             else:
@@ -186,7 +185,7 @@ class _Builder:
             self.anchors[event.anchor] = node
         return node
 
-    def _expand(self, node: _Node, path: Path, depth: int) -> Any:
+    def _expand(self, node: _Node, path: KeyPath, depth: int) -> Any:
         self.nodes += 1
         if self.nodes > MAX_NODES:
             raise StudyError([node.mark.problem(f"more than {MAX_NODES} values once its aliases are expanded")])
@@ -199,13 +198,13 @@ class _Builder:
             return self._expand_mapping(node.pairs, path, depth)
         return self._scalar(node, path)
 
-    def _expand_mapping(self, pairs: list[tuple[_Node, _Node]], path: Path, depth: int) -> dict[str, Any]:
+    def _expand_mapping(self, pairs: list[tuple[_Node, _Node]], path: KeyPath, depth: int) -> dict[str, Any]:
         mapping: dict[str, Any] = {}
         for key_node, value_node in pairs:
             if key_node.scalar is None:
                 self.document.problems.append(key_node.mark.problem("a key must be a word", dotted(path)))
                 continue
-            here: Path = (*path, key_node.scalar)
+            here: KeyPath = (*path, key_node.scalar)
             if key_node.scalar in mapping:
                 first = self.document.keys[here]
                 message = f"duplicate key; {key_node.scalar!r} is given in line {first.line} already"
@@ -215,7 +214,7 @@ class _Builder:
             mapping[key_node.scalar] = self._expand(value_node, here, depth + 1)
         return mapping
 
-    def _check_split(self, nodes: list[_Node], path: Path) -> None:
+    def _check_split(self, nodes: list[_Node], path: KeyPath) -> None:
         """Find ``{to: min(a, b)}``, which YAML splits at the comma into two entries."""
         if path in self.document.spoiled:
             return
@@ -230,7 +229,7 @@ class _Builder:
             self.document.spoiled.add(path)
             return
 
-    def _scalar(self, node: _Node, path: Path) -> Any:
+    def _scalar(self, node: _Node, path: KeyPath) -> Any:
         text = node.scalar or ""
         if not node.plain:
             return text
@@ -243,11 +242,7 @@ class _Builder:
         if _FLOAT.fullmatch(text):
             return float(text)
         if _NOT_FINITE.fullmatch(text):
-            return (
-                math.nan
-                if "n" in text.lower().replace("inf", "")
-                else math.copysign(math.inf, -1 if text[0] == "-" else 1)
-            )
+            return float(text.replace(".", ""))
         return text
 
 
@@ -262,3 +257,19 @@ def plain(data: Any) -> Any:
     if isinstance(data, Mapping):
         return {key: plain(value) for key, value in data.items()}
     return [plain(item) for item in data] if isinstance(data, list) else data
+
+
+def has(data: Any, key: Any) -> bool:
+    """Whether a mapping has a key, or a list an index."""
+    if isinstance(data, list):
+        return isinstance(key, int) and 0 <= key < len(data)
+    return isinstance(data, Mapping) and key in data
+
+
+def leaves(data: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
+    """Every value of data that is neither a mapping nor a list, with its path."""
+    if isinstance(data, Mapping | list):
+        for key, value in data.items() if isinstance(data, Mapping) else enumerate(data):
+            yield from leaves(value, (*path, key))
+    else:
+        yield path, data

@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from types import UnionType
+from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
-from mechdesign.errors import Problem, StudyError
-from mechdesign.study.text.document import Document, Path, dotted, plain
-from mechdesign.study.text.numbers import LOST, nearest, shown, suggestion
+from mechdesign.errors import Problem, StudyError, nearest, suggestion
+from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
+from mechdesign.study.text.numbers import LOST, shown
+from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, fits, measure
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
 # Keys that come with a later release, wherever they stand.
 LATER = ("matrix",)
+# What is expected where pydantic says of which type an error is.
+_EXPECTED = defaultdict(
+    lambda: "something else",
+    string_type="a text",
+    dict_type="a mapping of names",
+    model_type="a mapping",
+    model_attributes_type="a mapping",
+    tuple_type="a list",
+    list_type="a list",
+    bool_type="true or false",
+    bool_parsing="true or false",
+    too_long="a shorter list",
+    none_required="nothing",
+)
 
 
 def unknown_key(name: str, known: Iterable[str]) -> str:
@@ -51,11 +68,24 @@ class Reporter:
         if problem not in self.problems:
             self.problems.append(problem)
 
+    def kind(self, path: KeyPath, kind: str) -> None:
+        """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
+        for keys, raw in leaves(self.raw(path)):
+            if not isinstance(raw, str) or not QUANTITY.fullmatch(raw):
+                continue
+            try:
+                powers = measure(raw)[1]
+            except QuantityError:
+                continue
+            if not fits(powers, kind):
+                message = f"{raw!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected"
+                self.report((*path, *keys), message)
+
     def warn(self, path: Sequence[str | int], message: str) -> None:
         """Note what is likely a mistake, though the study can be answered, at a key of the data."""
         self.warnings.append(self._placed(self.written(path), message, True))
 
-    def unused(self, path: Path, what: str, others: Iterable[str]) -> None:
+    def unused(self, path: KeyPath, what: str, others: Iterable[str]) -> None:
         """Note a named thing that nothing uses: one that an override brought in is a name misspelt."""
         name = path[-1]
         if path in self.document.added:
@@ -64,7 +94,7 @@ class Reporter:
         else:
             self.warn(path, f"nothing uses {what} {name!r}")
 
-    def _placed(self, found: Path, message: str, at_key: bool) -> Problem:
+    def _placed(self, found: KeyPath, message: str, at_key: bool) -> Problem:
         known = self._nearest(found)
         mark = self.document.values[known]
         if (at_key or known != found) and known in self.document.keys:
@@ -91,19 +121,19 @@ class Reporter:
         """The data as written at a path, None where there is none."""
         data = self.document.data
         for segment in self.written(path):
-            if not _has(data, segment):
+            if not has(data, segment):
                 return None
             data = data[segment]
         return data
 
-    def written(self, path: Sequence[str | int]) -> Path:
+    def written(self, path: Sequence[str | int]) -> KeyPath:
         """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
         data: Any = self.document.data
         found: list[str | int] = []
         remaining = list(path)
         while remaining:
             segment = remaining.pop(0)
-            if _has(data, segment):
+            if has(data, segment):
                 found.append(segment)
                 data = data[segment]
             elif data is None or not found:
@@ -121,12 +151,12 @@ class Reporter:
                 found.append(segment)
         return tuple(found)
 
-    def _nearest(self, path: Path) -> Path:
+    def _nearest(self, path: KeyPath) -> KeyPath:
         while path and path not in self.document.values:
             path = path[:-1]
         return path
 
-    def report_validation(self, error: ValidationError, root: type[BaseModel], prefix: Path) -> None:
+    def report_validation(self, error: ValidationError, root: type[BaseModel], prefix: KeyPath) -> None:
         """Note every error of the validation of the part at `prefix`, in words."""
         for item in error.errors(include_url=False):
             location = (*prefix, *item["loc"])
@@ -135,16 +165,15 @@ class Reporter:
                 location = location[:-1]
             kind = item["type"]
             if kind == "extra_forbidden":
-                known = schema_keys(root, location[:-1])
+                known = schema_fields(root, location[:-1])
                 self.report(location, unknown_key(str(location[-1]), known), at_key=True)
             elif kind == "missing":
-                field = _fields(root, location[:-1]).get(str(location[-1]))
+                field = schema_fields(root, location[:-1]).get(str(location[-1]))
                 meaning = f": {field.description}" if field is not None and field.description else ""
                 self.report(location, f"is missing{meaning}", at_key=True)
             else:
-                self.report(
-                    location, str(item["msg"]) if kind == "study" else _expected(kind, item["input"]), at_key=at_key
-                )
+                message = item["msg"] if kind == "study" else f"expected {_EXPECTED[kind]}, not {shown(item['input'])}"
+                self.report(location, message, at_key=at_key)
 
     def mended(self, error: ValidationError, root: type[BaseModel], key: str, raw: Any) -> Any:
         """The data of a top-level part with the mistakes of a validation taken out, as far as that is possible.
@@ -157,70 +186,29 @@ class Reporter:
             *inner, last = self.written(location)[1:] or (None,)
             holder: Any = part
             for segment in inner:
-                holder = holder[segment] if _has(holder, segment) else None
+                holder = holder[segment] if has(holder, segment) else None
             if item["type"] == "extra_forbidden" and isinstance(holder, dict) and last in holder:
                 value = holder.pop(last)
-                near = nearest(str(last), schema_keys(root, location[:-1]))
+                near = nearest(str(last), schema_fields(root, location[:-1]))
                 if near is not None:
                     holder.setdefault(near, value)
-            elif _has(holder, last) and isinstance(holder[last], int | float | str):
+            elif has(holder, last) and isinstance(holder[last], int | float | str):
                 holder[last] = LOST
         return part
 
 
-def _has(data: Any, key: Any) -> bool:
-    if isinstance(data, list):
-        return isinstance(key, int) and 0 <= key < len(data)
-    return isinstance(data, dict) and key in data
-
-
-def _expected(kind: str, raw: Any) -> str:
-    what = {
-        "string_type": "a text",
-        "dict_type": "a mapping of names",
-        "model_type": "a mapping",
-        "model_attributes_type": "a mapping",
-        "tuple_type": "a list",
-        "list_type": "a list",
-        "bool_type": "true or false",
-        "bool_parsing": "true or false",
-        "too_long": "a shorter list",
-        "none_required": "nothing",
-    }.get(kind, "something else")
-    return f"expected {what}, not {shown(raw)}"
-
-
-def _fields(root: type[BaseModel], location: Sequence[str | int]) -> dict[str, Any]:
-    """Fields of the model at a location, none where there is no model."""
+def schema_fields(root: type[BaseModel], location: Sequence[str | int]) -> dict[str, FieldInfo]:
+    """Fields, by their keys in the text, of the model at a location of the schema; none where there is no model."""
     current: Any = root
-    for segment in location:
-        current = _strip(current)
-        if isinstance(current, type) and issubclass(current, BaseModel):
-            fields = current.model_fields.items()
-            current = next((field.annotation for name, field in fields if segment in (field.alias, name)), None)
-        elif get_origin(current) is dict:
-            current = get_args(current)[1]
-        elif get_origin(current) is tuple:
-            current = get_args(current)[0]
+    for segment in (*location, None):
+        while get_origin(current) in (Annotated, Union, UnionType):
+            current = next(arm for arm in get_args(current) if arm is not NoneType)
+        model = isinstance(current, type) and issubclass(current, BaseModel)
+        fields = {field.alias or name: field for name, field in current.model_fields.items()} if model else {}
+        if segment is None:
+            return fields
+        if get_origin(current) in (dict, tuple):
+            current = get_args(current)[-1 if get_origin(current) is dict else 0]
         else:
-            return {}
-    current = _strip(current)
-    if isinstance(current, type) and issubclass(current, BaseModel):
-        return dict(current.model_fields)
+            current = fields[str(segment)].annotation if segment in fields else None
     return {}
-
-
-def _strip(annotation: Any) -> Any:
-    """The type under Annotated and Optional."""
-    while True:
-        if get_origin(annotation) is Annotated:
-            annotation = get_args(annotation)[0]
-        elif get_origin(annotation) in (Union, UnionType):
-            annotation = next((arm for arm in get_args(annotation) if arm is not type(None)), None)
-        else:
-            return annotation
-
-
-def schema_keys(root: type[BaseModel], location: Sequence[str | int]) -> list[str]:
-    """Keys that the schema knows at a location."""
-    return [field.alias or name for name, field in _fields(root, location).items()]

@@ -7,10 +7,12 @@ that ``rad/s`` is never taken for a frequency.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 Powers = tuple[int, int, int, int]
@@ -106,15 +108,17 @@ class Units:
     ----------
     length, angle, time, force : str
         As the study writes them; length may be ``dimensionless``.
-    angle_factor : float
-        Radians in one unit of angle.
     """
 
     length: str = "mm"
     angle: str = "deg"
     time: str = "s"
     force: str = "N"
-    angle_factor: float = math.pi / 180.0
+
+    @cached_property
+    def angle_factor(self) -> float:
+        """Radians in one unit of angle."""
+        return _scale(self.angle)
 
     def label(self, kind: str) -> str:
         """Unit of a kind of quantity as tables show it (``mm/s``, ``N*mm/rad``); empty for pure numbers."""
@@ -144,11 +148,7 @@ class Units:
             Where the unit is unknown or of another kind.
         """
         number, powers, factor = measure(text)
-        if (
-            kind is not None
-            and powers != KINDS[kind]
-            and not (kind == "rotational_stiffness" and powers == (1, 0, 0, 1))
-        ):
+        if kind is not None and not fits(powers, kind):
             raise QuantityError(f"{text.strip()!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected")
         if powers[0] and self.length == "dimensionless":
             raise QuantityError(f"{text.strip()!r} has a length in it, and this study's lengths are dimensionless")
@@ -158,38 +158,39 @@ class Units:
         return number * factor / scale
 
 
-def units_from(length: str, angle: str, time: str, force: str) -> tuple[Units, dict[str, str]]:
-    """Check the units' names and build Units; the second value maps a wrong entry to what is wrong with it."""
-    problems: dict[str, str] = {}
-    given = {"length": length, "angle": angle, "time": time, "force": force}
-    for kind, name in given.items():
-        if name in _COMMON.get(kind, {}) or (kind == "length" and name == "dimensionless"):
-            continue
-        try:
-            powers = measure(f"1 {name}")[1] if QUANTITY.fullmatch(f"1 {name}") else None
-        except QuantityError:
-            powers = None
-        if powers != KINDS[kind]:
-            known = ", ".join(_COMMON[kind])
-            problems[kind] = f"{name!r} is not a unit of {kind}; for example {known}"
-    if problems:
-        return Units(), problems
-    return Units(length, angle, time, force, _scale(angle)), {}
-
-
-_COMMON: dict[str, dict[str, float]] = {
-    "length": {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254},
-    "angle": {"deg": math.pi / 180.0, "rad": 1.0},
-    "time": {"s": 1.0, "min": 60.0},
-    "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605},
+# Units that are read without the registry, which takes a while to build: their kind and SI value.
+_COMMON = {
+    "mm": ("length", 1e-3),
+    "cm": ("length", 1e-2),
+    "m": ("length", 1.0),
+    "in": ("length", 0.0254),
+    "deg": ("angle", math.pi / 180.0),
+    "rad": ("angle", 1.0),
+    "s": ("time", 1.0),
+    "min": ("time", 60.0),
+    "N": ("force", 1.0),
+    "kN": ("force", 1e3),
+    "lbf": ("force", 4.4482216152605),
 }
 
 
+def check_unit(kind: str, name: str) -> None:
+    """Check a unit of length, angle, time or force; a length may be ``dimensionless``.
+
+    Raises
+    ------
+    QuantityError
+        Where it is none, with examples.
+    """
+    with contextlib.suppress(QuantityError):
+        if (kind, name) == ("length", "dimensionless") or measure(f"1 {name}")[1] == KINDS[kind]:
+            return
+    known = ", ".join(unit for unit, (what, _) in _COMMON.items() if what == kind)
+    raise QuantityError(f"{name!r} is not a unit of {kind}; for example {known}")
+
+
 def _scale(name: str) -> float:
-    """SI value of one unit, for the common ones without the registry."""
-    for common in _COMMON.values():
-        if name in common:
-            return common[name]
+    """SI value of one unit."""
     return 1.0 if name == "dimensionless" else measure(f"1 {name}")[2]
 
 
@@ -214,18 +215,21 @@ def measure(text: str) -> tuple[float, Powers, float]:
 
 
 def _common(unit: str) -> tuple[Powers, float] | None:
-    """A common unit or a quotient of two, such as ``rad/s``, without the registry, which takes a while to build."""
+    """A common unit or a quotient of two, such as ``rad/s``."""
     names = [name.strip() for name in unit.split("/")]
-    powers, factor = [0, 0, 0, 0], 1.0
-    if len(names) > 2:
+    if len(names) > 2 or any(name not in _COMMON for name in names):
         return None
-    for name, sign in zip(names, (1, -1), strict=False):
-        kind = next((k for k, known in enumerate(_COMMON.values()) if name in known), None)
-        if kind is None:
-            return None
-        powers[kind] += sign
-        factor *= list(_COMMON.values())[kind][name] ** sign
-    return (powers[0], powers[1], powers[2], powers[3]), factor
+    kind, factor = _COMMON[names[0]]
+    powers = KINDS[kind]
+    if len(names) == 2:
+        kind, divisor = _COMMON[names[1]]
+        powers, factor = _powers(a - b for a, b in zip(powers, KINDS[kind], strict=True)), factor / divisor
+    return powers, factor
+
+
+def _powers(exponents: Iterable[float]) -> Powers:
+    length, angle, time, force = map(int, exponents)
+    return length, angle, time, force
 
 
 @cache
@@ -242,9 +246,8 @@ def _unit(unit: str) -> tuple[Powers, float]:
     exponents = (length - mass, angle, time + 2 * mass, mass)
     if any(exponent != int(exponent) for exponent in exponents):
         raise QuantityError(f"the unit {unit!r} has a broken power")
-    powers = (int(exponents[0]), int(exponents[1]), int(exponents[2]), int(exponents[3]))
     # The registry's base of mass is the gram.
-    return powers, float(base.magnitude) * 1e-3**mass
+    return _powers(exponents), float(base.magnitude) * 1e-3**mass
 
 
 @cache
@@ -254,6 +257,11 @@ def _registry() -> Any:
     registry: Any = pint.UnitRegistry(None, on_redefinition="ignore")
     registry.load_definitions(_DEFINITIONS.strip().splitlines())
     return registry
+
+
+def fits(powers: Powers, kind: str) -> bool:
+    """Whether a unit is one of a kind of quantity; a rotational stiffness may leave its radian out."""
+    return powers == KINDS[kind] or (kind == "rotational_stiffness" and powers == KINDS["moment"])
 
 
 def describe(powers: Powers) -> str:
