@@ -77,19 +77,15 @@ class Jacobian:
 
     @cached_property
     @quiet
-    def twice(self) -> Value:
-        """||J||_F^2 / |det J| of two rows: sigma_max/sigma_min and its inverse added [S1, eq. 8]; 2 at isotropy."""
-        (a, b), (c, d) = self.homogeneous
-        size = self.determinant if self.homogeneous is self.entries else self._determinant(self.homogeneous)
-        return (a * a + b * b + c * c + d * d) / np.abs(size)
-
-    @cached_property
-    @quiet
     def inverse_condition(self) -> Value:
         """Smallest over largest singular value, 0 at a singularity; nan where an entry is."""
         if len(self.homogeneous) == 2:
+            # ||J||_F^2 / |det J| is s = sigma_max/sigma_min and its inverse added [S1, eq. 8], 2 at isotropy.
+            (a, b), (c, d) = self.homogeneous
+            size = self.determinant if self.homogeneous is self.entries else self._determinant(self.homogeneous)
+            twice = (a * a + b * b + c * c + d * d) / np.abs(size)
             # (s - 2)(s + 2) rather than s^2 - 4 keeps the digits near isotropy; rounding may leave s just below 2.
-            return 2 / (self.twice + np.sqrt(np.maximum(self.twice - 2, 0) * (self.twice + 2)))
+            return 2 / (twice + np.sqrt(np.maximum(twice - 2, 0) * (twice + 2)))
         least, largest = self.singular_values
         return np.where(largest > 0, least / largest, 0.0 * largest)
 
@@ -109,14 +105,6 @@ class Jacobian:
         finite = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
         values = np.linalg.svd(np.where(finite[..., None, None], matrix, 0.0), compute_uv=False)
         return np.where(finite, values[..., -1], np.nan), np.where(finite, values[..., 0], np.nan)
-
-    @cached_property
-    @quiet
-    def roundness(self) -> Value:
-        """w = ((sigma_max - sigma_min)/(sigma_max + sigma_min))^2, which is smooth where the two meet (w = 0)."""
-        if len(self.homogeneous) == 2:
-            return np.maximum(self.twice - 2, 0.0) / (self.twice + 2)
-        return ((1 - self.inverse_condition) / (1 + self.inverse_condition)) ** 2
 
 
 def _matrix(entries: Entries, shape: tuple[int, ...]) -> Floats:

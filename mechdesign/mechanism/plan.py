@@ -13,13 +13,13 @@ from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import Start, follow, guess_of, unknowns_of
-from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.mechanism.structure import Structure
+from mechdesign.mechanism.turns import nearest
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # A pose set exactly on a limit must not fall outside by rounding.
@@ -220,16 +220,14 @@ class Plan:
         given = [flat(v) for v in values]
         found, reached = solve(given, None)
         # The way as it was given comes first; but a pose is the same whatever turn its angles are told in.
-        nearest = [
-            v - 2 * np.pi * np.round((v - at) / (2 * np.pi)) if c.quantity == "angle" else v
+        turned = [
+            nearest(v, at) if c.quantity == "angle" else v
             for c, v, at in zip(self.structure.given, given, begin.given, strict=True)
         ]
-        turned = np.zeros(count, dtype=bool)
-        for one, other in zip(given, nearest, strict=True):
-            turned |= one != other
-        rows = np.flatnonzero(turned & ~reached)
+        other = np.any([np.broadcast_to(one != two, (count,)) for one, two in zip(given, turned, strict=True)], axis=0)
+        rows = np.flatnonzero(other & ~reached)
         if len(rows):
-            better, there = solve(nearest, rows)
+            better, there = solve(turned, rows)
             found[:, rows[there]], reached[rows] = better[:, there], there
         return guess_of(self.structure, found.reshape(len(found), *shape)), reached.reshape(shape)
 
@@ -247,20 +245,18 @@ class Plan:
         graph = self.core.graph
         with np.errstate(invalid="ignore"):
             open_: Value = np.zeros((), dtype=bool)
-            for group in self.structure.groups:
-                # A group that does not close leaves nan in its first unknown.
-                for root in group.angles[:1]:
-                    open_ = open_ | ~np.isfinite(np.real(state.rotations[root]))
-                for slide in group.slides[:1]:
-                    open_ = open_ | ~np.isfinite(state.slides[slide])
-                for base in group.bases[:1]:
-                    open_ = open_ | ~np.isfinite(np.real(state.nodes[base]))
+            # A group that does not close leaves nan in its first unknown.
+            known = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
+            known += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]
+            known += [state.nodes[base] for group in self.structure.groups for base in group.bases[:1]]
+            known += [state.nodes[c.node] for c in self.structure.given if c.kind in ("x", "y")]
+            known += [state.rotations[graph.bodies[c.body][0]] for c in self.structure.given if c.kind == "angle"]
+            for value in known:
+                open_ = open_ | ~np.isfinite(np.real(value))
             for slide in graph.telescopic:
                 open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
             for k, _ in self.structure.spans:
                 open_ = open_ | ~(np.asarray(state.w[k]) >= 0)
-            for value in self.structure.given:
-                open_ = open_ | ~np.isfinite(self._given_value(state, value))
         reason = np.zeros(shape, dtype=np.int8)
         reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
         if reached is not None:
@@ -290,10 +286,3 @@ class Plan:
                 for _, margin in bound.margins(configuration, places):
                     outside = np.broadcast_to(margin, configuration.shape) < -slack
                     reason[outside & (reason == Reason.OK)] = Reason.LIMIT
-
-    def _given_value(self, state: State, coordinate: Coordinate) -> Value:
-        if coordinate.kind in ("x", "y"):
-            return np.real(state.nodes[coordinate.node])
-        if coordinate.kind == "angle":
-            return np.real(state.rotations[self.core.graph.bodies[coordinate.body][0]])
-        return 0.0

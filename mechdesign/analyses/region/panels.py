@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.region.breaks import TOGETHER, Search, signatures
+from mechdesign.analyses.region.breaks import TOGETHER, all_breaks
 from mechdesign.analyses.region.raster import Raster
-from mechdesign.analyses.region.rays import Designs, Intervals, curved, trace
+from mechdesign.analyses.region.rays import Designs, Intervals, trace
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-PROBES = 4
+# Times that the reach is doubled at most.
 DOUBLINGS = 16
 # Rounds in which rays are put where the raster shows what others pass by.
-LOOKS = 3
+LOOKS = 4
 
 
 @dataclass(frozen=True)
@@ -35,21 +35,16 @@ class Effort:
     cells : int
         Cells of the raster over the width and height of what the point can reach at most: pieces and holes that hold
         a circle around a cell are never lost.
-    closer : int or None
-        Where given, designs with limits that are not quadratic along rays (angles, not distances) are looked at by so
-        many rays over the scan: such limits leave thin parts.
     """
 
     rays: int
     samples: int
     cells: int
-    closer: int | None = None
 
 
-# One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it, and
-# looked at more closely where limits of angles may leave thin parts.
+# One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
 SINGLE = Effort(128, 48, 192)
-BATCH = Effort(16, 12, 24, 64)
+BATCH = Effort(16, 12, 24)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,30 +84,20 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     """
     count, samples = designs.count, effort.samples
     raster = Raster.of(designs, effort.cells, scan)
-    design, angle = _scanned(count, np.linspace(*scan, PROBES + 1))
     least = raster.farthest(designs.about)
-    reach = _extent(designs, design, angle, np.where(least > 0, least, _first_guess(designs)), least, samples)[0]
-    some = np.arange(0)
-    if effort.closer is not None:
-        bent = curved(designs, design, angle, reach[design])
-        limits = [kind == "limit" for kind, _ in designs.field.labels[: len(bent)]]
-        some = np.unique(design[bent[limits].any(axis=0)])
-    design, angle = _scanned(count, np.linspace(*scan, effort.rays + 1))
+    design = np.repeat(np.arange(count), effort.rays + 1)
+    angle = np.tile(np.linspace(*scan, effort.rays + 1), count)
+    reach = np.where(least > 0, least, _first_guess(designs))
     reach, intervals = _extent(designs, design, angle, reach, least, samples)
-    finer = np.linspace(*scan, (effort.closer or effort.rays) + 1)
-    more = np.repeat(some, len(finer)) + 1j * np.tile(finer, len(some))
     owner = np.arange(count)
     for _ in range(LOOKS):
         owner, hidden = raster.hidden(np.unique(owner), designs.about, scan, design, angle, intervals)
-        rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * hidden, more]))
+        rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * hidden]))
         if len(rays) == len(design):
             break
         design, angle = rays.real.astype(np.intp), rays.imag
         reach, intervals = _extent(designs, design, angle, reach, least, samples)
-    codes = signatures(intervals, len(designs.field.labels))
-    cell = np.flatnonzero((codes[1:] != codes[:-1]) & (design[1:] == design[:-1]))
-    search = Search(designs, reach, samples)
-    found, breaks = search.all_breaks(intervals, cell, design[cell], angle[cell], angle[cell + 1])
+    found, breaks = all_breaks(designs, reach, samples, intervals, design, angle)
     fixed = np.tile([*scan, *cuts], count)
     owner = np.concatenate([np.repeat(np.arange(count), 2 + len(cuts)), found])
     place, firm = np.concatenate([fixed, breaks]), np.arange(len(fixed) + len(breaks)) < len(fixed)
@@ -137,11 +122,6 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     closes = np.bincount(design, counts, count) > 0
     area, doubt = raster.area
     return Panels(owner[full], low[full], high[full], reach, closes, usual[full], area - doubt)
-
-
-def _scanned(count: int, angles: Floats) -> tuple[Ints, Floats]:
-    """The same rays for every design: design and angle of each."""
-    return np.repeat(np.arange(count), len(angles)), np.tile(angles, count)
 
 
 def _between(design: Ints, angle: Floats, owner: Ints, low: Floats, high: Floats) -> tuple[Ints, Ints]:

@@ -94,8 +94,6 @@ class Raster:
         design, angle, intervals
             The rays, ascending by both; for each design at least those at both ends of the scan.
         """
-        from scipy import ndimage
-
         every = np.arange(len(self.low) + 1)
         first, held = np.searchsorted(design, every), _Held(intervals)
         owners, angles = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
@@ -112,22 +110,13 @@ class Raster:
             passed = np.where(inside, ~before & ~after, before & after) & (theta < scan[1]) & (theta > scan[0])
             if not passed.any():
                 continue
-            # One ray for what hangs together, between the same two rays.
-            size = self.inside.shape[1]
-            shape = (len(block), size, size)
-            kind = np.where(passed, np.where(inside, 1, 2), 0).T.reshape(shape)
-            part, other = np.zeros(shape, dtype=np.intp), np.zeros(shape, dtype=np.intp)
-            pieces = ndimage.label(kind == 1, PLANE, output=part)
-            ndimage.label(kind == 2, PLANE, output=other)
-            part[other > 0] = other[other > 0] + pieces
-            flat = part.reshape(len(block), -1).T
+            # Of the places between the same two rays the one farthest from both: a piece, and a hole.
             cells, lanes = np.nonzero(passed)
             gap = at[cells, lanes]
             aside = np.minimum(theta[cells, lanes] - angle[gap], angle[gap + 1] - theta[cells, lanes])
-            order = np.lexsort((-aside, gap, flat[cells, lanes]))
-            key = np.stack([flat[cells, lanes], gap])[:, order]
-            new = np.append(True, (key[:, 1:] != key[:, :-1]).any(axis=0))
-            chosen = order[new]
+            kind = 2 * gap + inside[cells, lanes]
+            order = np.lexsort((-aside, kind))
+            chosen = order[np.append(True, np.diff(kind[order]) > 0)]
             owners.append(block[lanes[chosen]])
             angles.append(theta[cells[chosen], lanes[chosen]])
         return np.concatenate(owners), np.concatenate(angles)
@@ -144,17 +133,12 @@ class Raster:
             yield some, low.real + x * cell.real + 1j * (low.imag + y * cell.imag)
 
 
-# Cells of one design hang together over their sides and corners, those of two designs never.
-PLANE = np.zeros((3, 3, 3), dtype=int)
-PLANE[1] = 1
-
-
 class _Held:
     """Which radii the intervals of rays hold."""
 
     def __init__(self, intervals: Intervals) -> None:
         rays = len(intervals.beyond)
-        slot = np.arange(len(intervals.ray)) - np.searchsorted(intervals.ray, intervals.ray)
+        slot = intervals.slot
         most = int(slot.max(initial=-1)) + 1
         self.inner, self.outer = np.full((most, rays), np.inf), np.full((most, rays), -np.inf)
         self.inner[slot, intervals.ray], self.outer[slot, intervals.ray] = intervals.inner, intervals.outer

@@ -8,14 +8,15 @@ their roots.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.region.dips import Brackets, hidden_places, rounded, sign_changes
 from mechdesign.analyses.region.field import Field, Places
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.minima import dips
 from mechdesign.numerics.roots import bracketed_roots
 
 # Rays traced at once, measured: fewer cost more in calls than their smaller arrays save.
@@ -103,6 +104,11 @@ class Intervals:
         """Intervals of each ray."""
         return np.bincount(self.ray, minlength=len(self.beyond))
 
+    @property
+    def slot(self) -> Ints:
+        """Place of each interval on its ray, outwards from 0."""
+        return np.arange(len(self.ray)) - np.searchsorted(self.ray, self.ray)
+
     def kept(self, keep: Flags) -> Intervals:
         """Some of the intervals, on the same rays."""
         if keep.all():
@@ -161,12 +167,6 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
     return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
 
 
-def curved(designs: Designs, design: Ints, theta: Floats, reach: Floats) -> Flags:
-    """Which margins (but those of the assembly) are not quadratic along which rays; shape (margins, rays)."""
-    z = designs.about + FIVE[:, None] * reach * np.exp(1j * theta)
-    return ~_parabolas(designs.field.margins(z, designs.of(design), assembly=False))[0]
-
-
 def _parabolas(values: Floats) -> tuple[Flags, tuple[Floats, Floats, Floats]]:
     """Coefficients of a + b x + c x^2 through margins at x = 0, 1/2, 1, and which margins are such on each ray.
 
@@ -213,59 +213,89 @@ def _others(
     fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, samples))), INSET, 1 - INSET)
     radii = inner + fraction[:, None] * width
     rows = np.flatnonzero(~known.all(axis=1))
-    values = designs.field.margins(designs.about + radii * direction[owner], local)[rows]
-    # Roots that are known have ended the intervals.
-    margin, lane = np.nonzero(known[rows][:, owner])
-    values[margin, :, lane] = 1.0
-    values, noise = rounded(values, designs.field.rounding[rows])
-    positive = values > 0
-    thick = width > thin[owner]
 
-    def margin_at(function: Ints, lane: Ints, radius: Floats) -> Floats:
+    def margins_at(lane: Ints, radius: Floats) -> Floats:
         z = designs.about + radius * direction[owner[lane]]
-        found_there = designs.field.margins(z, {name: value[lane] for name, value in local.items()})
-        return found_there[rows[function], np.arange(len(lane))]
+        values = designs.field.margins(z, {name: value[lane] for name, value in local.items()})[rows]
+        # Roots that are known have ended the intervals.
+        margin, of = np.nonzero(known[rows][:, owner[lane]])
+        values[margin, ..., of] = 1.0
+        return values
 
-    dips = hidden_places(margin_at, radii, values, noise)
-    cut = ~positive.all(axis=(0, 1)) & thick
-    cut[dips[1]] |= thick[dips[1]]
-    if not cut.any():
+    values, noise = margins_at(np.arange(len(owner)), radii), designs.field.rounding[rows]
+    radii, values = _with_dips(margins_at, radii, _without_rounding(values, noise), noise)
+    positive = values > 0
+    lanes = np.flatnonzero(~positive.all(axis=(0, 1)) & (width > thin[owner]))
+    if not lanes.size:
         return found
-    lanes = np.flatnonzero(cut)
-    brackets = sign_changes(radii[:, lanes], values[:, :, lanes], _within(dips, lanes))
-    margin, lane = brackets.function, brackets.lane
-    # Where another margin is negative all over a bracket nothing ends there: its middle will do.
-    radius = 0.5 * (brackets.low[0] + brackets.high[0])
-    asked = np.flatnonzero(~_idle(brackets, radii[:, lanes], positive[:, :, lanes], _within(dips, lanes)))
+    radii, values, positive = radii[:, lanes], values[:, :, lanes], positive[:, :, lanes]
+    margin, cell, lane = np.nonzero(positive[:, 1:] != positive[:, :-1])
+    ends = np.stack([cell, cell + 1, np.where(cell > 0, cell - 1, np.minimum(cell + 2, len(radii) - 1))])
+    x, f = radii[ends, lane], values[margin, ends, lane]
+    # Where another margin is negative at both ends nothing ends there: the middle will do.
+    radius = 0.5 * (x[0] + x[1])
+    idle = ~(positive[:, 1:] | positive[:, :-1])
+    asked = np.flatnonzero(~idle[:, cell, lane].any(axis=0))
 
     def evaluate(which: Ints, radius: Floats) -> Floats:
         which = asked[which]
-        return margin_at(margin[which], lanes[lane[which]], radius)
+        return margins_at(lanes[lane[which]], radius)[margin[which], np.arange(len(which))]
 
-    low, high, third = ((x[asked], f[asked]) for x, f in (brackets.low, brackets.high, brackets.third))
     cut_of = sampled[lanes]
-    radius[asked] = bracketed_roots(evaluate, *low, *high, *third, ROUNDING * found.outer[cut_of[lane[asked]]])
-    turn = np.where(brackets.high[1] > 0, 1, -1)
-    start = (~positive[:, 0][:, lanes]).sum(axis=0)
-    part = _intervals(rows[margin], lane, turn, radius, start, found.outer[cut_of], 0.0)
+    (a, b, c), (fa, fb, fc) = x[:, asked], f[:, asked]
+    tolerance = ROUNDING * found.outer[cut_of[lane[asked]]]
+    radius[asked] = bracketed_roots(evaluate, a, fa, b, fb, c, fc, tolerance)
+    start = (~positive[:, 0]).sum(axis=0)
+    part = _intervals(rows[margin], lane, np.where(f[1] > 0, 1, -1), radius, start, found.outer[cut_of], 0.0)
     return _replace(found, cut_of, part, NOTHING * reach)
 
 
-def _idle(brackets: Brackets, x: Floats, positive: Flags, dips: tuple[Ints, Ints, Floats, Floats]) -> Flags:
-    """Brackets over which another margin is negative, at the samples beside them and without a hidden place between."""
-    negative = ~(positive[:, 1:] | positive[:, :-1])
-    function, lane, place, _ = dips
-    negative[function, (x[:, lane] < place).sum(axis=0) - 1, lane] = False
-    cell = (x[:, brackets.lane] <= brackets.low[0]).sum(axis=0) - 1
-    others = negative[:, cell, brackets.lane]
-    others[brackets.function, np.arange(len(cell))] = False
-    return np.asarray(others.any(axis=0))
+def _without_rounding(values: Floats, noise: Floats) -> Floats:
+    """Margins (margins, samples, lanes) with samples below their `noise` given the sign of both neighbours."""
+    beside, noise = np.sign(values[:, :-2]), noise[:, None, None]
+    with np.errstate(invalid="ignore"):
+        doubtful = (np.abs(values[:, 1:-1]) <= noise) & (beside == np.sign(values[:, 2:]))
+    values[:, 1:-1] = np.where(doubtful, beside * noise, values[:, 1:-1])
+    return values
 
 
-def _within(dips: tuple[Ints, Ints, Floats, Floats], lanes: Ints) -> tuple[Ints, Ints, Floats, Floats]:
-    """Hidden places of the chosen lanes, numbered among them."""
-    use = np.isin(dips[1], lanes)
-    return dips[0][use], np.searchsorted(lanes, dips[1][use]), dips[2][use], dips[3][use]
+def _with_dips(
+    margins_at: Callable[[Ints, Floats], Floats], radii: Floats, values: Floats, noise: Floats
+) -> tuple[Floats, Floats]:
+    """Samples of margins with those added at which a margin has the other sign than at the samples on both sides.
+
+    A local minimum above zero (or maximum below) is looked at where the slopes beside it admit a zero.
+    """
+    before, here, after = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    left, right = radii[1:-1] - radii[:-2], radii[2:] - radii[1:-1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sign = np.sign(here)
+        height, fall, rise = np.abs(here), sign * (before - here), sign * (after - here)
+        lowest = (fall >= 0) & (rise >= 0) & (sign * before > 0) & (sign * after > 0)
+        slope = np.maximum(fall / left, rise / right)
+        lowest &= (height <= slope * np.maximum(left, right)) & np.isfinite(height)
+    margin, row, lane = np.nonzero(lowest)
+    if not len(margin):
+        return radii, values
+    rows, sign = row + np.arange(3)[:, None], sign[margin, row, lane]
+
+    def evaluate(which: Ints, radius: Floats) -> Floats:
+        found = margins_at(lane[which], radius)[margin[which], np.arange(len(which))]
+        return np.asarray(sign[which] * found)
+
+    place, value = dips(evaluate, radii[rows, lane], sign * values[margin, rows, lane], -noise[margin])
+    hidden = value < -noise[margin]
+    lane, place = lane[hidden], place[hidden]
+    order = np.argsort(lane, kind="stable")
+    lane, place = lane[order], place[order]
+    # As many more samples a lane, all at its end but those that were found.
+    slot = np.arange(len(lane)) - np.searchsorted(lane, lane)
+    most = int(slot.max(initial=-1)) + 1
+    more, more_values = np.repeat(radii[-1:], most, axis=0), np.repeat(values[:, -1:], most, axis=1)
+    more[slot, lane], more_values[:, slot, lane] = place, margins_at(lane, place)
+    radii, values = np.concatenate([radii, more]), np.concatenate([values, more_values], axis=1)
+    order = np.argsort(radii, axis=0, kind="stable")
+    return np.take_along_axis(radii, order, axis=0), np.take_along_axis(values, order[None], axis=1)
 
 
 def _replace(found: Intervals, lanes: Ints, part: Intervals, tie: Floats) -> Intervals:
@@ -342,20 +372,3 @@ def _first_named(owner: Ints, at: Floats, label: Ints, margin: Ints, ray: Ints, 
         match[match] = np.abs(radius[at_k[match]] - at[match]) <= tie[owner[match]]
         best[match] = np.minimum(best[match], margin[at_k[match]])
     return best
-
-
-def clearances(intervals: Intervals, reach: Floats, among: Flags) -> tuple[Floats, Floats]:
-    """Distance from each interval's ends to the next root of a margin `among` some, below and above; inf where none."""
-    rays, radii, margins, _ = intervals.crossings
-    use = among[margins]
-    rays, radii = rays[use], radii[use]
-    begin, end = np.searchsorted(rays, intervals.ray), np.searchsorted(rays, intervals.ray, side="right")
-    below, above = np.full(len(begin), np.inf), np.full(len(begin), np.inf)
-    tie = SAME * reach[intervals.ray]
-    for k in range(int(np.max(end - begin, initial=0))):
-        at = radii[np.minimum(begin + k, len(radii) - 1)]
-        here = begin + k < end
-        under, over = intervals.inner - at, at - intervals.outer
-        below = np.where(here & (under > tie), np.minimum(below, under), below)
-        above = np.where(here & (over > tie), np.minimum(above, over), above)
-    return below, above

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.region.meetings import ROOTS, parabola
+from mechdesign.analyses.region.breaks import ROOTS, parabola
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Margins (margins + 2, n) of rays at radii and values; the last two are zero at the lower and upper end of the range.

@@ -41,8 +41,6 @@ class Index:
         grows as 1/distance; None where it stays finite.
     bounds : (float, float)
         What it can never be below or above.
-    kink : function, optional
-        k, where the index is a smooth function plus k sqrt(w), with w the Jacobian's `Local.roundness`.
     section : str
         Section of the study that it needs beside the workspace; empty where the Jacobian is enough.
     """
@@ -52,7 +50,6 @@ class Index:
     unit: Callable[[Study, Field], str]
     crossing: float | None = None
     bounds: tuple[float, float] = (0.0, float("inf"))
-    kink: Evaluate | None = None
     section: str = ""
 
 

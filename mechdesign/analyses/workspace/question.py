@@ -14,9 +14,8 @@ from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.bounding import bounding_box
 from mechdesign.analyses.workspace.index import Prepared, prepare
-from mechdesign.analyses.workspace.integrands import Integrand
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
-from mechdesign.analyses.workspace.quadrature import integrate, simple_means
+from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
 from mechdesign.indices import INDEX_NAMES, USUAL, needed_section
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats

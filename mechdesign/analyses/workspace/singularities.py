@@ -7,7 +7,7 @@ drives' structure vanishes. An `inverse` (serial) one is where a leg is stretche
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -21,6 +21,8 @@ from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.numerics.zero_curves import joined, zero_curves
 
 FORWARD, INVERSE = "forward", "inverse"
+# How the links of a group lie where its determinant vanishes.
+FORMS = {"two angles": "in line", "angle and fixed slide": "at right angles", "two slides": "parallel"}
 # Poses no more regular than this (0 at a singularity, at most 1) are singular but for rounding.
 REGULAR = 1e-10
 # Spacing of the grid on which curves are looked for, in rows and columns of a patch's grid; and the part of a ray's
@@ -96,34 +98,23 @@ def _in_words(mechanism: Mechanism, group: Group) -> str:
     links = list(dict.fromkeys(b.removesuffix(":rod") for b, (frame, _) in bodies.items() if frame in frames))
     slides = [mechanism.graph.slides[slide] for slide in group.slides]
     named = "-".join(dict.fromkeys([*links, *slides]))
-    if group.form == "two angles":
-        return f"{named} in line"
-    if group.form == "angle and fixed slide":
-        return f"{named} at right angles"
-    if group.form == "two slides":
-        return f"{named} parallel"
-    return f"{named} not held"
+    return f"{named} {FORMS.get(group.form, 'not held')}"
 
 
 def singular_everywhere(field: Field) -> bool:
     """Whether every pose is a forward singularity, so that determinants are nothing but rounding."""
-    field = replace(field, same_assembly=False)
-    z = field.surroundings
-    closures = [kind == "singularity" for kind, _ in field.labels]
-    reached = (field.margins(z, {})[closures] > 0).all(axis=0)
-    return bool(reached.any()) and _singular(field, z[reached])
-
-
-def _singular(field: Field, z: Complexes) -> bool:
-    """Whether the mechanism is in a forward singularity with its point at each of the places `z`."""
+    margins = field.margins(field.surroundings, {}, assembly=False)
+    closures = [kind == "singularity" for kind, _ in field.labels[: len(margins)]]
+    z = field.surroundings[(margins[closures] > 0).all(axis=0)]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        return bool((np.asarray(regularity(field.mechanism.linearize(field.configuration(z, {})))) <= REGULAR).all())
+        regular = np.asarray(regularity(field.mechanism.linearize(field.configuration(z, {}))))
+    return len(z) > 0 and bool((regular <= REGULAR).all())
 
 
 def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus]:
     """Forward singularities inside a region: on the lines of a grid of its patches to rounding, in order as curves."""
     names = forward_names(field.mechanism)
-    if field.same_assembly or not names or all(_singular(field, patch.grid(about)) for patch in patches):
+    if field.same_assembly or not names or not patches or singular_everywhere(field):
         return []
 
     def values(z: Complexes) -> Floats:
