@@ -63,16 +63,19 @@ def continuous(
     if len(coarse):
         begins = known[at[coarse]]
         moved[:, coarse] = _on_the_way(angles, given, begins, begins + 1, parts[at[coarse]], solve)
-    # Whole turns from each pose on, counted anew on every line of a grid.
-    turns = np.zeros(seen.shape)
-    turns[:, at + 1] = np.round((moved - rises[:, at]) / TURN)
-    if turns.any():
-        turns = np.cumsum(turns, axis=1)
+    # Whole turns from each of some poses on, counted anew on every line of a grid.
     heads = np.flatnonzero(starts)
-    first = (seen[:, heads] < ON_THE_CUT - np.pi) - turns[:, heads]
-    found = values.copy()
-    found[:, known] = seen + TURN * (turns + np.repeat(first, np.diff(np.append(heads, len(known))), axis=1))
-    return np.stack([_across(row, poses.grid) for row in found])
+    begins = np.concatenate([heads, at + 1])
+    order = np.argsort(begins, kind="stable")
+    more = np.concatenate([np.zeros((len(values), len(heads))), np.round((moved - rises[:, at]) / TURN)], axis=1)
+    total = np.cumsum(more[:, order], axis=1)
+    line_of = np.cumsum(order < len(heads)) - 1
+    total += ((seen[:, heads] < ON_THE_CUT - np.pi) - total[:, order < len(heads)])[:, line_of]
+    found = values
+    if total.any():
+        found = values.copy()
+        found[:, known] += TURN * np.repeat(total, np.diff(np.append(begins[order], len(known))), axis=1)
+    return found if len(poses.grid) == 1 else np.stack([_across(row, poses.grid) for row in found])
 
 
 def _parts(plan: Plan, given: Sequence[Floats], known: Ints) -> Ints:

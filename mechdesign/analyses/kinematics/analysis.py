@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.extremes import extremes, needed
-from mechdesign.analyses.kinematics.lines import Line
+from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
-from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry
+from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, characteristic_length, entry, motion_question
 from mechdesign.analyses.kinematics.motion_limits import motion_limits
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.poses import judge_failures, pose_in_words
+from mechdesign.analyses.shown import Keeper, Shown
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
@@ -30,6 +32,8 @@ from mechdesign.threads import one_thread
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
+# Assembly modes that a picture has room for.
+MOST_DRAWN = 12
 # What a step of a motion may lead beside its rates, as a part of it.
 ASTRAY = 1e-3
 
@@ -48,8 +52,10 @@ def kinematics(
     Parameters
     ----------
     study : Study
-    seed, jobs : ignored
-        Kinematics draws no random numbers and is fast enough on one thread.
+    seed : ignored
+        Kinematics draws no random numbers.
+    jobs : int or None
+        Threads that solve a long sweep; None uses every processor.
     all_modes : bool
         Whether to follow every other assembly of the same links as well.
 
@@ -69,13 +75,14 @@ def kinematics(
     StudyError
         If all modes are asked of poses that give different coordinates.
     """
-    question = asked(study)
+    question = motion_question(study)
     poses = question.poses
     if all_modes and len(poses.groups) > 1:
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
     progress.start(poses.count, "poses")
-    motion = move(question, progress)
+    keeper = Keeper(study, poses)
+    motion = move(question, progress, jobs, also=keeper.keep)
     warnings, failed = judge_failures(study, poses, motion.reason)
     warnings += (
         _conditioning(motion)
@@ -96,21 +103,30 @@ def kinematics(
     if question.square:
         tables["jacobian"] = jacobian_table(motion)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(motion.reason))}
+    drawn: dict[str, Any] = {"poses": poses, "motion": keeper.shown}
     if all_modes:
-        tables["modes"], told, counts["modes"] = _modes(question, motion)
+        tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
         warnings += told
-    return Result("kinematics", tables, warnings, counts, failed)
+    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn)
 
 
-def _modes(question: Asked, drawn: Motion) -> tuple[Table, list[str], int]:
-    """The motion of every assembly, the sketch's first; what is to be said of each; and how many they are."""
+def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
+    """The motion of every assembly, the sketch's first; what is to be said of each, how many they are, some to draw."""
     study, poses = question.study, question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
     labels: list[str] = []
     parts: list[Sequence[Column]] = []
     warnings = []
+    pictured: dict[str, Shown] = {}
     for assembly in sorted(found, key=lambda assembly: not assembly.drawn):
-        motion = drawn if assembly.drawn else move(asked(dataclasses.replace(study, mechanism=assembly.mechanism)))
+        motion, seen = drawn, shown
+        if not assembly.drawn:
+            other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism))
+            keeper = Keeper(other.study, other.poses)
+            motion = move(other, also=keeper.keep)
+            seen = keeper.shown
+        if seen.configuration.valid.any() and len(pictured) < MOST_DRAWN:
+            pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = seen
         labels += [assembly.label] * poses.count
         parts.append(motion.columns())
         bad = int(np.count_nonzero(motion.reason))
@@ -120,7 +136,7 @@ def _modes(question: Asked, drawn: Motion) -> tuple[Table, list[str], int]:
     columns = [Column("mode", np.array(labels), "", "assembly: the joints that choose it and their sides")]
     for same in zip(*parts, strict=True):
         columns.append(dataclasses.replace(same[0], values=np.concatenate([column.values for column in same])))
-    return Table("modes", tuple(columns), "the motion of every assembly mode"), warnings, len(parts)
+    return Table("modes", tuple(columns), "the motion of every assembly mode"), warnings, len(parts), pictured
 
 
 def swept_of(poses: Poses) -> str | None:
@@ -153,12 +169,12 @@ def tables_between(
         Tables ``extremes``, ``loops`` where there are four-bars and slider-cranks, and of a sweep their ``toggles``;
         and the designs whose motion ends where no limit is known, so that the tables do not answer for them.
     """
-    poses, swept, line = motion.asked.poses, swept_of(motion.asked.poses), None
-    loops = four_bars(motion.asked.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
+    poses, swept, line = motion.question.poses, swept_of(motion.question.poses), None
+    loops = four_bars(motion.question.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
     torn = np.zeros(poses.designs, dtype=bool)
     if swept is not None:
         coordinates = needed(motion, names) if "extremes" in wanted else []
-        line = Line(motion, swept, coordinates, functions(loops), ends)
+        line = PoseLine(motion, swept, coordinates, functions(loops), ends)
     tables = {}
     if "extremes" in wanted:
         tables["extremes"] = extremes(motion, swept, line, names)
@@ -171,13 +187,13 @@ def tables_between(
 
 def targets_table(motion: Motion) -> Table:
     """Errors against the targets."""
-    poses = motion.asked.poses
-    return targets.table(motion.asked.study, motion.errors, poses, swept_of(poses), motion.valid)
+    poses = motion.question.poses
+    return targets.table(motion.question.study, motion.errors, poses, swept_of(poses), motion.valid)
 
 
 def jacobian_table(motion: Motion) -> Table:
     """Every entry of the Jacobian, a row a pose."""
-    question = motion.asked
+    question = motion.question
     columns = motion.pose_columns()
     for output in question.listed:
         for drive in question.drives:
@@ -203,7 +219,7 @@ def _conditioning(motion: Motion) -> list[str]:
         return []
     values = motion.arrays["inverse_condition"]
     regular = motion.valid & (motion.arrays["conditioning"] >= STALLED)
-    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.asked.study) is None:
+    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.question.study) is None:
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
     near = regular & ~(values >= SINGULAR)
     if near.any():
@@ -215,7 +231,7 @@ def _conditioning(motion: Motion) -> list[str]:
 
 def _astray(motion: Motion) -> list[str]:
     """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
-    study, section, poses = motion.asked.study, motion.asked.section, motion.asked.poses
+    study, section, poses = motion.question.study, motion.question.section, motion.question.poses
     if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
         return []
     sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
@@ -236,7 +252,7 @@ def _astray(motion: Motion) -> list[str]:
 
 
 def _stalled(motion: Motion) -> list[str]:
-    study, poses = motion.asked.study, motion.asked.poses
+    study, poses = motion.question.study, motion.question.poses
     stalled = motion.valid & ~motion.smooth & ~(motion.arrays["conditioning"] >= STALLED)
     warnings = []
     rows = np.flatnonzero(stalled)
@@ -247,7 +263,7 @@ def _stalled(motion: Motion) -> list[str]:
             f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
             f"nothing there; the first: {pose_in_words(study, poses, rows[0])}"
         )
-    if motion.asked.of_given:
+    if motion.question.of_given:
         rates = motion.arrays[f"{study.mechanism.drives[0]}_velocity"]
         rows = np.flatnonzero(motion.valid & ~stalled & np.isnan(rates))
         if len(rows):

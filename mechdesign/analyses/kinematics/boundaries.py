@@ -28,7 +28,7 @@ FINE = 1e-13
 # A limit this near to the first or the last value of the sweep lies at it (as a part of the value, or of 1).
 AT_END = 1e-9
 # Ends within this part of the sweep's size are one; a change point within this part of a step of a pose is at it.
-SAME, AT_POSE = 1e-11, 1e-6
+ONE_END, AT_POSE = 1e-11, 1e-6
 # How far beside a single place, as a part of the step, the motion must go on for it to have no gap there.
 BESIDE = 1e-5
 
@@ -164,7 +164,7 @@ class _Search:
         span = float(np.ptp(self.at))
         kept: list[Boundary] = []
         for end in ends:
-            if not kept or abs(end.place - kept[-1].place) > SAME * span or end.cause != kept[-1].cause:
+            if not kept or abs(end.place - kept[-1].place) > ONE_END * span or end.cause != kept[-1].cause:
                 kept.append(end)
         return kept, changes
 
@@ -197,48 +197,50 @@ class _Search:
         if not len(step):
             return []
         side = np.where(parts.valid[0], 0, 1)
-        inner, bad = parts.x[side, lanes], parts.x[1 - side, lanes]
-        good, poses = inner, self.solve(step, inner)
-        causes = self._causes(step, bad)[1]
-        turned = {k: self._turned(float(good[k]), poses.take(k), cause)
-                  for k, cause in enumerate(causes) if cause.role == "reached"}  # fmt: skip
-        for _ in range(HALVINGS):
+        good, bad = parts.x[side, lanes], parts.x[1 - side, lanes]
+        poses, (_, causes) = self.solve(step, good), self._causes(step, bad)
+        turned = [
+            self._turned(int(step[k]), float(good[k]), poses.take(k), cause) if cause.role == "reached" else None
+            for k, cause in enumerate(causes)
+        ]
+        rest = np.flatnonzero([end is None for end in turned])
+        return [end for end in turned if end is not None] + self._closed_in(step[rest], good[rest], bad[rest])
+
+    def _closed_in(self, step: Ints, inner: Floats, bad: Floats) -> list[Boundary]:
+        """Ends between places of which one is valid and the other is not, brought together."""
+        good = inner
+        for _ in range(HALVINGS if len(step) else 0):
             middle = good + (bad - good) / 2
             inside = self.solve(step, middle).valid
             good, bad = np.where(inside, middle, good), np.where(inside, bad, middle)
         # Right beyond the end, where rounding is still forgiven, lies the pose in which a dead centre is straight.
+        last = len(self.at) - 2
         outer = (step == 0) | (step == last)
         good = np.where(outer, np.where(step == 0, self.at[1], self.at[-2]), good)
-        poses = self.solve(step, good)
-        which, causes = self._causes(step, bad)
-        places = np.where(outer, good, self._zeros(step, which, causes, inner, good, bad))
-        found = []
-        for k in lanes.tolist():
-            place, pose, cause = turned.get(k) or self._named(float(places[k]), poses.take(k), causes[k])
-            position = float(self._position(step[[k]], np.array([place]))[0])
-            found.append(Boundary(position, place, cause, pose))
-        return found
+        poses, (which, causes) = self.solve(step, good), self._causes(step, bad)
+        # Where the margin is zero, without that allowance.
+        root = self._root(step, which, inner, bad)
+        smooth = np.array([cause.role in ("closure", "limit", "leg") for cause in causes], dtype=bool)
+        places = np.where(smooth & ~outer & np.isfinite(root), root, good)
+        positions = self._position(step, places).tolist()
+        return [
+            Boundary(positions[k], float(places[k]), self._named(poses.take(k), cause), poses.take(k))
+            for k, cause in enumerate(causes)
+        ]
 
-    def _zeros(
-        self, step: Ints, which: Ints, causes: list[Cause], inner: Floats, good: Floats, bad: Floats
-    ) -> Floats:  # fmt: skip
-        """Where the margins that end the motion are zero, without the allowance for rounding; `good` for others."""
-        smooth = np.flatnonzero([cause.role in ("closure", "limit", "leg") for cause in causes])
+    def _root(self, step: Ints, which: Ints, low: Floats, high: Floats) -> Floats:
+        """Where margins `which` are zero between two places; nan where they have the same sign at both."""
 
-        def margin(left: Ints, x: Floats) -> Floats:
-            lane = smooth[left]
-            one: Floats = self.evaluate(step[lane], x)[which[lane], np.arange(len(lane))]
-            return one
+        def margin(lane: Ints, x: Floats) -> Floats:
+            found: Floats = self.evaluate(step[lane], x)[which[lane], np.arange(len(lane))]
+            return found
 
-        found = good.copy()
-        if len(smooth):
-            a, b, every = inner[smooth], bad[smooth], np.arange(len(smooth))
-            at_a, at_b, none = margin(every, a), margin(every, b), np.full(len(smooth), np.nan)
-            place = bracketed_roots(margin, a, at_a, b, at_b, none, none, np.abs(b - a) * 2.0**-HALVINGS)
-            found[smooth] = np.where((at_a >= 0) & (at_b < 0), place, good[smooth])
-        return found
+        every, none = np.arange(len(step)), np.full(len(step), np.nan)
+        a, b = margin(every, low), margin(every, high)
+        place = bracketed_roots(margin, low, a, high, b, none, none, FINE * np.abs(high - low))
+        return np.where((a >= 0) != (b >= 0), place, np.nan)
 
-    def _turned(self, place: float, pose: Configuration, cause: Cause) -> tuple[float, Configuration, Cause] | None:
+    def _turned(self, step: int, place: float, pose: Configuration, cause: Cause) -> Boundary | None:
         """The very place at which a group without a closed form turns back; its continuation ends a little before."""
         margins = self.margins
         given = list(margins.held)
@@ -246,19 +248,20 @@ class _Search:
         exact = turning_point(margins.plan, given, margins.which, pose)
         if exact is None:
             return None
-        group = margins.plan.structure.groups[exact[2]]
-        return exact[0], exact[1], replace(cause, joint=joints_of(margins.mechanism, group), group=exact[2])
+        joint = joints_of(margins.mechanism, margins.plan.structure.groups[exact[2]])
+        position = float(self._position(np.array([step]), np.array([exact[0]]))[0])
+        return Boundary(position, exact[0], replace(cause, joint=joint, group=exact[2]), exact[1])
 
-    def _named(self, place: float, pose: Configuration, cause: Cause) -> tuple[float, Configuration, Cause]:
+    def _named(self, pose: Configuration, cause: Cause) -> Cause:
         """The cause where a group without a closed form is not continued although it does not turn back."""
-        if cause.role == "reached":
-            mechanism = self.margins.mechanism
-            for slide in self.margins.legs:
-                leg = mechanism.graph.slides[slide]
-                if abs(float(pose.slides[slide])) <= AT_END * mechanism.size:
-                    return place, pose, Cause(ZERO_LENGTH, leg, leg, -1, "leg")
-            cause = replace(cause, kind=Reason.OTHER_ASSEMBLY.text)
-        return place, pose, cause
+        if cause.role != "reached":
+            return cause
+        mechanism = self.margins.mechanism
+        for slide in self.margins.legs:
+            leg = mechanism.graph.slides[slide]
+            if abs(float(pose.slides[slide])) <= AT_END * mechanism.size:
+                return Cause(ZERO_LENGTH, leg, leg, -1, "leg")
+        return replace(cause, kind=Reason.OTHER_ASSEMBLY.text)
 
     def _causes(self, step: Ints, bad: Floats) -> tuple[Ints, list[Cause]]:
         """What ends the motion just beyond its end: the margin that is most below zero, and its index."""
@@ -280,12 +283,8 @@ class _Search:
         """Single places at which the motion goes to infinity."""
         a, b = np.moveaxis(parts.values, 1, 0)
         function, lane = np.nonzero(self.role("across")[:, None] & ((a >= 0) != (b >= 0)) & np.isfinite(a + b))
-        step, (low, high) = parts.step[lane], parts.x[:, lane]
-        none = np.full(len(lane), np.nan)
-        place = bracketed_roots(
-            lambda k, x: self.evaluate(step[k], x)[function[k], np.arange(len(k))],
-            low, a[function, lane], high, b[function, lane], none, none, FINE * np.abs(high - low),
-        )  # fmt: skip
+        step = parts.step[lane]
+        place = self._root(step, function, *parts.x[:, lane])
         positions = self._position(step, place).tolist()
         return [
             Boundary(positions[k], float(place[k]), self.margins.causes[function[k]], None)

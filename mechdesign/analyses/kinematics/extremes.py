@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from mechdesign.analyses.kinematics import targets
-from mechdesign.analyses.kinematics.lines import Line
+from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.kinematics.peaks import STILL, Along, Peak, peaks, searched
 from mechdesign.analyses.poses import in_study_units
@@ -18,14 +18,14 @@ from mechdesign.results import Column, Table
 
 def needed(motion: Motion, names: Collection[str] | None) -> list[Coordinate]:
     """Coordinates that a line must follow for extremes of some outputs and errors, or all."""
-    mechanism = motion.asked.study.mechanism
-    found = [output for output in motion.asked.outputs if names is None or output.name in names]
+    mechanism = motion.question.study.mechanism
+    found = [output for output in motion.question.outputs if names is None or output.name in names]
     if any(names is None or error.name in names for error in motion.errors):
-        found += [mechanism.coordinate(name) for name in targets.needed(motion.asked.study, motion.asked.poses)]
+        found += [mechanism.coordinate(name) for name in targets.needed(motion.question.study, motion.question.poses)]
     return found
 
 
-def extremes(motion: Motion, swept: str | None, line: Line | None, names: Collection[str] | None = None) -> Table:
+def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Collection[str] | None = None) -> Table:
     """Smallest and largest value of each output and error over the motion, and the ratio of the times between.
 
     Where one coordinate is swept they are those of the whole motion, from limit to limit, between its poses too;
@@ -37,12 +37,12 @@ def extremes(motion: Motion, swept: str | None, line: Line | None, names: Collec
     ----------
     swept : str or None
         The one coordinate that moves.
-    line : Line or None
+    line : PoseLine or None
         The motion along it.
     names : collection of str, optional
         Outputs and errors whose extremes between the poses are wanted; all where left out.
     """
-    study, poses, outputs = motion.asked.study, motion.asked.poses, motion.asked.outputs
+    study, poses, outputs = motion.question.study, motion.question.poses, motion.question.outputs
     mechanism = study.mechanism
     shape = (poses.designs, poses.count // poses.designs)
     curves = {output.name: (output.quantity, motion.arrays[output.name]) for output in outputs}
@@ -96,7 +96,13 @@ def extremes(motion: Motion, swept: str | None, line: Line | None, names: Collec
 
 
 def _between(
-    motion: Motion, line: Line, names: Collection[str] | None, found: Floats, row: Ints, still: Floats, moving: Flags
+    motion: Motion,
+    line: PoseLine,
+    names: Collection[str] | None,
+    found: Floats,
+    row: Ints,
+    still: Floats,
+    moving: Flags,
 ) -> None:
     """Put better extremes than those of the poses into a table: from between the poses, and at limits of the motion.
 
@@ -111,7 +117,7 @@ def _between(
     moving : bool array, shape (designs, names)
         Which move; those found to move are added.
     """
-    study, outputs = motion.asked.study, motion.asked.outputs
+    study, outputs = motion.question.study, motion.question.outputs
     swept = study.mechanism.coordinate(line.swept)
 
     def take(peak: Peak, end: int, which: Sequence[int], exact: bool) -> None:
@@ -139,9 +145,9 @@ def _between(
             take(searched(line, along, along(every, line.place), still.T[wrong]), end, wrong, False)
 
 
-def _errors(motion: Motion, line: Line, sign: int) -> Along:
+def _errors(motion: Motion, line: PoseLine, sign: int) -> Along:
     """Errors times a sign, beside poses of a line."""
-    study, poses = motion.asked.study, motion.asked.poses
+    study, poses = motion.question.study, motion.question.poses
     names, wanted = [error.name for error in motion.errors], targets.needed(study, poses)
     held = {name: values for name, values in poses.groups[0].values.items() if name != line.swept}
 

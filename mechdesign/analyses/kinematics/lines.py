@@ -9,8 +9,8 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.motion import Motion
+from mechdesign.analyses.kinematics.moving import NEAR
 from mechdesign.analyses.kinematics.rates import drive_velocities
-from mechdesign.analyses.kinematics.smoothing import NEAR
 from mechdesign.analyses.poses import CHUNK, dimensions, in_study_units, radians, starts
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet, wrap
@@ -73,7 +73,7 @@ def _frame(k: int) -> Function:
 
 def thinned(motion: Motion, swept: str) -> Flags:
     """Poses of a sweep that tell the motion: its ends, those where it ceases to be valid, and enough between."""
-    study, poses = motion.asked.study, motion.asked.poses
+    study, poses = motion.question.study, motion.question.poses
     coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
     steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
     longest = LONGEST * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
@@ -87,7 +87,7 @@ def thinned(motion: Motion, swept: str) -> Flags:
     return taken
 
 
-class Line:
+class PoseLine:
     """Poses along the sweep of one coordinate, of one design or several, and the segments between them.
 
     Poses are those of the sweep (of a very fine one, some), the limits of motion, and as many between them as the
@@ -123,7 +123,7 @@ class Line:
         self, motion: Motion, swept: str, coordinates: Sequence[Coordinate],
         others: Mapping[str, Function], ends: Sequence[Boundary] = (),
     ) -> None:  # fmt: skip
-        study, poses = motion.asked.study, motion.asked.poses
+        study, poses = motion.question.study, motion.question.poses
         self.study, self.poses, self.swept, self.ends = study, poses, swept, ends
         (group,) = poses.groups
         self.plan = study.mechanism.plan(group.names)

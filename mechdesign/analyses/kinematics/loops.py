@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.lines import Function, Line
+from mechdesign.analyses.kinematics.lines import Function, PoseLine
 from mechdesign.analyses.kinematics.motion import Motion, as_given
 from mechdesign.analyses.kinematics.peaks import peaks, zeros
 from mechdesign.analyses.poses import solve_poses
@@ -26,7 +26,7 @@ SQUARE = 1e-10
 # Sines below these are zero: as the pose at a limit of motion tells, and at another pose.
 IN_LINE, AT_POSE = 1e-6, 1e-12
 # Toggles this near to each other are one, in rows of the sweep.
-SAME = 1e-5
+ONE_TOGGLE = 1e-5
 PARTS = ("frame", "input", "coupler", "output")
 
 
@@ -72,15 +72,15 @@ def _in_line(loop: FourBar, end: int) -> dict[str, Function]:
     return {"sine": sine, "cosine": cosine}
 
 
-def loops_table(motion: Motion, loops: Sequence[FourBar], line: Line | None) -> Table:
+def loops_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine | None) -> Table:
     """Every loop of every design: its links and lengths (of a single design), and how well it transmits.
 
     Parameters
     ----------
-    line : Line or None
+    line : PoseLine or None
         The motion along its sweep, with `functions` of the loops; None where not just one coordinate is swept.
     """
-    study, poses = motion.asked.study, motion.asked.poses
+    study, poses = motion.question.study, motion.question.poses
     length, angle = study.units.label("length"), study.units.label("angle")
     columns = [
         Column("kind", np.array([loop.kind for loop in loops]), "", "what the four bodies and their joints are"),
@@ -117,7 +117,7 @@ def loops_table(motion: Motion, loops: Sequence[FourBar], line: Line | None) -> 
 @quiet
 def _at_poses(motion: Motion, loops: Sequence[FourBar]) -> list[tuple[Floats, Floats]]:
     """Smallest and largest transmission angle over the poses, and its row; shape (loops, designs)."""
-    study, poses = motion.asked.study, motion.asked.poses
+    study, poses = motion.question.study, motion.question.poses
     angle = np.full((len(loops), poses.count), np.nan)
     for solved in solve_poses(study, poses):
         valid = solved.configuration.valid
@@ -133,7 +133,7 @@ def _at_poses(motion: Motion, loops: Sequence[FourBar]) -> list[tuple[Floats, Fl
     return found
 
 
-def _between(motion: Motion, line: Line, count: int) -> list[tuple[Floats, Floats]]:
+def _between(motion: Motion, line: PoseLine, count: int) -> list[tuple[Floats, Floats]]:
     """Smallest and largest transmission angle over a swept motion, and the swept coordinate there."""
     squares = np.array([line.rows[f"square {k}"] for k in range(count)])
     angles = np.array([line.rows[f"angle {k}"] for k in range(count)])
@@ -148,9 +148,9 @@ def _between(motion: Motion, line: Line, count: int) -> list[tuple[Floats, Float
     return found
 
 
-def toggles_table(motion: Motion, loops: Sequence[FourBar], line: Line) -> Table:
+def toggles_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine) -> Table:
     """Every place at which the coupler of a loop comes into line with its input or its output."""
-    study, swept = motion.asked.study, line.swept
+    study, swept = motion.question.study, line.swept
     which = [(k, end) for end in (0, 3) for k in range(len(loops))]
     sines, cosines = (np.array([line.rows[f"{name} {k} {end}"] for k, end in which]) for name in ("sine", "cosine"))
     found = zeros(line, sines, AT_POSE, IN_LINE)
@@ -186,7 +186,7 @@ def _once(toggles: list[_Toggle]) -> list[_Toggle]:
         if (
             before is None
             or (before[1].end, before[1].loop) != (toggle.end, toggle.loop)
-            or toggle.position - before[1].position > SAME
+            or toggle.position - before[1].position > ONE_TOGGLE
         ):
             kept.append((k, toggle))
         elif k < before[0]:
@@ -200,7 +200,7 @@ def _together(toggles: list[_Toggle]) -> list[bool]:
     order = sorted(range(len(toggles)), key=lambda k: (toggles[k].loop, toggles[k].position))
     for one, other in pairwise(order):
         a, b = toggles[one], toggles[other]
-        if a.loop == b.loop and b.position - a.position <= SAME:
+        if a.loop == b.loop and b.position - a.position <= ONE_TOGGLE:
             found[one] = found[other] = True
     return found
 

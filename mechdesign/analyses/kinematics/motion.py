@@ -49,7 +49,7 @@ def characteristic_length(study: Study) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class MotionQuestion:
     """What a study asks of every pose.
 
     Parameters
@@ -84,7 +84,7 @@ class Asked:
         return [self.study.mechanism.coordinate(name) for name in self.study.mechanism.drives]
 
 
-def asked(study: Study) -> Asked:
+def motion_question(study: Study) -> MotionQuestion:
     """Read a study's questions about its motion.
 
     Raises
@@ -102,7 +102,7 @@ def asked(study: Study) -> Asked:
         shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
     names = dict.fromkeys([*mechanism.drives, *shown, *needed(study, poses)])
     watched = {name: mechanism.coordinate(name) for name in names}
-    return Asked(
+    return MotionQuestion(
         study,
         section,
         poses,
@@ -128,7 +128,7 @@ class Motion:
         Poses at a change point whose values are those of the motion that goes through it.
     """
 
-    asked: Asked
+    question: MotionQuestion
     arrays: dict[str, Floats] = field(default_factory=dict)
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
@@ -137,7 +137,7 @@ class Motion:
     @cached_property
     def given(self) -> dict[str, Floats]:
         """Values of the coordinates that the poses give."""
-        return self.asked.poses.values
+        return self.question.poses.values
 
     @property
     def valid(self) -> Flags:
@@ -147,14 +147,14 @@ class Motion:
     def put(self, name: str, rows: Ints, values: object) -> None:
         """Set some rows of a column."""
         if name not in self.arrays:
-            self.arrays[name] = np.full(self.asked.poses.count, np.nan)
+            self.arrays[name] = np.full(self.question.poses.count, np.nan)
         self.arrays[name][rows] = np.broadcast_to(np.asarray(values, dtype=float), rows.shape)
 
     def fill(self, solved: SolvedPoses) -> None:
         """Take up poses that give the same coordinates."""
-        study, rows, configuration = self.asked.study, solved.rows, solved.configuration
+        study, rows, configuration = self.question.study, solved.rows, solved.configuration
         self.reason[rows] = configuration.reason
-        for coordinate in self.asked.watched:
+        for coordinate in self.question.watched:
             if coordinate.name in solved.given:
                 # As the study gives it, not there and back through radians; also where the pose fails.
                 self.put(coordinate.name, rows, self.given[coordinate.name][rows])
@@ -165,33 +165,33 @@ class Motion:
         conditioning = np.where(assembled, regularity(linear), np.nan)
         self.put("conditioning", rows, conditioning)
         regular = conditioning >= STALLED
-        section = self.asked.section
+        section = self.question.section
         if section.rates or section.accelerations or section.speed:
             self._rates(linear, solved, regular)
-        if self.asked.square or self.asked.section.loads:
+        if self.question.square or self.question.section.loads:
             self._statics(linear, rows, regular)
 
     def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> None:
-        drives = drive_rates(self.asked.study, self.asked.section, self.asked.poses, solved, linear)
+        drives = drive_rates(self.question.study, self.question.section, self.question.poses, solved, linear)
         velocity = linear.velocity(drives.velocities)
         acceleration = linear.acceleration(velocity, drives.accelerations)
         configuration = linear.configuration
-        found = {o.name: o for o in [*(self.asked.drives if self.asked.of_given else []), *self.asked.outputs]}
+        found = {o.name: o for o in [*(self.question.drives if self.question.of_given else []), *self.question.outputs]}
         for output in found.values():
             for order, value in (
                 ("velocity", first(configuration, output, velocity)),
                 ("acceleration", second(configuration, output, velocity, acceleration)),
             ):
-                value = np.where(regular, in_study_units(self.asked.study, output, value), np.nan)
+                value = np.where(regular, in_study_units(self.question.study, output, value), np.nan)
                 self.put(f"{output.name}_{order}", solved.rows, value)
 
     def _statics(self, linear: Linearization, rows: Ints, regular: Flags) -> None:
-        study, listed, drives = self.asked.study, self.asked.listed, self.asked.drives
+        study, listed, drives = self.question.study, self.question.listed, self.question.drives
 
         def put(name: str, values: Value) -> None:
             self.put(name, rows, np.where(regular, values, np.nan))
 
-        if self.asked.square:
+        if self.question.square:
             length = characteristic_length(study)
             arc = (np.nan if length is None else length) if mixes(listed, drives) else None
             jacobian = Jacobian.of(linear, listed, arc)
@@ -201,7 +201,7 @@ class Motion:
             put("det_J", jacobian.determinant)
             put("inverse_condition", jacobian.inverse_condition)
         work: dict[str, float] = {}
-        for load in self.asked.section.loads:
+        for load in self.question.section.loads:
             if load.at is not None and load.force is not None:
                 work |= {f"{load.at}.{axis}": work.get(f"{load.at}.{axis}", 0.0) + force
                          for axis, force in zip("xy", load.force, strict=True)}  # fmt: skip
@@ -213,11 +213,11 @@ class Motion:
 
     def columns(self) -> list[Column]:
         """The columns of the motion table, `valid` last."""
-        asked, arrays, label = self.asked, self.arrays, self.asked.study.units.label
-        shown = {output.name: output for output in asked.outputs}
-        drives = {drive.name: drive for drive in asked.drives}
+        question, arrays, label = self.question, self.arrays, self.question.study.units.label
+        shown = {output.name: output for output in question.outputs}
+        drives = {drive.name: drive for drive in question.drives}
         columns = [column for column in self.pose_columns() if column.name in drives or column.name not in shown]
-        for name, output in ((drives if asked.of_given else {}) | shown).items():
+        for name, output in ((drives if question.of_given else {}) | shown).items():
             if name not in drives:
                 columns.append(Column(name, arrays[name], label(output.quantity), f"value of {name}"))
             for order in ("velocity", "acceleration"):
@@ -235,7 +235,7 @@ class Motion:
         ):  # fmt: skip
             if name in arrays:
                 columns.append(Column(name, arrays[name], "", meaning))
-        for drive in asked.drives:
+        for drive in question.drives:
             name = f"{drive.name}_effort"
             if name in arrays:
                 unit = label("moment" if drive.quantity == "angle" else "force")
@@ -245,16 +245,16 @@ class Motion:
 
     def pose_columns(self) -> list[Column]:
         """The drives, and the coordinates that the study gives."""
-        asked, units = self.asked, self.asked.study.units
-        columns = [Column(c.name, self.arrays[c.name], units.label(c.quantity), "drive") for c in asked.drives]
+        question, units = self.question, self.question.study.units
+        columns = [Column(c.name, self.arrays[c.name], units.label(c.quantity), "drive") for c in question.drives]
         named = {column.name for column in columns}
-        for column in pose_columns(asked.study, asked.poses):
+        for column in pose_columns(question.study, question.poses):
             if column.name not in named:
                 columns.append(replace(column, values=self.arrays.get(column.name, column.values)))
         return columns
 
     def _error(self, error: Error) -> Column:
-        study = self.asked.study
+        study = self.question.study
         far = error.output in study.mechanism.points
         meaning = f"distance of {error.output} from its target" if far else f"{error.output} less its target"
         return Column(error.name, error.values, study.units.label(error.quantity), meaning)
@@ -270,7 +270,7 @@ def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> F
     positions : ndarray
         Where they are along the sweep, in rows.
     """
-    (group,), study = motion.asked.poses.groups, motion.asked.study
+    (group,), study = motion.question.poses.groups, motion.question.study
     given = group.values[swept]
     values = in_study_units(study, study.mechanism.coordinate(swept), places)
     beside, near = given[np.round(positions).astype(int)], AT_POSE * np.ptp(given)

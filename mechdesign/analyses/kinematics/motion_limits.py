@@ -42,8 +42,8 @@ def motion_limits(motion: Motion, swept: str) -> Limits:
     swept : str
         The one coordinate that moves.
     """
-    study, outputs = motion.asked.study, motion.asked.outputs
-    (group,) = motion.asked.poses.groups
+    study, outputs = motion.question.study, motion.question.outputs
+    (group,) = motion.question.poses.groups
     mechanism = study.mechanism
     angles = angles_of([*outputs, *mechanism.counting])
     rows = np.flatnonzero(thinned(motion, swept))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.lines import Line
+from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.minima import lowest
 from mechdesign.numerics.roots import bracketed_roots
@@ -49,7 +49,7 @@ class Places:
         """All of several."""
         return Places(*(np.concatenate([getattr(p, name) for p in parts]) for name in Places.__dataclass_fields__))
 
-    def position(self, line: Line) -> Floats:
+    def position(self, line: PoseLine) -> Floats:
         """Place along the sweep in rows."""
         begin, span = line.place[self.node], line.place[self.other] - line.place[self.node]
         part = np.where(span != 0, (self.place - begin) / np.where(span != 0, span, 1.0), 0.0)
@@ -76,7 +76,7 @@ class Peak:
     node: Ints
 
 
-def turns(line: Line, rows: Ints, wanted: Wanted) -> Places:
+def turns(line: PoseLine, rows: Ints, wanted: Wanted) -> Places:
     """Places between the poses of a line at which slopes of functions (rows of its values) change their sign.
 
     A segment cannot hold a value below both its ends by more than half its length times its largest slope: links
@@ -120,7 +120,7 @@ def _roots(
     )  # fmt: skip
 
 
-def zeros(line: Line, rows: Ints, at_pose: float, touching: float) -> Places:
+def zeros(line: PoseLine, rows: Ints, at_pose: float, touching: float) -> Places:
     """Places along a line at which functions are zero.
 
     Parameters
@@ -160,7 +160,7 @@ def zeros(line: Line, rows: Ints, at_pose: float, touching: float) -> Places:
     return Places.joined(at_nodes, crossed.take(np.abs(found) <= touching), touched)
 
 
-def peaks(line: Line, rows: Ints, still: Floats, *, all_poses: bool = False) -> tuple[Peak, Peak]:
+def peaks(line: PoseLine, rows: Ints, still: Floats, *, all_poses: bool = False) -> tuple[Peak, Peak]:
     """Smallest values of functions (rows of the line's values), and of them times -1.
 
     Parameters
@@ -182,7 +182,7 @@ def peaks(line: Line, rows: Ints, still: Floats, *, all_poses: bool = False) -> 
     )
 
 
-def searched(line: Line, along: Along, table: Floats, still: Floats) -> Peak:
+def searched(line: PoseLine, along: Along, table: Floats, still: Floats) -> Peak:
     """Smallest values of functions without slopes, by golden section beside the poses that are below their neighbours.
 
     Parameters
@@ -214,7 +214,7 @@ def searched(line: Line, along: Along, table: Floats, still: Floats) -> Peak:
     return _best(line, still, 1, table, found.take(np.isfinite(least)), False)
 
 
-def _best(line: Line, still: Floats, sign: int, values: Floats, between: Places, all_poses: bool) -> Peak:
+def _best(line: PoseLine, still: Floats, sign: int, values: Floats, between: Places, all_poses: bool) -> Peak:
     """Of a line's poses and of places between them, the first along the sweep of the smallest but for rounding.
 
     Parameters

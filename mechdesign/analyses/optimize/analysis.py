@@ -13,6 +13,7 @@ from mechdesign.analyses.optimize.explorer import Explorer
 from mechdesign.analyses.optimize.files import optimum_files
 from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns, judged_of
 from mechdesign.analyses.optimize.sensitivity import active_bounds, sensitivity_table
+from mechdesign.analyses.optimize.shown import best_design
 from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
 from mechdesign.analyses.optimize.variables import grid, in_words
 from mechdesign.analyses.workspace.analysis import index_meanings
@@ -105,7 +106,8 @@ def optimize(
     files, wrong = optimum_files(study, compared, marked)
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
     warnings = (*doubts, *_warnings(study, evaluator, designs), *wrong)
-    return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files)
+    drawn = {"best": lambda: best_design(compared)}
+    return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files, drawn=drawn)
 
 
 def _ask(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.analyses.kinematics import analysis as kinematics
-from mechdesign.analyses.kinematics.motion import Motion, asked
+from mechdesign.analyses.kinematics.motion import Motion, motion_question
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
@@ -178,7 +178,7 @@ def _motion(
     also: Callable[[SolvedPoses], object],
 ) -> tuple[dict[str, Table], NDArray[np.int8], Flags]:  # fmt: skip
     """Tables, reasons, and the designs whose motion ends where no limit is known."""
-    question = dataclasses.replace(asked(study), poses=poses)
+    question = dataclasses.replace(motion_question(study), poses=poses)
     motion = move(question, also=also)
     known = {"motion": True, "targets": bool(motion.errors), "jacobian": question.square}
     found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}

@@ -15,7 +15,7 @@ from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import determinants
-from mechdesign.mechanism.margins import SINGULARITY, Cause, causes
+from mechdesign.mechanism.margins import LIMIT, SINGULARITY, Cause, causes
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
@@ -114,8 +114,8 @@ class Field:
 
     @cached_property
     def labels(self) -> tuple[tuple[str, str], ...]:
-        """Kind and name of each margin; see `mechdesign.mechanism.margins.Cause`."""
-        found = [(cause.kind, cause.name) for cause in self._causes]
+        """Of each margin ``limit`` or ``singularity``, and the name of its cause (`mechdesign.mechanism.margins`)."""
+        found = [(LIMIT if cause.kind == LIMIT else SINGULARITY, cause.name) for cause in self._causes]
         if self.plan.iterative:
             found.append((SINGULARITY, "continuation"))
         if self.same_assembly:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.shown import solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
 from mechdesign.report.figures.beams import draw_beams
@@ -15,7 +16,8 @@ from mechdesign.report.figures.drawing import Travel, draw_mechanism
 from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, fit, framed, scale_of
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.scene import Scene, pose, travels
-from mechdesign.report.figures.sweep import solve_sweep
+from mechdesign.report.figures.sweep import Sweep
+from mechdesign.results import Result
 
 if TYPE_CHECKING:
     from mechdesign.mechanism.configuration import Configuration
@@ -29,28 +31,29 @@ _ROUGH = 10.0  # points on paper: a place drawn nearer than this lies under the 
 _TALLEST = 4.2
 
 
-def mechanism_figure(study: Study, title: str = "sketch pose") -> Figure:
+def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -> Figure:
     """The sketch pose, under `title`, and the first pose of the study's kinematics, on one scale.
 
-    Use inside `style.context`.
+    Where the result carries no motion, a few poses of it are solved. Use inside `style.context`.
     """
     mechanism = study.mechanism
     sketch = mechanism.sketch_configuration
     panels: list[Panel] = [(title, sketch, 0)]
     scenes = [pose(mechanism, sketch)]
     try:
-        sweep = solve_sweep(study, _POSES)
+        sweep = Sweep.of(result.drawn["motion"] if "motion" in result.drawn else solve_shown(study, _POSES))
     except MechdesignError:
         return _compose(study, panels, travels(_drawable(scenes)))
-    poses = [pose(mechanism, sweep.configuration, k) for k in range(len(sweep.rows))]
-    first = next((k for k, scene in enumerate(poses) if scene is not None), None)
+    some = np.unique(np.linspace(0, len(sweep.rows) - 1, _POSES).round().astype(int)).tolist()
+    poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
+    first = next((k for k, scene in poses.items() if scene is not None), None)
     if first is not None:
         note = "first pose" if first == 0 else "first pose that can be assembled"
         if _same(scenes[0], poses[first]):
             panels = []
             note = f"{title.removesuffix(' pose')} and {note}"
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
-        scenes += poses
+        scenes += poses.values()
     return _compose(study, panels, travels(_drawable(scenes)))
 
 

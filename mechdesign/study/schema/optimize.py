@@ -131,7 +131,7 @@ class OptimizeSection(fields.Model):
 def check(checker: Checker, section: OptimizeSection) -> None:
     """Check the variables of an optimisation, its method, and the results that its goals name."""
     root: KeyPath = ("optimize",)
-    report = checker.reporter.report
+    report = checker.report
     if not section.variables:
         report((*root, "variables"), "an optimisation needs at least one variable")
     if not section.maximize and not section.minimize:
@@ -172,7 +172,7 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
         checker.known(command, COMMANDS, "command", path)
     elif required or name not in known:
         hint = suggestion(name, known) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
-        checker.reporter.report(path, f"there is no result {name!r}{hint}")
+        checker.report(path, f"there is no result {name!r}{hint}")
     if not required:
         column = name.rpartition(".")[2]
         checker.needs(command if command in _UNASSUMED else needed_section(column.rpartition("_")[0]), repr(name), path)

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 
 def prepare(study: Study) -> Evaluate:
     """sqrt(var x + var y), the drives held [S2, eq. 9]."""
+    from mechdesign.analyses.kinematics.rates import DriveRates
     from mechdesign.analyses.reliability.deflection import elasticity
     from mechdesign.analyses.reliability.error_limits import Channel
-    from mechdesign.analyses.reliability.first_order import Rates, linear_errors
+    from mechdesign.analyses.reliability.first_order import linear_errors
     from mechdesign.analyses.reliability.sources import find_sources
 
     assert study.workspace is not None
@@ -28,7 +29,7 @@ def prepare(study: Study) -> Evaluate:
 
     def evaluate(configuration: Configuration) -> Floats:
         elastic = None if bent is None else bent.at(configuration, channels)
-        linear = linear_errors(mechanism, configuration, channels, sources, Rates((), ()), elastic)
+        linear = linear_errors(mechanism, configuration, channels, sources, DriveRates((), ()), elastic)
         return np.asarray(np.sqrt((linear.deviation() ** 2).sum(axis=0)))
 
     return of_configurations(evaluate)

@@ -15,13 +15,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
-from mechdesign.report.figures.sweep import Sweep, is_motion, solve_sweep
-from mechdesign.study import Study
+from mechdesign.report.figures.sweep import Sweep
+from mechdesign.results import Result
 
 FRAMES = 72
 _COLORS, _WHITE = 128, 244
@@ -30,12 +29,10 @@ _CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and o
 _DPI = 100  # 800 pixels wide
 
 
-def animation(study: Study) -> bytes:
+def animation(result: Result) -> bytes:
     """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
-    if not is_motion(study_poses(study, "kinematics")):
-        return b""
-    sweep = solve_sweep(study)
-    return gif(sweep) if len(sweep.valid) else b""
+    sweep = Sweep.of(result.drawn["motion"])
+    return gif(sweep) if sweep.poses.motion and len(sweep.valid) else b""
 
 
 def gif(sweep: Sweep) -> bytes:

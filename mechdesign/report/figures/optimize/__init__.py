@@ -36,5 +36,5 @@ def figures(study: Study, result: Result) -> Gallery:
         found.add("pareto", front_figure, designs, result.tables["pareto"])
     if study.optimize.method == "search":
         found.add("convergence", convergence, designs)
-    found.add("optimum", optimum_figure, study, designs)
+    found.add("optimum", optimum_figure, result, designs)
     return found

@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
+from mechdesign.analyses.workspace.shown import curves
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.workspace.regions import PALE, ROOM, curves, keys, outline_of, pick, sheet
+from mechdesign.report.figures.workspace.regions import PALE, ROOM, keys, outline_of, pick, sheet
 from mechdesign.results import Result, Table
 from mechdesign.study.schema.workspace import Over
 

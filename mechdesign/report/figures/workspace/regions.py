@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.analyses.workspace.shown import curves
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.results import Result, Table
 
@@ -102,8 +103,8 @@ def regions(study: Study, result: Result) -> list[Region]:
         )
         boundary, others = pick(result.tables["boundary"], values), None
         if study.workspace is not None and study.workspace.assembly == "same" and (local["piece"] > 1).any():
-            others = _rows(local, local["piece"] > 1), _rows(boundary, boundary["piece"] > 1)
-            local, boundary = _rows(local, local["piece"] == 1), _rows(boundary, boundary["piece"] == 1)
+            others = local.take(local["piece"] > 1), boundary.take(boundary["piece"] > 1)
+            local, boundary = local.take(local["piece"] == 1), boundary.take(boundary["piece"] == 1)
         loci = pick(lines, values) if lines is not None and len(lines) else None
         found.append(Region(title, values, row, local, boundary, loci, others))
     return found
@@ -114,18 +115,7 @@ def pick(table: Table, values: Mapping[str, float]) -> Table:
     rows = np.ones(len(table), dtype=bool)
     for name, value in values.items():
         rows &= table[name] == value
-    return _rows(table, rows)
-
-
-def _rows(table: Table, rows: Flags) -> Table:
-    columns = tuple(type(c)(c.name, np.asarray(c.values)[rows], c.unit, c.meaning) for c in table.columns)
-    return Table(table.name, columns, table.meaning)
-
-
-def curves(table: Table) -> Iterator[Ints]:
-    """Rows of each curve of a boundary or of a locus."""
-    for curve in np.unique(table["curve"]):
-        yield np.flatnonzero(table["curve"] == curve)
+    return table.take(rows)
 
 
 def fate(kind: str, at: str) -> str:
