@@ -18,6 +18,12 @@ MOST_BEST = 10
 APART = 0.05
 
 
+def normalised(values: Floats, low: float, high: float, *, smallest: bool) -> Floats:
+    """Values as fractions of a range, 1 the best [S1, eq. 27]; 0 where there is none."""
+    share = (values - low) / (high - low) if high > low else np.zeros_like(values)
+    return np.asarray(1 - share if smallest and high > low else share)
+
+
 class Comparison:
     """Designs compared by the weighted sums of their normalised goals [S1, eqs. 27, 28].
 
@@ -55,14 +61,12 @@ class Comparison:
     def score_of(self, values: Floats, row: Floats) -> Floats:
         """Weighted sums of other designs, of values in the shape (designs, goals), normalised by the same bounds.
 
-        Each goal counts as the fraction of its range over the feasible designs, 1 the best; one that is the same for
-        all of them counts 0.
+        Each goal counts as the fraction of its range over the feasible designs.
         """
         total = np.zeros(len(values))
         for k, each in enumerate(self.designs.goals):
-            if row[k] and self._high[k] > self._low[k]:
-                share = (values[:, k] - self._low[k]) / (self._high[k] - self._low[k])
-                total += row[k] * (1 - share if each.smallest else share)
+            if row[k]:
+                total += row[k] * normalised(values[:, k], self._low[k], self._high[k], smallest=each.smallest)
         return total
 
     def unit_of(self, name: str) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.reliability import methods
-from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, Model, UnreachableError, cheapest
+from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, ToleranceModel, UnreachableError, cheapest
 from mechdesign.analyses.reliability.engine.precision import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.tables import at_poses
@@ -42,7 +42,7 @@ _NARROW = 1e-100
 class _Round:
     """Tolerances, and what model and simulation say of them, by pose (in the order of the settings)."""
 
-    model: Model
+    model: ToleranceModel
     scales: Floats
     allowed: Floats
     analytic: Floats
@@ -81,7 +81,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     task = replace(task, settings=[replace(setting, scale=None, followed=False) for setting in task.settings])
     if section.precision is None:
         task = replace(task, precision=Precision(_PRECISION, None))
-    model = Model(task, found, free, np.full(len(free), WIDEST))
+    model = ToleranceModel(task, found, free, np.full(len(free), WIDEST))
     method = "auto" if "auto" in section.methods or task.samples * asked < _SEEN else "monte_carlo"
     allowed = np.full(len(task.settings), asked)
     rounds: list[_Round] = []
@@ -134,7 +134,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **beside})
 
 
-def _simulated(model: Model, scales: Floats, method: str) -> list[Estimate]:
+def _simulated(model: ToleranceModel, scales: Floats, method: str) -> list[Estimate]:
     """What simulation says of these tolerances, at each pose."""
     task = model.task
     try:
@@ -146,7 +146,7 @@ def _simulated(model: Model, scales: Floats, method: str) -> list[Estimate]:
     return [said.estimates[setting.pose] for setting in task.settings]
 
 
-def _shares(model: Model, scales: Floats, k: int) -> Floats:
+def _shares(model: ToleranceModel, scales: Floats, k: int) -> Floats:
     """Share of each source in the variances of the limited errors at a pose, each over the square of its limit."""
     question = model.task.question
     linear = model.linear(scales).take([model.task.settings[k].pose])
@@ -222,7 +222,7 @@ def _ends(last: _Round) -> list[str]:
     return notes
 
 
-def _idle(model: Model, scales: Floats) -> Flags:
+def _idle(model: ToleranceModel, scales: Floats) -> Flags:
     """Allocated tolerances that change no limited error at any pose, to the first order."""
     shares = [_shares(model, scales, k)[model.free] for k in range(len(model.task.settings))]
     return np.asarray(~(np.abs(shares) > _NOTHING).any(axis=0))
@@ -234,7 +234,7 @@ def _plain(failure: float) -> str:
     return f"{1.0 - failure:.{digits}f}".rstrip("0").rstrip(".")
 
 
-def _unreachable(model: Model, error: UnreachableError, allowed: Floats, asked: float) -> str:
+def _unreachable(model: ToleranceModel, error: UnreachableError, allowed: Floats, asked: float) -> str:
     """Why the tightest tolerances do not do, and what they reach."""
     # SciPy takes a quarter of a second to import, and a study without limits does not need it.
     from mechdesign.analyses.reliability.probability import failure_probability

@@ -19,7 +19,7 @@ from mechdesign.analyses.reliability.engine.precision import Precision
 from mechdesign.analyses.reliability.engine.sobol import SobolIndices
 from mechdesign.analyses.reliability.first_order import linear_errors, nominal_values
 from mechdesign.analyses.reliability.notes import notes
-from mechdesign.analyses.reliability.question import Question, ask, unsaid
+from mechdesign.analyses.reliability.question import ask, unsaid
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MOST, MethodResult, Partial, Task
@@ -30,7 +30,6 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.threads import one_thread
 
 # Poses whose sensitivities are computed together.
@@ -72,7 +71,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     """
     keep_freed_memory()
     sources, warnings = find_sources(study)
-    section = _section(study)
+    section = study.reliability
+    assert section is not None
     task, groups, doubts = _first_order(study, study_poses(study, "reliability"), sources)
     poses = task.poses
     warnings += [*doubts, *unsaid(study, task.question)]
@@ -150,17 +150,14 @@ def first_order_tables(
     return {table.name: table for table in made}, task.reason
 
 
-def _section(study: Study) -> ReliabilitySection:
-    assert study.reliability is not None
-    return study.reliability
-
-
 def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _Groups, list[str]]:
     """The nominal mechanism and its linear error model at every pose, nan where it is not assembled; what is doubtful.
 
     Poses that do not hold the study's load are marked.
     """
-    mechanism, question = study.mechanism, ask(study, _section(study))
+    mechanism, section = study.mechanism, study.reliability
+    assert section is not None
+    question = ask(study, section)
     bent, doubts = elasticity(study)
     channels = question.channels
     reason = np.zeros(poses.count, dtype=np.int8)
@@ -171,7 +168,10 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
     for solved in solve_poses(study, poses, [channel.coordinate for channel in channels]):
         configuration, rows = solved.configuration, solved.rows
         reason[rows] = configuration.reason
-        rates = _rates(study, question, poses, solved)
+        rates = DriveRates((), ())
+        if any(channel.order for channel in channels):
+            # Held for made mechanisms too.
+            rates = drive_rates(study, section, poses, solved, mechanism.linearize(configuration))
         for row, value in zip(nominal, nominal_values(mechanism, configuration, channels, rates), strict=True):
             row[rows] = value
         for begin in range(0, len(rows), _BLOCK):
@@ -196,13 +196,6 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
     task = Task(study, poses, question, sources, reason, nominal, linear, elastic)
     components[:, :, ~task.assembled] = np.nan
     return task, groups, doubts
-
-
-def _rates(study: Study, question: Question, poses: Poses, solved: SolvedPoses) -> DriveRates:
-    """Rates of the drives at some poses, at which they are held for made mechanisms too; none where none are asked."""
-    if not any(channel.order for channel in question.channels):
-        return DriveRates((), ())
-    return drive_rates(study, _section(study), poses, solved, study.mechanism.linearize(solved.configuration))
 
 
 def _settings(task: Task, groups: _Groups) -> list[Setting]:

@@ -28,7 +28,7 @@ _TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class ToleranceModel:
     """Costs and failure probabilities by the first-order model, of tolerances so many times as wide as given.
 
     Parameters
@@ -91,7 +91,7 @@ class UnreachableError(Exception):
         self.failures = failures
 
 
-def cheapest(model: Model, allowed: Floats) -> Floats:
+def cheapest(model: ToleranceModel, allowed: Floats) -> Floats:
     """Factors of all tolerances.
 
     Parameters

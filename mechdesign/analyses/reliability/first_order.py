@@ -75,6 +75,7 @@ class FirstOrder:
         found = np.asarray(np.einsum("czp,z->cp", self.components, self._spread[0]))
         return found if self.offset is None else found + self.offset
 
+    @cached_property
     def sensitivity(self) -> Floats:
         """Per source, shape (channels, sources, poses): the derivative, of a pin sqrt(s_x^2 + s_y^2)."""
         each = [self.components[:, self.owner == k] for k in range(len(self.sources.all))]
@@ -90,14 +91,16 @@ class FirstOrder:
         total = parts.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
 
-    def worst_case(self, sensitivity: Floats) -> Floats:
+    def worst_case(self) -> Floats:
         """Sum of |sensitivity| times the larger end of the tolerance, shape (channels, poses)."""
         reach = np.array([max(abs(end) for end in source.ends) for source in self.sources.all])
-        return np.asarray(np.einsum("csp,s->cp", np.abs(sensitivity), reach))
+        return np.asarray(np.einsum("csp,s->cp", np.abs(self.sensitivity), reach))
 
-    def worst_ends(self, sensitivity: Floats) -> tuple[Floats, Floats]:
+    def worst_ends(self) -> tuple[Floats, Floats]:
         """Lowest and highest error with each source at the end of its tolerance that leads there, (channels, poses)."""
-        low, high = (sensitivity * np.array([source.ends[k] for source in self.sources.all])[:, None] for k in (0, 1))
+        low, high = (
+            self.sensitivity * np.array([source.ends[k] for source in self.sources.all])[:, None] for k in (0, 1)
+        )
         offset = 0.0 if self.offset is None else self.offset
         return np.minimum(low, high).sum(axis=1) + offset, np.maximum(low, high).sum(axis=1) + offset
 

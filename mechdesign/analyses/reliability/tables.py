@@ -46,8 +46,7 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
         for name in ("mean", "sigma")
     )
     nominal = (task.nominal * scale)[channel, pose]
-    sensitivity = linear.sensitivity()
-    low, high = linear.worst_ends(sensitivity)
+    low, high = linear.worst_ends()
     columns = [
         *at_poses(task, pose),
         Column("method", np.array([each.method for each in known])[method], meaning="how it was computed"),
@@ -55,7 +54,7 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("nominal", nominal, meaning="value of the nominal mechanism, in `unit`"),
         Column("mean", nominal + mean, meaning="mean over made mechanisms, in `unit`"),
         Column("sigma", sigma, meaning="standard deviation of the error, in `unit`"),
-        Column("worst_case", (linear.worst_case(sensitivity) * scale)[channel, pose],
+        Column("worst_case", (linear.worst_case() * scale)[channel, pose],
                meaning="sum of |sensitivity| times the larger end of the tolerance, in `unit`"),
         Column("worst_low", (low * scale)[channel, pose], meaning="lowest error that the tolerances allow, in `unit`"),
         Column("worst_high", (high * scale)[channel, pose],
@@ -112,7 +111,7 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
 
 def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     """Sensitivity to each source and its share of the variance, to the first order; Sobol' indices by pose."""
-    sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity(), task.linear.share()))
+    sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity, task.linear.share()))
     pose, channel, source = (index.ravel() for index in np.indices(share.shape))
     names = np.array([source.name for source in task.sources.all])
     links = np.array([links_meant(task.study, c.coordinate) for c in task.question.channels])

@@ -29,7 +29,7 @@ _ROUNDING = 1e-9
 
 def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
     """Note what is wrong; returns the section with wildcards and the clearances' links filled in."""
-    meant = _said(checker, section)
+    meant = _links_of_points(checker, section)
     dimensions = _dimensions(checker, section)
     clearances = {
         point: found
@@ -81,7 +81,7 @@ def split_link(names: Names, name: str) -> tuple[str, str, str]:
     return link, rest, point
 
 
-def _said(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
+def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
     """The link that outputs and limits mean by each point, where they say; what contradicts itself is noted."""
     found: dict[str, str] = {}
     given: list[tuple[KeyPath, str, bool]] = [

@@ -17,14 +17,13 @@ from PIL import Image
 
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import framed
+from mechdesign.report.figures.framing import TITLE, framed
 from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
 from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Result
 
 FRAMES = 72
 _COLORS, _WHITE = 128, 244
-_TITLE = 0.36  # inches above the drawing, for the pose in words
 _CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and of a frame
 _DPI = 100  # 800 pixels wide
 
@@ -44,7 +43,7 @@ def gif(sweep: Sweep) -> bytes:
     # A closed motion begins again with its last pose; another shows its inner poses twice.
     most = FRAMES + 1 if closed else FRAMES // 2 + 1
     some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
-    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST, above=_TITLE)
+    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST, above=TITLE)
     figure.set_dpi(_DPI)
     draw_paths(axes, sweep)
     pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)

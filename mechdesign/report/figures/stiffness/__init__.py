@@ -10,8 +10,9 @@ from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import name_labels, obstacles
 from mechdesign.report.figures.drawing import draw_mechanism, link_colors
-from mechdesign.report.figures.framing import equal_canvas
+from mechdesign.report.figures.framing import TALLEST, TITLE, framed
 from mechdesign.report.figures.labels import place_labels
+from mechdesign.report.figures.panels import along
 from mechdesign.report.figures.planes import Plane, map_sheet, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, pose
@@ -49,7 +50,7 @@ def _springs(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     if scene is None or not coils:
         return None
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
-    figure, axes = equal_canvas(places, study.units.label("length"))
+    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
     axes.set_title(f"equivalent springs at {pose_in_words(study, poses, drawn.row)}", loc="left")
     draw_mechanism(axes, study.mechanism, drawn.configuration, labels=False, drives=False)
     draw_coils(axes, coils)
@@ -115,8 +116,8 @@ def _directions(study: Study, result: Result) -> Figure | None:
 def _curves(study: Study, result: Result) -> Figure | None:
     """Stiffnesses to a force and to a moment along a path; what is rigid or free everywhere has no curve."""
     table, poses, units = result.tables["stiffness"], result.drawn["poses"], study.units
-    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
-    along = poses.values[moving[0]] if len(moving) == 1 else np.arange(poses.count)
+    over = along(study, poses)
+    assert over is not None
     forces = {"k_x": ("-", None), "k_y": ("-", None), "k_min": ("--", style.INK), "k_max": (":", style.INK)}
     panels = [
         (about, kind, looks)
@@ -133,13 +134,11 @@ def _curves(study: Study, result: Result) -> Figure | None:
     for axis, (about, kind, looks) in zip(axes, panels, strict=True):
         for name, (look, color) in looks.items():
             values = np.where(np.isfinite(table[name]), table[name], np.nan)
-            axis.plot(along, values, look, label=name, color=color)
+            axis.plot(over.values, values, look, label=name, color=color)
         axis.set_ylabel(style.axis_label(about, units.label(kind)))
         axis.set_yscale("log")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    single = len(moving) == 1
-    unit = units.label(study.mechanism.quantity(moving[0])) if single else ""
-    axes[-1].set_xlabel(style.axis_label(moving[0] if single else "pose along the path", unit))
+    axes[-1].set_xlabel(over.label)
     figure.align_ylabels(axes)
     return figure
 

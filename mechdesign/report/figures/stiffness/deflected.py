@@ -16,7 +16,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import equal_canvas
+from mechdesign.report.figures.framing import TALLEST, TITLE, framed
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
 from mechdesign.study import Poses, Study
@@ -42,7 +42,7 @@ def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     scales = [round_down(_MOVED * scene.span / max(size, 1e-300)) for size in sizes]
     bent = [[rest + scale * move[:, k] for rest, move in shapes] for k, scale in enumerate(scales)]
     places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
-    figure, axes = equal_canvas(places, study.units.label("length"))
+    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
     draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True)
     for color, lines, each, scale in zip(style.PALETTE, bent, loads, scales, strict=False):
         for line in lines:
@@ -141,7 +141,7 @@ def free_motion(study: Study, result: Result, drawn: Drawn) -> Figure | None:
     else:
         ways = [rest + way * scale * move for way in (1, -1)]
     places = np.concatenate([[*scene.points.values()], *ways])
-    figure, axes = equal_canvas(places, study.units.label("length"))
+    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
     draw_mechanism(axes, study.mechanism, drawn.configuration)
     for line, dash in zip(ways, ("-", "--"), strict=True):
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,

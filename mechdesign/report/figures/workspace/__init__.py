@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,11 +17,9 @@ from mechdesign.report.figures.workspace.inscribed import inscribed_figure
 from mechdesign.report.figures.workspace.maps import map_figures
 from mechdesign.report.figures.workspace.point_paths import path_figures
 from mechdesign.report.figures.workspace.ranges import range_figures
-from mechdesign.report.figures.workspace.regions import ROOM, Region, fill, keys, loci, outline, regions, sheet
+from mechdesign.report.figures.workspace.regions import ROOM, Region, fill, regions, sheet
 from mechdesign.results import Result, Table
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 SIDES = {"inner": style.BLUE, "outer": style.VERMILION}
 DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
@@ -63,7 +60,7 @@ def workspace_figure(study: Study, result: Result, region: Region, title: str = 
     page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
     (axes,) = page.axes
     fill(axes, region)
-    page.legend(keys(outline(axes, region), loci(axes, region)))
+    page.ends([region])
     for index in range(len(configuration.reason)):
         draw_mechanism(axes, mechanism, configuration, index, faint=True)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
