@@ -90,14 +90,15 @@ def kinematics(
         + _astray(motion)
         + targets.gaps(study, motion.errors, poses, motion.valid)
     )
-    tables = {"motion": motion_table(motion)}
-    swept = swept_of(poses)
+    tables, swept, ends = {"motion": motion_table(motion)}, swept_of(poses), list[Boundary]()
     if swept is not None:
-        limits = motion_limits(motion, swept)
-        warnings += limits.warnings
-        tables["limits"] = limits.table
-    between, _ = tables_between(motion, limits.ends if swept is not None else ())
-    tables = {"motion": tables["motion"], "extremes": between.pop("extremes"), **tables, **between}
+        limits, told, ends = motion_limits(motion, swept)
+        warnings += told
+    between, _ = tables_between(motion, ends)
+    tables["extremes"] = between["extremes"]
+    if swept is not None:
+        tables["limits"] = limits
+    tables |= between
     if motion.errors:
         tables["targets"] = targets_table(motion)
     if question.square:
@@ -174,7 +175,7 @@ def tables_between(
     torn = np.zeros(poses.designs, dtype=bool)
     if swept is not None:
         coordinates = needed(motion, names) if "extremes" in wanted else []
-        line = PoseLine(motion, swept, coordinates, functions(loops), ends)
+        line = PoseLine(motion, swept, coordinates, functions(loops, "toggles" in wanted), ends)
     tables = {}
     if "extremes" in wanted:
         tables["extremes"] = extremes(motion, swept, line, names)
