@@ -110,6 +110,15 @@ def test_a_design_without_workspace_is_infeasible() -> None:
     assert result.counts == {"designs": 4, "infeasible": 2}
 
 
+def test_a_workspace_that_follows_each_design() -> None:
+    """A find: indices of a section that depends on a variable had no meaning, which was an error."""
+    variables = "optimize.variables={l_min: {from: 2, to: 2.2, number: 2}}"
+    follows = ("workspace.scan.about=[0*l_min, 0]", "workspace.integrate.tolerance=1e-3")
+    study = mechdesign.load(CONFIGS / "two_rrr.yaml", [variables, "optimize.weights=", *follows])
+    columns = {column.name: column for column in mechdesign.optimize(study).main.columns}
+    assert columns["GII"].meaning == "mean of the inverse condition number over the region"
+
+
 def test_goals_of_other_questions() -> None:
     """The worst pose counts: where the arm reaches farthest is minimised, by the length of its first link."""
     changes = (
