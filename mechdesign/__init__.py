@@ -15,36 +15,24 @@ from typing import TYPE_CHECKING, Any
 from mechdesign.commands import COMMANDS
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.kinematics.analysis import kinematics
-    from mechdesign.analyses.optimize.analysis import optimize
-    from mechdesign.analyses.reliability.analysis import reliability
-    from mechdesign.analyses.stiffness.analysis import stiffness
-    from mechdesign.analyses.workspace.analysis import workspace
-    from mechdesign.errors import AssemblyError, MechdesignError, StudyError
-    from mechdesign.study import load
+    from mechdesign.analyses.kinematics.analysis import kinematics as kinematics
+    from mechdesign.analyses.optimize.analysis import optimize as optimize
+    from mechdesign.analyses.reliability.analysis import reliability as reliability
+    from mechdesign.analyses.stiffness.analysis import stiffness as stiffness
+    from mechdesign.analyses.workspace.analysis import workspace as workspace
+    from mechdesign.errors import AssemblyError as AssemblyError
+    from mechdesign.errors import MechdesignError as MechdesignError
+    from mechdesign.errors import StudyError as StudyError
+    from mechdesign.study import load as load
 
     __version__: str
 
-__all__ = [
-    "AssemblyError",
-    "MechdesignError",
-    "StudyError",
-    "__version__",
-    "kinematics",
-    "load",
-    "optimize",
-    "reliability",
-    "stiffness",
-    "workspace",
-]
-
 _HOMES = {
-    "AssemblyError": "mechdesign.errors",
-    "MechdesignError": "mechdesign.errors",
-    "StudyError": "mechdesign.errors",
+    **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
     "load": "mechdesign.study",
     **{name: command.module for name, command in COMMANDS.items()},
 }
+__all__ = sorted((*_HOMES, "__version__"))
 
 
 def __getattr__(name: str) -> Any:

@@ -5,14 +5,28 @@ Each class maps to one exit code of the command line (`exit_code`).
 
 from __future__ import annotations
 
+import difflib
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from mechdesign.results import Result
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that resembles this one most, None where none does."""
+    folded = {candidate.casefold(): candidate for candidate in known}
+    close = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.6)
+    return folded[close[0]] if close else None
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Give ``; did you mean 'x'?`` where a known name resembles this one, or else nothing."""
+    near = nearest(name, known)
+    return f"; did you mean {near!r}?" if near is not None else ""
 
 
 class MechdesignError(Exception):

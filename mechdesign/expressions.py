@@ -218,6 +218,26 @@ def arity(name: str) -> int:
     return _ARITY.get(name, 1)
 
 
+def is_linear(expression: Expression) -> bool:
+    """Whether the derivatives of an expression are the same everywhere, as its form shows."""
+    degrees: list[int] = []
+    for kind, item in expression.program:
+        if kind != "call":
+            degrees.append(int(kind == "name"))
+            continue
+        count = arity(str(item))
+        inner = degrees[-count:]
+        del degrees[-count:]
+        if item in ("+", "-", "negate"):
+            degrees.append(max(inner))
+        elif item == "*":
+            degrees.append(sum(inner))
+        else:
+            # A quotient by a constant is linear; all else of a variable counts as not.
+            degrees.append(inner[0] if item == "/" and not inner[1] else 2 * max(inner))
+    return degrees[0] <= 1
+
+
 def _has_nan(env: Mapping[str, ArrayLike], names: frozenset[str]) -> bool:
     """Whether the value is lost already in a variable, whose own mistake has been told."""
     return any(bool(np.isnan(np.asarray(env[name], dtype=float)).any()) for name in names)

@@ -31,6 +31,11 @@ class Column:
     unit: str = ""
     meaning: str = ""
 
+    @property
+    def numeric(self) -> bool:
+        """Whether it holds numbers or booleans rather than words."""
+        return self.values.dtype.kind in "fiub"
+
 
 @dataclass(frozen=True, eq=False)
 class Table:
@@ -45,14 +50,24 @@ class Table:
         if len(lengths) > 1:
             raise ValueError(f"table {self.name}: columns of unequal length {sorted(lengths)}")
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def column(self, name: str) -> Column:
+        """The column of a name.
+
+        Raises
+        ------
+        KeyError
+            If there is none.
+        """
         for column in self.columns:
             if column.name == name:
-                return column.values
+                return column
         raise KeyError(f"table {self.name!r} has no column {name!r}; it has {', '.join(self.names)}")
 
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.column(name).values
+
     def __contains__(self, name: object) -> bool:
-        return any(column.name == name for column in self.columns)
+        return name in self.names
 
     def __len__(self) -> int:
         return len(self.columns[0].values) if self.columns else 0
@@ -76,7 +91,7 @@ class Result:
     Parameters
     ----------
     command : str
-        ``kinematics``, ``workspace``, ``optimize``, ``reliability`` or ``stiffness``.
+        Its name in `mechdesign.commands.COMMANDS`.
     tables : mapping of str to Table
         Named as their files; the first is the main table.
     warnings : sequence of str

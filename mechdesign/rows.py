@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.errors import nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 
@@ -62,8 +62,8 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
     """
     table, column, rows = _locate(result, path)
     counts = rows
-    values = np.asarray(table[column])
-    if values.dtype.kind not in "fiub":
+    values = table[column]
+    if not table.column(column).numeric:
         raise UnknownColumnError(
             f"column {column!r} of {table.name} holds words, which cannot be compared with a number"
         )
@@ -79,13 +79,12 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
 
 def _one_unit(table: Table, column: str, counts: Flags) -> None:
     """Check that the rows that count can be compared: that they are not millimetres and degrees."""
-    meaning = next(each.meaning for each in table.columns if each.name == column)
-    if IN_UNIT not in meaning or "unit" not in table:
+    if IN_UNIT not in table.column(column).meaning or "unit" not in table:
         return
     units = np.asarray(table["unit"])[counts]
     if len(set(units.tolist())) < 2:
         return
-    named = [each for each in table.columns if each.values.dtype.kind not in "fiub" and each.name != "unit"]
+    named = [each for each in table.columns if not each.numeric and each.name != "unit"]
     pairs = {each.name: dict.fromkeys(zip(each.values[counts].tolist(), units.tolist(), strict=True)) for each in named}
     # The words that tell the rows of one unit from those of another.
     telling = [name for name, found in pairs.items() if len({word for word, _ in found}) == len(found)]
@@ -107,28 +106,25 @@ def worst(values: Floats, counts: Flags, *, largest: bool) -> Floats:
 
 
 def _locate(result: Result, path: str) -> tuple[Table, str, Flags]:
-    for table in result.tables.values():
-        if path in table:
-            return table, path, np.ones(len(table), dtype=bool)
     name, _, rest = path.partition(".")
-    if name in result.tables:
-        table = result.tables[name]
-        if rest in table:
-            return table, rest, np.ones(len(table), dtype=bool)
-        for column in table.names:
+    named = result.tables.get(name)
+    for table, column in (*((each, path) for each in result.tables.values()), *([(named, rest)] if named else [])):
+        if column in table:
+            return table, column, np.ones(len(table), dtype=bool)
+    if named is not None:
+        for column in named.names:
             word = rest.removesuffix(f".{column}")
-            for words in table.columns if word != rest else ():
-                if words.values.dtype.kind not in "fiub" and (rows := _equal(words.values, word)).any():
-                    return table, column, rows
+            for words in named.columns if word != rest else ():
+                if not words.numeric and (rows := _equal(words.values, word)).any():
+                    return named, column, rows
     known = [column for table in result.tables.values() for column in table.names]
     raise UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
 
 
 def _unknown(where: str, name: str, known: Iterable[str]) -> str:
     names = list(dict.fromkeys(known))
-    close = get_close_matches(name, names, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(names)}"
-    return f"{where}: no column {name!r}; {hint}"
+    hint = suggestion(name, names) or f"; it has {', '.join(names)}"
+    return f"{where}: no column {name!r}{hint}"
 
 
 def _missing(table: Table, rows: Flags, where: Mapping[str, Any]) -> str:
@@ -148,11 +144,11 @@ def _present(values: NDArray[Any], wanted: object) -> str:
     """The values of a column in words: all of few, the ends and the nearest of many numbers."""
     number = values.dtype.kind in "fiub"
     known = list(dict.fromkeys((values[np.isfinite(values)] if number else values).tolist()))
-    if not number and (close := get_close_matches(str(wanted), known, n=1)):
-        return f"did you mean {close[0]!r}?"
+    if not number and (close := nearest(str(wanted), known)):
+        return f"did you mean {close!r}?"
     if number and len(known) > MOST_VALUES and isinstance(wanted, (int, float)):
-        nearest = min(known, key=lambda value: abs(value - wanted))
-        return f"there are {min(known):.12g} to {max(known):.12g}, {nearest:.12g} the nearest"
+        beside = min(known, key=lambda value: abs(value - wanted))
+        return f"there are {min(known):.12g} to {max(known):.12g}, {beside:.12g} the nearest"
     shown = [f"{value:.12g}" if isinstance(value, float) else str(value) for value in known[:MOST_VALUES]]
     rest = ", ..." * (len(known) > MOST_VALUES)
     return f"there {'is' if len(known) == 1 else 'are'} {', '.join(shown) or 'none'}{rest}"

@@ -52,37 +52,45 @@ def continuous(
     known = np.flatnonzero(np.isfinite(values).all(axis=0))
     if not len(known):
         return values
-    begins, ends = known[:-1], known[1:]
-    together = begins // line == ends // line
-    moved = wrap(values[:, ends] - values[:, begins])
-    neighbours = together & (ends == begins + 1)
-    parts = _parts(plan, given, begins, ends)
-    coarse = np.flatnonzero(neighbours & ((parts > 1) | (np.abs(moved) >= SURE).any(axis=0)))
+    seen = values if len(known) == values.shape[1] else values[:, known]
+    starts = known // line != np.append(-1, known[:-1]) // line
+    rises = np.diff(seen, axis=1)
+    far = ~starts[1:] & (np.abs(rises) >= SURE).any(axis=0)
+    parts = _parts(plan, given, known)
+    at = np.flatnonzero(far | (parts > 1) & ~starts[1:])
+    moved = wrap(rises[:, at])
+    coarse = np.flatnonzero((known[at + 1] == known[at] + 1) & ((parts[at] > 1) | (np.abs(moved) >= SURE).any(axis=0)))
     if len(coarse):
-        moved[:, coarse] = _on_the_way(angles, given, begins[coarse], ends[coarse], parts[coarse], solve)
-    turns = np.round((values[:, begins] + moved - values[:, ends]) / TURN)
-    turns = np.concatenate([np.zeros((len(values), 1)), np.where(together, turns, 0.0)], axis=1)
-    total = np.cumsum(turns, axis=1)
-    # Every line of a grid starts anew.
-    starts = np.concatenate([[True], ~together])
-    heads = np.maximum.accumulate(np.where(starts, np.arange(len(known)), 0))
-    total -= total[:, heads]
-    total += values[:, known[heads]] < ON_THE_CUT - np.pi
-    found = values.copy()
-    found[:, known] += TURN * total
-    return np.stack([_across(row, poses.grid) for row in found])
+        begins = known[at[coarse]]
+        moved[:, coarse] = _on_the_way(angles, given, begins, begins + 1, parts[at[coarse]], solve)
+    # Whole turns from each of some poses on, counted anew on every line of a grid.
+    heads = np.flatnonzero(starts)
+    begins = np.concatenate([heads, at + 1])
+    order = np.argsort(begins, kind="stable")
+    more = np.concatenate([np.zeros((len(values), len(heads))), np.round((moved - rises[:, at]) / TURN)], axis=1)
+    total = np.cumsum(more[:, order], axis=1)
+    line_of = np.cumsum(order < len(heads)) - 1
+    total += ((seen[:, heads] < ON_THE_CUT - np.pi) - total[:, order < len(heads)])[:, line_of]
+    found = values
+    if total.any():
+        found = values.copy()
+        found[:, known] += TURN * np.repeat(total, np.diff(np.append(begins[order], len(known))), axis=1)
+    return found if len(poses.grid) == 1 else np.stack([_across(row, poses.grid) for row in found])
 
 
-def _parts(plan: Plan, given: Sequence[Floats], begins: Ints, ends: Ints) -> Ints:
+def _parts(plan: Plan, given: Sequence[Floats], known: Ints) -> Ints:
     """In how many parts (a power of two) each step is made, so that what is given moves little in each."""
-    longest = np.ones(len(begins))
+    longest = np.ones(len(known) - 1)
     for coordinate, values in zip(plan.structure.given, given, strict=True):
         step = {"angle": STEP, "length": PART * plan.core.size}.get(coordinate.quantity)
         if step:
-            longest = np.maximum(longest, np.abs(values[ends] - values[begins]) / step)
+            longest = np.maximum(longest, np.abs(np.diff(values[known])) / step)
+    parts = np.ones(len(longest), dtype=np.intp)
     # A step that is just one part must not become two by rounding.
-    powers = np.ceil(np.log2(longest) - 1e-9)
-    return np.asarray(2 ** np.clip(powers, 0, math.log2(MOST)), dtype=np.intp)
+    long = np.flatnonzero(longest > 1 + 1e-9)
+    powers = np.ceil(np.log2(longest[long]) - 1e-9)
+    parts[long] = 2 ** np.clip(powers, 0, math.log2(MOST)).astype(np.intp)
+    return parts
 
 
 def _on_the_way(

@@ -8,7 +8,7 @@ from importlib import import_module
 from mechdesign.commands import COMMANDS
 from mechdesign.results import Result
 from mechdesign.study import Study
-from mechdesign.study.reliability_models import Precision
+from mechdesign.study.schema.reliability import Precision
 
 # Enough designs that one of them may well be feasible.
 DESIGNS, SAMPLES = 10, 2

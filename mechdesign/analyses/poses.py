@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,11 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.turns import TURN, angles_of
 from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.parallel import map_chunks
 from mechdesign.results import Column
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
+from mechdesign.study.poses import PoseGroup, Poses, default, expand
+from mechdesign.study.schema.poses import PoseSection
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 CHUNK = 65536
@@ -36,14 +39,36 @@ class SolvedPoses:
         Place of each pose in the study's order.
     given : tuple of str
         The coordinates given.
-    drives : sequence of ndarray
-        Value of each drive (radians and lengths): as given, or from the inverse problem.
     """
 
     rows: Ints
     given: tuple[str, ...]
     configuration: Configuration
-    drives: tuple[Value, ...]
+
+
+def study_poses(study: Study, section: str) -> Poses:
+    """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
+
+    A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.
+
+    Raises
+    ------
+    StudyError
+        Where nothing sensible can be assumed.
+    """
+    turn = TURN / study.units.angle_factor
+    for name in dict.fromkeys((section, "kinematics")):
+        asked: PoseSection | None = getattr(study, name)
+        if asked is not None and asked.at_nodes:
+            # Here, for regions need SciPy, which is slow to import.
+            from mechdesign.analyses.region.nodes import workspace_nodes
+
+            return workspace_nodes(study)
+        if asked is not None:
+            found = expand(asked, study.path.parent if study.path else Path(), turn)
+            if found is not None:
+                return found
+    return default(study.mechanism.description, turn)
 
 
 def radians(study: Study, coordinate: Coordinate, value: Value) -> Value:
@@ -56,55 +81,54 @@ def in_study_units(study: Study, coordinate: Coordinate, value: Value) -> Value:
     return value / study.units.angle_factor if coordinate.quantity == "angle" else value
 
 
-def solve_poses(study: Study, poses: Poses, wanted: Sequence[Coordinate] = ()) -> Iterator[SolvedPoses]:
+def solve_poses(
+    study: Study, poses: Poses, wanted: Sequence[Coordinate] = (), jobs: int | None = 1
+) -> Iterator[SolvedPoses]:  # fmt: skip
     """Solve each group of poses with the plan of its coordinates, at most `CHUNK` poses at a time.
 
     What a pose gives keeps its turns. Drives that are found lie within their limits. Where the poses are those of a
     motion or a grid, the other angles of the wanted coordinates and of the study's limits, in expressions too, are
     followed along it from a first value in (-180, 180] deg, a drive's from the sketch's; of listed poses each is in
-    (-180, 180] deg.
+    (-180, 180] deg. The result is the same for any number of threads, `jobs`.
 
     Raises
     ------
     MechanismError
         Where the coordinates of a pose do not determine the mechanism.
     """
-    mechanism: Mechanism = study.mechanism
     for group in poses.groups:
-        plan = mechanism.plan(group.names)
-        given = [
-            np.asarray(radians(study, c, v), dtype=float)
-            for c, v in zip(plan.structure.given, group.columns(), strict=True)
-        ]
-        pieces = [slice(begin, begin + CHUNK) for begin in range(0, len(group.rows), CHUNK)]
-        solved = None
-        near: dict[str, Floats] = {}
-        angles = [] if poses.listed else _followed(mechanism, plan, wanted)
-        if angles:
-            values = np.empty((len(angles), len(group.rows)))
-            for piece in pieces:
-                solved = _solve(mechanism, plan, poses, [v[piece] for v in given], group.rows[piece])
-                for row, angle in zip(values, angles, strict=True):
-                    row[piece] = solved.value(angle)
-            values = continuous(poses, plan, given, angles, values, partial(_solve, mechanism, plan, poses))
-            near = {angle.name: row for angle, row in zip(angles, values, strict=True)}
-            near |= {name: _begun(study, poses, name, near[name]) for name in mechanism.drives if name in near}
-        for piece in pieces:
-            rows = group.rows[piece]
-            if solved is None or len(pieces) > 1:
-                solved = _solve(mechanism, plan, poses, [v[piece] for v in given], rows)
-            told = {**solved.near, **{name: values[piece] for name, values in near.items()}}
-            configuration = replace(solved, near=told, counted=solved.counted | near.keys())
-            plan.judge(configuration)
-            known: dict[str, Value] = {name: values[piece] for name, values in zip(group.names, given, strict=True)}
-            drives = tuple(
-                np.broadcast_to(
-                    known[name] if name in known else configuration.value(mechanism.coordinate(name)),
-                    configuration.shape,
-                )
-                for name in mechanism.drives
-            )
-            yield SolvedPoses(rows, group.names, configuration, drives)
+        yield from _solve_group(study, poses, group, wanted, jobs)
+
+
+def _solve_group(
+    study: Study, poses: Poses, group: PoseGroup, wanted: Sequence[Coordinate], jobs: int | None
+) -> Iterator[SolvedPoses]:  # fmt: skip
+    mechanism: Mechanism = study.mechanism
+    plan = mechanism.plan(group.names)
+    coordinates = plan.structure.given
+    given = [np.asarray(radians(study, c, v), dtype=float) for c, v in zip(coordinates, group.columns(), strict=True)]
+    solve = partial(_solve, mechanism, plan, poses)
+    pieces = [slice(begin, begin + CHUNK) for begin in range(0, len(group.rows), CHUNK)]
+
+    def at(piece: slice) -> Configuration:
+        return solve([v[piece] for v in given], group.rows[piece])
+
+    only = [at(piece) for piece in pieces] if len(pieces) == 1 else None
+    near: dict[str, Floats] = {}
+    angles = [] if poses.listed else _followed(mechanism, plan, wanted)
+    if angles:
+        values = np.empty((len(angles), len(group.rows)))
+        for piece, configuration in zip(pieces, only or map_chunks(at, pieces, jobs), strict=True):
+            for row, angle in zip(values, angles, strict=True):
+                row[piece] = configuration.value(angle)
+        values = continuous(poses, plan, given, angles, values, solve)
+        near = {angle.name: row for angle, row in zip(angles, values, strict=True)}
+        near |= {name: _begun(study, poses, name, near[name]) for name in mechanism.drives if name in near}
+    for piece, configuration in zip(pieces, only or map_chunks(at, pieces, jobs), strict=True):
+        told = {**configuration.near, **{name: values[piece] for name, values in near.items()}}
+        configuration = replace(configuration, near=told, counted=configuration.counted | near.keys())
+        plan.judge(configuration)
+        yield SolvedPoses(group.rows[piece], group.names, configuration)
 
 
 def _solve(mechanism: Mechanism, plan: Plan, poses: Poses, given: Sequence[Floats], rows: Ints) -> Configuration:

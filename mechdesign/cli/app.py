@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from typing import Annotated
+from collections.abc import Callable, Sequence
+from functools import partial
+from inspect import Parameter, Signature
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -45,119 +48,54 @@ def _start(
     """Options before the command."""
 
 
-def _command(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """A question's command, with its help."""
-    asked = COMMANDS[name]
-    return app.command(name, short_help=asked.question, help=f"{asked.question} {asked.answer}")
+def _add(name: str, run: Callable[[Any, Options], int], takes: Sequence[Parameter], short: str, told: str) -> None:
+    """Add a command: what it runs with its study or studies and its options, these, and its help."""
 
-
-def _add_question(name: str) -> None:
-    @_command(name)
-    def question(
-        study: given.StudyArgument = None,
-        out: given.Out = None,
-        overrides: given.Overrides = None,
-        seed: given.Seed = None,
-        jobs: given.Jobs = None,
-        json: given.Json = False,
-        quiet: given.Quiet = False,
-        no_plots: given.NoPlots = False,
-    ) -> None:
+    def command(**said: Any) -> None:
         with guard():
-            from mechdesign.cli.execution import ask
+            raise typer.Exit(run(said.pop("study"), Options(**said)))
 
-            options = Options(out, tuple(overrides or ()), seed, jobs, json, quiet, not no_plots)
-            raise typer.Exit(ask(study, name, options))
-
-
-@_command("kinematics")
-def kinematics(
-    study: given.StudyArgument = None,
-    out: given.Out = None,
-    overrides: given.Overrides = None,
-    seed: given.Seed = None,
-    jobs: given.Jobs = None,
-    json: given.Json = False,
-    quiet: given.Quiet = False,
-    no_plots: given.NoPlots = False,
-    animate: given.Animate = False,
-    all_modes: given.AllModes = False,
-) -> None:
-    """The question of motion, with the options that only it has."""
-    with guard():
-        from mechdesign.cli.execution import ask
-
-        options = Options(
-            out, tuple(overrides or ()), seed, jobs, json, quiet, not no_plots, animate=animate, all_modes=all_modes
-        )
-        raise typer.Exit(ask(study, "kinematics", options))
+    command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
+    app.command(name, short_help=short, help=told)(command)
 
 
-@_command("optimize")
-def optimize(
-    study: given.StudyArgument = None,
-    out: given.Out = None,
-    overrides: given.Overrides = None,
-    seed: given.Seed = None,
-    jobs: given.Jobs = None,
-    json: given.Json = False,
-    quiet: given.Quiet = False,
-    no_plots: given.NoPlots = False,
-    resume: given.ResumeDesigns = False,
-) -> None:
-    """The question of the best dimensions, which may take long and be gone on with."""
-    with guard():
-        from mechdesign.cli.execution import ask
+def _ask(question: str, study: Path | None, options: Options) -> int:
+    from mechdesign.cli.execution import ask
 
-        options = Options(out, tuple(overrides or ()), seed, jobs, json, quiet, not no_plots, resume=resume)
-        raise typer.Exit(ask(study, "optimize", options))
+    return ask(study, question, options)
 
 
-for _name in COMMANDS:
-    if _name not in ("kinematics", "optimize"):
-        _add_question(_name)
+def _run(studies: Sequence[Path] | None, options: Options) -> int:
+    from mechdesign.cli import batch
+
+    return batch.run(studies or [], options)
 
 
-@app.command("run", short_help="Answer every question that each study asks.")
-def run(
-    studies: given.StudiesArgument = None,
-    out: given.OutAll = None,
-    overrides: given.Overrides = None,
-    seed: given.Seed = None,
-    jobs: given.Jobs = None,
-    json: given.Json = False,
-    quiet: given.Quiet = False,
-    no_plots: given.NoPlots = False,
-    animate: given.Animate = False,
-    junit: given.Junit = None,
-    fail_fast: given.FailFast = False,
-    resume: given.Resume = False,
-) -> None:
-    """Answer every question that each study asks, each in a folder of its own; one summary for all."""
-    with guard():
-        from mechdesign.cli import batch
+def _check(studies: Sequence[Path] | None, options: Options) -> int:
+    from mechdesign.cli.checking import check_studies
 
-        options = Options(
-            out, tuple(overrides or ()), seed, jobs, json, quiet, not no_plots,
-            animate=animate, fail_fast=fail_fast, resume=resume,
-        )  # fmt: skip
-        raise typer.Exit(batch.run(studies or [], options, junit))
+    return check_studies(studies or [None], options)
 
 
-@app.command("check", short_help="Validate only: joints, mobility, plan of solution.")
-def check(
-    studies: given.StudiesArgument = None,
-    out: given.OutDrawings = None,
-    overrides: given.Overrides = None,
-    quiet: given.Quiet = False,
-    no_plots: given.NoPlots = False,
-) -> None:
-    """Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch."""
-    with guard():
-        from mechdesign.cli.checking import check_studies
-
-        options = Options(out, tuple(overrides or ()), quiet=quiet, plots=not no_plots)
-        raise typer.Exit(check_studies(studies or [None], options))
+for _name, _asked in COMMANDS.items():
+    _takes = (*given.COMMON, *given.OWN.get(_name, ()))
+    _add(_name, partial(_ask, _name), _takes, _asked.question, f"{_asked.question} {_asked.answer}")
+_add(
+    "run",
+    _run,
+    (
+        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.ANIMATE, given.JUNIT, given.FAIL_FAST, given.RESUME,
+    ),
+    "Outcome every question that each study asks.",
+    "Outcome every question that each study asks, each in a folder of its own; one summary for all.",
+)  # fmt: skip
+_add(
+    "check",
+    _check,
+    (given.STUDIES, given.OUT_DRAWINGS, given.OVERRIDES, given.QUIET, given.NO_PLOTS),
+    "Validate only: joints, mobility, plan of solution.",
+    "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",
+)
 
 
 @app.command("new")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Answer, Owners, answer, load_study, study_label, tell
+from mechdesign.cli.execution import Outcome, Owners, answer, folder, load_study, study_label, tell
 from mechdesign.cli.failure import INTERRUPTED
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
@@ -38,13 +38,13 @@ def questions(study: Study) -> tuple[str, ...]:
 
 
 @one_thread()
-def run(paths: Sequence[Path], options: Options, junit: Path | None = None) -> int:
-    """Answer every question of the studies; returns the exit code, the highest of them all.
+def run(paths: Sequence[Path], options: Options) -> int:
+    """Outcome every question of the studies; returns the exit code, the highest of them all.
 
     A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
     summary and the JUnit file then tell what was finished.
     """
-    answers: list[Answer] = []
+    answers: list[Outcome] = []
     try:
         for given in _answers(paths or [None], options):
             answers.append(given)
@@ -52,17 +52,17 @@ def run(paths: Sequence[Path], options: Options, junit: Path | None = None) -> i
                 break
     except KeyboardInterrupt:
         terminal.say("interrupted; what was finished is whole")
-        answers.append(Answer("", "", Path(), INTERRUPTED, 0, failed="interrupted"))
+        answers.append(Outcome("", "", Path(), INTERRUPTED, 0, failed="interrupted"))
     terminal.show(_summary(answers), as_json=options.json)
-    if junit is not None:
+    if options.junit is not None:
         from mechdesign.cli.junit import to_xml
         from mechdesign.report.writer import write_text
 
-        write_text(junit, to_xml(answers))
+        write_text(options.junit, to_xml(answers))
     return max(given.exit_code for given in answers)
 
 
-def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Answer]:
+def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome]:
     """Answers of all studies in order; every study is read before the first is computed."""
     studies: list[Study] = []
     for path in paths:
@@ -78,14 +78,12 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Answer]
         except StudyError as error:
             yield _failure(label, "check", Path(), error)
             continue
-        root = options.out or Path("results") / label
-        if options.out is not None and len(paths) > 1:
-            root /= label
+        root = folder(study, "", options, several=len(paths) > 1)
         for command in questions(study):
             yield _ask(study, command, root / command, options)
 
 
-def _ask(study: Study, command: str, directory: Path, options: Options) -> Answer:
+def _ask(study: Study, command: str, directory: Path, options: Options) -> Outcome:
     label = study_label(study)
     try:
         given = answer(study, command, directory, options)
@@ -95,13 +93,13 @@ def _ask(study: Study, command: str, directory: Path, options: Options) -> Answe
     return given
 
 
-def _failure(label: str, command: str, directory: Path, error: Exception) -> Answer:
+def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
     code, message = explain(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
-    return Answer(label, command, directory, code, 0, failed=message)
+    return Outcome(label, command, directory, code, 0, failed=message)
 
 
-def _summary(answers: Sequence[Answer]) -> Table:
+def _summary(answers: Sequence[Outcome]) -> Table:
     import numpy as np
 
     from mechdesign.results import Column, Table
@@ -111,7 +109,7 @@ def _summary(answers: Sequence[Answer]) -> Table:
     def words(values: list[str]) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
         return np.array(values, dtype=np.str_)
 
-    def met(given: Answer) -> str:
+    def met(given: Outcome) -> str:
         return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
 
     return Table(

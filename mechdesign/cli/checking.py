@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Owners, load_study, study_label
+from mechdesign.cli.execution import Owners, folder, load_study, study_label
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import explain
@@ -18,7 +18,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     from mechdesign.mechanism.describe import describe
     from mechdesign.report.requirements import foresee
-    from mechdesign.study.pin_links import in_words
+    from mechdesign.study.schema.reliability_checks import in_words
 
     worst = 0
     owners = Owners()
@@ -32,13 +32,11 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
             for warning in study.warnings:
                 terminal.say(f"warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS)
-            if options.plots:
+            if not options.no_plots:
                 from mechdesign.report.writer import write_sketch
 
                 owners.claim(study)
-                directory = options.out or Path("results") / label / "check"
-                if options.out is not None and len(paths) > 1:
-                    directory /= label
+                directory = folder(study, "check", options, several=len(paths) > 1)
                 terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
         except Exception as error:
             code, message = explain(error)

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from mechdesign.cli import terminal
 from mechdesign.cli.options import Options
+from mechdesign.errors import Interrupted, StudyError
 from mechdesign.threads import one_thread
 
 if TYPE_CHECKING:
     from mechdesign.journal import Journal
-    from mechdesign.report.manifest import Asked
+    from mechdesign.report.manifest import Extras
     from mechdesign.report.requirements import Verdict
     from mechdesign.results import Result, Table
     from mechdesign.study import Study
@@ -23,7 +24,7 @@ BUILT_IN = "two_link_arm"
 
 
 @dataclass(frozen=True)
-class Answer:
+class Outcome:
     """What one command gave.
 
     Parameters
@@ -58,18 +59,24 @@ def load_study(path: Path | None, options: Options) -> Study:
     from mechdesign.study import load, template_path
 
     if path is None:
-        path = Path("study.yaml")
-        if path.exists():
-            terminal.say("study: study.yaml", quiet=options.quiet)
-        else:
-            terminal.say("study: the built-in two-link arm (no study.yaml here)", quiet=options.quiet)
-            path = template_path(BUILT_IN)
-    return load(path, options.overrides, options.seed)
+        here = Path("study.yaml")
+        path = here if here.exists() else template_path(BUILT_IN)
+        what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
+        terminal.say(f"study: {what}", quiet=options.quiet)
+    return load(path, options.overrides or (), options.seed)
 
 
 def study_label(study: Study) -> str:
     """The name of a study's folder: that of its file."""
     return study.path.stem if study.path is not None else study.name
+
+
+def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
+    """Where the results of a command go, given alone; of several studies each has a folder in that of the option."""
+    label = study_label(study)
+    if options.out is None:
+        return Path("results") / label / name
+    return options.out / label if several else options.out
 
 
 class Owners:
@@ -86,15 +93,13 @@ class Owners:
         StudyError
             If another file of that name has it.
         """
-        from mechdesign.errors import StudyError
-
         source = str(study.path)
         owner = self._sources.setdefault(study_label(study), source)
         if owner != source:
             raise StudyError(f"{source}: its results would overwrite those of {owner}; rename one of the files")
 
 
-def answer(study: Study, command: str, directory: Path, options: Options) -> Answer:
+def answer(study: Study, command: str, directory: Path, options: Options) -> Outcome:
     """Compute one command's result, judge it by the study's requirements and write it, unless it is there.
 
     Raises
@@ -104,12 +109,11 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
     """
     import mechdesign
     from mechdesign.analyses.look import LONG
-    from mechdesign.errors import Interrupted
     from mechdesign.report import manifest, requirements, writer
 
     begun = time.perf_counter()
     writer.check_writable(directory)
-    asked = manifest.Asked(options.plots, options.animate and command == "kinematics", options.all_modes)
+    asked = manifest.Extras(not options.no_plots, options.animate and command == "kinematics", options.all_modes)
     if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
     if command in LONG:
@@ -135,22 +139,15 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Ans
         raise
     if journal is not None:
         journal.discard()
-    code = 3 if result.failed else 0 if all(verdict.met for verdict in verdicts) else 1
-    return Answer(
-        study=study_label(study),
-        command=command,
-        directory=directory,
-        exit_code=code,
-        rows=len(result.main),
-        warnings=[*map(str, study.warnings), *result.warnings, *undrawn],
-        failed=result.failed,
-        verdicts=verdicts,
-        seconds=time.perf_counter() - begun,
+    warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
+    code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
+    return Outcome(
+        study_label(study), command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         result=result,
-    )
+    )  # fmt: skip
 
 
-def _finished(study: Study, command: str, directory: Path, asked: Asked) -> Answer | None:
+def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
     """The answer that an earlier run left whole in the directory, if this run would give the same."""
     from mechdesign.report import manifest
     from mechdesign.report.requirements import Verdict, command_of
@@ -159,28 +156,20 @@ def _finished(study: Study, command: str, directory: Path, asked: Asked) -> Answ
     if content is None:
         return None
     verdicts = [
-        Verdict(
-            entry["requirement"],
-            entry["met"],
-            float("nan") if entry["worst"] is None else entry["worst"],
-            entry["place"],
-        )
+        Verdict(**entry | {"worst": float("nan") if entry["worst"] is None else entry["worst"]})
         for entry in content["requirements"]
     ]
     if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
         return None
-    failed = content["failed"]
-    return Answer(
-        study=study_label(study),
-        command=command,
-        directory=directory,
-        exit_code=3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1,
-        rows=next(iter(content["tables"].values()))["rows"],
-        warnings=content["warnings"],
-        failed=failed,
-        verdicts=verdicts,
-        kept=True,
+    rows = next(iter(content["tables"].values()))["rows"]
+    code = _exit_code(content["failed"], verdicts)
+    return Outcome(
+        study_label(study), command, directory, code, rows, content["warnings"], content["failed"], verdicts, kept=True
     )
+
+
+def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
+    return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
 
 
 def _main_table(directory: Path) -> Table:
@@ -196,11 +185,10 @@ def _main_table(directory: Path) -> Table:
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Asked
+    directory: Path, study: Study, result: Result, asked: Extras
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     from mechdesign.analyses.look import LONG
-    from mechdesign.errors import StudyError
     from mechdesign.report import requirements, writer
 
     try:
@@ -227,7 +215,7 @@ def _journal(study: Study, directory: Path, options: Options) -> Journal:
     return journal
 
 
-def tell(given: Answer, options: Options) -> None:
+def tell(given: Outcome, options: Options) -> None:
     """Say on stderr what came out; what is not met or failed is said even where quiet is wanted."""
     for warning in given.warnings:
         terminal.say(f"warning: {warning}", quiet=options.quiet)
@@ -243,7 +231,7 @@ def tell(given: Answer, options: Options) -> None:
 def ask(path: Path | None, command: str, options: Options) -> int:
     """One command from end to end; returns its exit code."""
     study = load_study(path, options)
-    directory = options.out or Path("results") / study_label(study) / command
+    directory = folder(study, command, options)
     given = answer(study, command, directory, options)
     table = given.result.main if given.result is not None else _main_table(directory)
     terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))

@@ -7,10 +7,10 @@ from itertools import groupby
 
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
-from mechdesign.cli.execution import Answer
+from mechdesign.cli.execution import Outcome
 
 
-def to_xml(answers: Sequence[Answer]) -> str:
+def to_xml(answers: Sequence[Outcome]) -> str:
     """A suite a study; a case a command, and a case a requirement.
 
     A requirement that is not met is a failure; whatever kept a command from its result is an error.
@@ -27,7 +27,7 @@ def to_xml(answers: Sequence[Answer]) -> str:
     return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'
 
 
-def _cases(given: Answer) -> list[TestCase]:
+def _cases(given: Outcome) -> list[TestCase]:
     name = ".".join(part for part in ("mechdesign", given.study) if part)
     case = TestCase(given.command or "run", classname=name, time=round(given.seconds, 3))
     if given.exit_code > 1:

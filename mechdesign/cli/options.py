@@ -3,108 +3,81 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from inspect import Parameter
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from mechdesign.errors import StudyError
 
-StudyArgument = Annotated[
-    Path | None,
-    typer.Argument(
-        metavar="STUDY",
-        help="The study file. Left out: study.yaml here, or else the built-in two-link arm.",
-        show_default=False,
-    ),
-]
-StudiesArgument = Annotated[
-    list[Path] | None,
-    typer.Argument(
-        metavar="STUDY...",
-        help="The study files. Left out: study.yaml here, or else the built-in two-link arm.",
-        show_default=False,
-    ),
-]
-Out = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        metavar="DIR",
-        help="Folder for tables, pictures and manifest. Default: results/<study>/<command>.",
-        show_default=False,
-    ),
-]
-OutAll = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        metavar="DIR",
-        help="Folder that gets one folder a command (several studies: <study>/<command>). Default: results/<study>.",
-        show_default=False,
-    ),
-]
-OutDrawings = Annotated[
-    Path | None,
-    typer.Option(
-        "--out",
-        metavar="DIR",
-        help="Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.",
-        show_default=False,
-    ),
-]
-Overrides = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="A.B.C=VALUE",
-        help="Change one entry of the study before it is checked, e.g. mechanism.parameters.r=42. Repeatable.",
-        show_default=False,
-    ),
-]
-Seed = Annotated[
-    int | None,
-    typer.Option(
-        "--seed",
-        metavar="N",
-        min=0,
-        help="Seed of the random numbers. Default: the study's, else 0.",
-        show_default=False,
-    ),
-]
-Jobs = Annotated[
-    int | None,
-    typer.Option(
-        "--jobs",
-        metavar="N",
-        min=1,
-        help="Threads to compute on; the results do not depend on it. Default: every processor.",
-        show_default=False,
-    ),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print the main table to stdout as JSON.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the results and what went wrong.")]
-NoPlots = Annotated[bool, typer.Option("--no-plots", help="Draw no pictures.")]
-Animate = Annotated[bool, typer.Option("--animate", help="Also draw the motion of a sweep or path: motion.gif.")]
-AllModes = Annotated[
-    bool, typer.Option("--all-modes", help="Follow every way in which the mechanism can be assembled: modes.csv.")
-]
-Junit = Annotated[
-    Path | None,
-    typer.Option("--junit", metavar="FILE", help="Also write the outcome as JUnit XML, for CI.", show_default=False),
-]
-FailFast = Annotated[bool, typer.Option("--fail-fast", help="Stop at the first question that fails.")]
-Resume = Annotated[
-    bool,
-    typer.Option(
-        "--resume",
-        help="Skip questions whose results are there, whole, from the same study and seed; go on with unfinished ones.",
-    ),
-]
+_LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
-ResumeDesigns = Annotated[
-    bool, typer.Option("--resume", help="Go on with what an interrupted run of the same study and seed had finished.")
-]
+
+def _parameter(name: str, kind: Any, default: Any, told: Any) -> Parameter:
+    annotated: Any = Annotated
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotated[kind, told])
+
+
+def _text(name: str, kind: Any, flag: str, metavar: str, told: str, **more: Any) -> Parameter:
+    option = typer.Option(flag, metavar=metavar, help=told, show_default=False, **more)
+    return _parameter(name, kind | None, None, option)
+
+
+def _flag(name: str, flag: str, told: str, *short: str) -> Parameter:
+    return _parameter(name, bool, False, typer.Option(flag, *short, help=told))
+
+
+def _out(told: str) -> Parameter:
+    return _text("out", Path, "--out", "DIR", told)
+
+
+STUDY = _parameter(
+    "study", Path | None, None, typer.Argument(metavar="STUDY", help=f"The study file. {_LEFT_OUT}", show_default=False)
+)
+STUDIES = _parameter(
+    "study",
+    list[Path] | None,
+    None,
+    typer.Argument(metavar="STUDY...", help=f"The study files. {_LEFT_OUT}", show_default=False),
+)
+OUT = _out("Folder for tables, pictures and manifest. Default: results/<study>/<command>.")
+OUT_ALL = _out("Folder that gets one folder a command (several studies: <study>/<command>). Default: results/<study>.")
+OUT_DRAWINGS = _out("Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.")
+OVERRIDES = _text(
+    "overrides",
+    list[str],
+    "--set",
+    "A.B.C=VALUE",
+    "Change one entry of the study before it is checked, e.g. mechanism.parameters.r=42. Repeatable.",
+)
+SEED = _text("seed", int, "--seed", "N", "Seed of the random numbers. Default: the study's, else 0.", min=0)
+JOBS = _text(
+    "jobs",
+    int,
+    "--jobs",
+    "N",
+    "Threads to compute on; the results do not depend on it. Default: every processor.",
+    min=1,
+)
+JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
+QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
+NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
+ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
+ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
+JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
+FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
+RESUME = _flag(
+    "resume",
+    "--resume",
+    "Skip questions whose results are there, whole, from the same study and seed; go on with unfinished ones.",
+)
+RESUME_DESIGNS = _flag(
+    "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
+)
+# What every question takes, and what only some of them do.
+COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS)
+OWN = {"kinematics": (ANIMATE, ALL_MODES), "optimize": (RESUME_DESIGNS,)}
 
 
 @dataclass(frozen=True)
@@ -123,17 +96,18 @@ class Options:
     """
 
     out: Path | None = None
-    overrides: tuple[str, ...] = ()
+    overrides: tuple[str, ...] | None = ()
     seed: int | None = None
     jobs: int | None = None
     json: bool = False
     quiet: bool = False
-    plots: bool = True
+    no_plots: bool = False
     animate: bool = False
     all_modes: bool = False
+    junit: Path | None = None
     fail_fast: bool = False
     resume: bool = False
 
     def __post_init__(self) -> None:
-        if self.animate and not self.plots:
+        if self.animate and self.no_plots:
             raise StudyError("--animate and --no-plots contradict each other")

@@ -69,8 +69,7 @@ def _show_to_people(table: Table, rest: str) -> None:
         room -= 2 + max(len(text) for text in (*head.splitlines(), *texts))
         if room < 0 and shown:
             break
-        number = column.values.dtype.kind in "fiub"
-        grid.add_column(Text(head), justify="right" if number else "left", no_wrap=True)
+        grid.add_column(Text(head), justify="right" if column.numeric else "left", no_wrap=True)
         shown += 1
     for row in zip(*columns[:shown], strict=True):
         grid.add_row(*(Text(text) for text in row))

@@ -18,7 +18,6 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import Guess
 from mechdesign.mechanism.structure import Group
-from mechdesign.numerics.arrays import Flags
 
 # Bound of the assemblies that are listed and followed.
 MOST = 256
@@ -129,10 +128,7 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
         if group.form == "newton"
     }
     state = plan.run(given, vectors, guess, modes, STEPS)
-    solved: Flags = np.ones(STARTS, dtype=bool)
-    for converged in state.converged:
-        solved &= converged
-    every = plan.configuration(state, (STARTS,), {}, vectors, solved, limits=False)
+    every = plan.configuration(state, (STARTS,), {}, vectors, state.solved((STARTS,)), limits=False)
     good = every.valid
     for slide in plan.core.graph.telescopic:
         # A leg without length has no direction: whatever its angle, it is no assembly.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,18 +26,8 @@ def too_large(shape: tuple[int, ...]) -> bool:
 
 
 Parts = tuple[Sequence[Value], Sequence[Value], Sequence[Value], Sequence[Value], NDArray[np.int8]]
-
-
-class AtOnce(Protocol):
-    """Solution of a batch in one piece, see `Plan.solve_at_once`."""
-
-    def __call__(
-        self,
-        values: Sequence[Value],
-        dims: Mapping[str, Value],
-        shape: tuple[int, ...],
-        start: Configuration | None,
-    ) -> Configuration: ...
+# Solution of a batch in one piece, see `Plan.solve_at_once`.
+AtOnce = Callable[[Sequence[Value], Mapping[str, Value], tuple[int, ...], Configuration | None], Configuration]
 
 
 def solve(
@@ -81,46 +71,31 @@ def solve(
         )
 
     first = part(0)
-    whole = _Whole(first, count)
-    whole.put(0, first)
+    reason = np.empty(count, dtype=np.int8)
+    # What is the same for every pose stays a single number.
+    whole: list[list[Any]] = [
+        [np.empty(count, dtype=np.asarray(v).dtype) if np.ndim(v) else v for v in kind] for kind in _arrays(first)
+    ]
 
-    def fill(begin: int) -> None:
-        whole.put(begin, part(begin))
-
-    for _ in map_chunks(fill, range(length, count, length), jobs):
-        pass
-    return whole.reshaped(shape)
-
-
-class _Whole:
-    """Arrays of a whole batch, written chunk by chunk; what is the same for every pose stays a single number."""
-
-    def __init__(self, first: Configuration, count: int) -> None:
-        self.reason = np.empty(count, dtype=np.int8)
-        self.parts: list[list[Any]] = [
-            [np.empty(count, dtype=np.asarray(v).dtype) if np.ndim(v) else v for v in kind] for kind in _arrays(first)
-        ]
-
-    def put(self, begin: int, chunk: Configuration) -> None:
+    def put(begin: int, chunk: Configuration) -> None:
         some = slice(begin, begin + len(chunk.reason))
-        self.reason[some] = chunk.reason
-        for kind, values in zip(self.parts, _arrays(chunk), strict=True):
+        reason[some] = chunk.reason
+        for kind, values in zip(whole, _arrays(chunk), strict=True):
             for array, value in zip(kind, values, strict=True):
                 if np.ndim(array):
                     array[some] = value
 
-    def reshaped(self, shape: tuple[int, ...]) -> Parts:
-        reason = self.reason.reshape(shape)
-        nodes, rotations, slides, closures = (
-            [v.reshape(shape) if np.ndim(v) else v for v in kind] for kind in self.parts
+    put(0, first)
+    for _ in map_chunks(lambda begin: put(begin, part(begin)), range(length, count, length), jobs):
+        pass
+    nodes, rotations, slides, closures = ([v.reshape(shape) if np.ndim(v) else v for v in kind] for kind in whole)
+    lost = ((reason == Reason.NOT_CLOSED) | (reason == Reason.OTHER_ASSEMBLY)).reshape(shape)
+    if lost.any():
+        # In a chunk without a pose that is lost they were single numbers still.
+        nodes, rotations, slides = (
+            [v if np.ndim(v) else hide(v, lost) for v in kind] for kind in (nodes, rotations, slides)
         )
-        lost = (reason == Reason.NOT_CLOSED) | (reason == Reason.OTHER_ASSEMBLY)
-        if lost.any():
-            # In a chunk without a pose that is lost they were single numbers still.
-            nodes, rotations, slides = (
-                [v if np.ndim(v) else hide(v, lost) for v in kind] for kind in (nodes, rotations, slides)
-            )
-        return nodes, rotations, slides, closures, reason
+    return nodes, rotations, slides, closures, reason.reshape(shape)
 
 
 def _arrays(configuration: Configuration) -> tuple[Sequence[Value], ...]:

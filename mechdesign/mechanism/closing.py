@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import Value, cross, quiet
+from mechdesign.mechanism.algebra import Value, cross
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
@@ -18,6 +18,7 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.redundancy import owners_of
 from mechdesign.mechanism.rigidity import CLOSED
 from mechdesign.mechanism.sketch import KEY
+from mechdesign.mechanism.solve import loop_vectors
 from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -127,37 +128,26 @@ def open_group(state: State, gaps: Complexes) -> tuple[str, str]:
 class _Walk:
     """The loop of a dyad cut into the parts that move as one: per unknown root its vector, links and end nodes."""
 
-    @quiet
     def __init__(self, state: State, group: Group) -> None:
         (loop,) = group.loops
-        structure, graph = state.structure, state.graph
-        self.known: complex = 0j if loop.start == loop.end else state.nodes[loop.start] - state.nodes[loop.end]
-        self.vector: dict[int, complex] = dict.fromkeys(group.angles, 0j)
+        structure = state.structure
+        self.known, self.vector, self.direction = loop_vectors(state, group)
         self.ends: dict[int, list[int]] = {root: [] for root in group.angles}
         self.links: dict[int, list[str]] = {root: [] for root in group.angles}
-        self.direction: dict[int, complex] = {}
         self.slide_ends: dict[int, tuple[int, int]] = {}
-        for k, sign in loop.edges:
+        for k, _ in loop.edges:
             edge = structure.edges[k]
             root = structure.ties[edge.frame].root
             slides = edge.slide is not None and edge.slide in group.slides
-            arm = state.w[k] if slides else state.arm(k)
-            if root in self.vector:
-                self.vector[root] += sign * complex(arm * state.ties[edge.frame])
-                turn = complex(state.ties[edge.frame])
-                if edge.locals:
-                    self.links[root].append(edge.locals[0][1].removesuffix(":rod"))
-            else:
-                self.known += sign * complex(state.turned(arm, edge.frame))
-                turn = complex(state.rotations[edge.frame])
+            if root in self.links and edge.locals:
+                self.links[root].append(edge.locals[0][1].removesuffix(":rod"))
             if slides and edge.slide is not None:
-                self.direction[edge.slide] = sign * turn * complex(state.vectors.d[k])
                 self.slide_ends[edge.slide] = (edge.tail, edge.head)
             elif root in self.ends:
                 for node in (edge.tail, edge.head):
                     ends = self.ends[root]
                     ends.remove(node) if node in ends else ends.append(node)
-        self.names = [graph.nodes[node] for node in range(len(graph.nodes))]
+        self.names = state.graph.nodes
 
     def link(self, root: int) -> str:
         """Links of a root, with the distance of the joints that they hold apart."""

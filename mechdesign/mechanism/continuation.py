@@ -64,78 +64,40 @@ def unknowns_of(
     return found
 
 
-class _Path:
-    """Straight lines from a start to `count` poses, and the unknowns of the Newton groups as one table."""
-
-    def __init__(
-        self, structure: Structure, solver: Solver, start: Start, given: Sequence[Value], places: Mapping[str, Value],
-        nominal: Mapping[str, float], size: float, count: int,
-    ) -> None:  # fmt: skip
-        self.structure, self.solver, self.count = structure, solver, count
-        self.indices = [index for index, group in enumerate(structure.groups) if group.form == "newton"]
-        groups = [structure.groups[index] for index in self.indices]
-        self.is_angle = np.concatenate(
-            [[True] * len(g.angles) + [False] * (len(g.slides) + 2 * len(g.bases)) for g in groups]
-        ).astype(bool)
-        self.size = size
-        self.given = [(np.asarray(a, dtype=float), b) for a, b in zip(start.given, given, strict=True)]
-        names = set(places) | set(start.places)
-        self.places = {
-            name: (start.places.get(name, nominal.get(name, 0.0)), places.get(name, nominal.get(name, 0.0)))
-            for name in names
-        }
-        self.signs = [np.broadcast_to(np.asarray(v), (count,)) for v in start.signs]
-        self.begin = np.stack(
-            [np.broadcast_to(v, (count,)) for index in self.indices for part in start.unknowns[index] for v in part]
-        )
-
-    def guess(self, table: Floats) -> Guess:
-        """Rows of a table as angles and slides by group."""
-        found, row = {}, 0
-        for index in self.indices:
-            group = self.structure.groups[index]
-            angles, lengths = len(group.angles), len(group.slides) + 2 * len(group.bases)
-            found[index] = (list(table[row : row + angles]), list(table[row + angles : row + angles + lengths]))
-            row += angles + lengths
-        return found
-
-    def solve(self, lanes: Ints, at: Value, guess: Floats, steps: int = STEPS) -> tuple[Floats, State]:
-        """Unknowns and state of some poses at parts `at` of their paths."""
-
-        def between(ends: tuple[Value, Value]) -> Value:
-            a, b = (_pick(end, lanes) for end in ends)
-            return a + at * (b - a)
-
-        state = self.solver(
-            [between(ends) for ends in self.given],
-            {name: between(ends) for name, ends in self.places.items()},
-            self.guess(guess),
-            steps,
-        )
-        shape = (len(lanes),)
-        rows = [np.broadcast_to(v, shape) for index in self.indices for part in state.unknowns[index] for v in part]
-        return np.stack(rows), state
-
-    def scale(self, table: Floats) -> Floats:
-        """What changes are measured by: radians, and the mechanism's size or a length beyond it."""
-        return np.where(self.is_angle[:, None], 1.0, np.maximum(self.size, np.abs(table)))
-
-    def change(self, new: Floats, old: Floats) -> Floats:
-        """How far the unknowns moved, angles the short way round."""
-        difference = new - old
-        return np.where(self.is_angle[:, None], wrap(difference), difference)
+def guess_of(structure: Structure, table: Floats) -> Guess:
+    """Rows of a table as angles and slides by group."""
+    found, row = {}, 0
+    for index, group in enumerate(structure.groups):
+        if group.form == "newton":
+            lengths = row + len(group.angles)
+            end = lengths + len(group.slides) + 2 * len(group.bases)
+            found[index] = (list(table[row:lengths]), list(table[lengths:end]))
+            row = end
+    return found
 
 
-def _pick(value: Value, lanes: Ints) -> Value:
-    value = np.asarray(value, dtype=float)
-    return value if value.ndim == 0 else value[lanes]
+def table_of(unknowns: Guess, shape: tuple[int, ...]) -> Floats:
+    """Unknowns of all groups, one a row."""
+    return np.stack([np.broadcast_to(v, shape) for parts in unknowns.values() for part in parts for v in part])
+
+
+def angle_rows(structure: Structure) -> Flags:
+    """Which rows of a table are angles, shape (rows, 1)."""
+    groups = [group for group in structure.groups if group.form == "newton"]
+    rows = [[True] * len(g.angles) + [False] * (len(g.slides) + 2 * len(g.bases)) for g in groups]
+    return np.concatenate(rows)[:, None]
+
+
+def scale_of(structure: Structure, size: float, table: Floats) -> Floats:
+    """What changes are measured by: radians, and the mechanism's size or a length beyond it."""
+    return np.where(angle_rows(structure), 1.0, np.maximum(size, np.abs(table)))
 
 
 def follow(
     structure: Structure, solver: Solver, start: Start, given: Sequence[Value], places: Mapping[str, Value],
     nominal: Mapping[str, float], size: float, count: int,
-) -> tuple[Guess, Flags]:  # fmt: skip
-    """Continue `count` poses from `start`; returns their unknowns and which poses were reached.
+) -> tuple[Floats, Flags]:  # fmt: skip
+    """Continue `count` poses from `start`; returns the table of their unknowns and which poses were reached.
 
     Parameters
     ----------
@@ -143,44 +105,65 @@ def follow(
     nominal : nominal value of every place
     size : a length of the mechanism, against which slides are judged
     """
-    path = _Path(structure, solver, start, given, places, nominal, size, count)
-    every = np.arange(count)
-    table = path.begin.copy()
+    angles = angle_rows(structure)
+    ends = list(zip(start.given, given, strict=True))
+    sizes = {
+        name: tuple(at.get(name, nominal.get(name, 0.0)) for at in (start.places, places))
+        for name in {**places, **start.places}
+    }
+    signs = [np.broadcast_to(sign, (count,)) for sign in start.signs]
+
+    def solve(lanes: Ints, at: Value, guess: Floats, steps: int = STEPS) -> tuple[Floats, State]:
+        """Unknowns and state of some poses at parts `at` of their paths."""
+
+        def between(begin: Value, end: Value) -> Value:
+            a, b = (value if np.ndim(value) == 0 else value[lanes] for value in (begin, end))
+            return a + at * (b - a)
+
+        state = solver(
+            [between(*pair) for pair in ends], {name: between(*pair) for name, pair in sizes.items()},
+            guess_of(structure, guess), steps,
+        )  # fmt: skip
+        return table_of(state.unknowns, lanes.shape), state
+
+    def change(new: Floats, old: Floats) -> Floats:
+        """How far the unknowns moved, angles the short way round."""
+        return np.where(angles, wrap(new - old), new - old)
+
+    def planned(slope: Floats, table: Floats) -> Floats:
+        """Step over which the unknowns change as much as is planned."""
+        speed = (np.abs(slope) / scale_of(structure, size, table)).max(axis=0)
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.minimum(1.0, PLANNED / speed))
+
+    table = table_of(start.unknowns, (count,)).copy()
+    moving = np.arange(count)
     # One step of Newton's method at the very beginning gives the direction in which the unknowns set out.
-    first, _ = path.solve(every, BEGINNING, table, 1)
-    slope = path.change(first, table) / BEGINNING
+    first, _ = solve(moving, BEGINNING, table, 1)
+    slope = change(first, table) / BEGINNING
     slope = np.where(np.isfinite(slope).all(axis=0), slope, 0.0)
     done = np.zeros(count)
-    step = _planned(path, slope, table)
+    step = planned(slope, table)
     steady = np.ones(count, dtype=bool)
-    moving = every
     for _ in range(MAX_ROUNDS):
         if not len(moving):
             break
         target = np.minimum(1.0, done[moving] + step[moving])
         taken = target - done[moving]
         old = table[:, moving]
-        new, state = path.solve(moving, target, old + slope[:, moving] * taken)
-        moved = path.change(new, old)
+        new, state = solve(moving, target, old + slope[:, moving] * taken)
+        moved = change(new, old)
         with np.errstate(invalid="ignore"):
-            good = (np.abs(moved) <= MAX_CHANGE * path.scale(old)).all(axis=0)
-        for converged, determinant, sign in zip(state.converged, state.determinants, path.signs, strict=True):
-            good &= converged & (np.sign(determinant) == sign[moving])
+            good = (np.abs(moved) <= MAX_CHANGE * scale_of(structure, size, old)).all(axis=0)
+        good &= state.solved(moving.shape, [sign[moving] for sign in signs])
         reached = moving[good]
         table[:, reached] = old[:, good] + moved[:, good]
         slope[:, reached] = moved[:, good] / taken[good]
         done[reached] = target[good]
         # Longer steps only after two in a row: before a singularity every second one is refused.
         growth = np.where(steady[reached], 2.0, 1.0)
-        step[reached] = np.minimum(_planned(path, slope[:, reached], table[:, reached]), growth * step[reached])
+        step[reached] = np.minimum(planned(slope[:, reached], table[:, reached]), growth * step[reached])
         step[moving[~good]] = taken[~good] / 2
         steady[moving] = good
         moving = moving[(done[moving] < 1) & (step[moving] >= SMALLEST_STEP)]
-    return path.guess(table), done >= 1
-
-
-def _planned(path: _Path, slope: Floats, table: Floats) -> Floats:
-    """Step over which the unknowns change as much as is planned."""
-    speed = (np.abs(slope) / path.scale(table)).max(axis=0)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.minimum(1.0, PLANNED / speed))
+    return table, done >= 1

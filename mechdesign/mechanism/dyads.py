@@ -10,7 +10,8 @@ vector and s a displacement, the loop of a dyad (RRR, RRP, RPR, PRP, RPP in any 
 
 Each function takes complex arrays that broadcast and the assembly mode (+1 or -1), and returns the unknowns and the
 closures: quantities that are positive where the loop closes and zero at the limit of motion (squares of lengths, so
-that they stay smooth there). Outside, the unknowns are nan.
+that they stay smooth there). Outside, the unknowns are nan, or with `beyond` those of links stretched or folded towards
+each other, continuous at the limit.
 """
 
 from __future__ import annotations
@@ -31,20 +32,22 @@ ROUNDING = 4e-15
 Solution = tuple[Value, Value, tuple[Value, ...]]
 
 
-def _root(product: Value, *sizes: Value) -> Value:
-    """Square root, zero down to -ROUNDING times the product of `sizes` and nan below it."""
+def _root(product: Value, beyond: bool, *sizes: Value) -> Value:
+    """Square root, zero down to -ROUNDING times the product of `sizes` and nan below it, or zero where `beyond`."""
+    if beyond:
+        return np.sqrt(np.maximum(product, 0.0))
     below = product < 0
     if np.any(below):
         product = np.where(below & (product >= -ROUNDING * math.prod(sizes)), 0.0, product)
     return np.sqrt(product)
 
 
-def two_angles(k: Value, z1: Value, z2: Value, mode: Value) -> Solution:
+def two_angles(k: Value, z1: Value, z2: Value, mode: Value, beyond: bool = False) -> Solution:
     """Rotations U1, U2 of two links that meet; `mode` is the side of the line -k on which they meet (+1 left)."""
     n1, n2, reach = norm2(z1), norm2(z2), norm2(k)
     product = 2 * np.sqrt(n1 * n2)
     outer, inner = (n1 + n2 + product) - reach, reach - (n1 + n2 - product)
-    height = _root(outer * inner, n1 + n2, reach)
+    height = _root(outer * inner, beyond, n1 + n2, reach)
     half = 0.5 / reach
     first = vector((reach + (n1 - n2)) * half, height * (mode * half)) * k
     u1 = np.multiply(first, np.conj(z1) * (-1 / n1))
@@ -52,22 +55,22 @@ def two_angles(k: Value, z1: Value, z2: Value, mode: Value) -> Solution:
     return u1, u2, (outer, inner)
 
 
-def angle_and_fixed_slide(k: Value, z: Value, d: Value, mode: Value) -> Solution:
+def angle_and_fixed_slide(k: Value, z: Value, d: Value, mode: Value, beyond: bool = False) -> Solution:
     """Rotation U and displacement s along a known direction; `mode` is the side of the perpendicular's foot."""
     n = norm2(z)
     offset = cross(d, k)
     closure = n - offset * offset
-    s = mode * _root(closure, n) - dot(d, k)
+    s = mode * _root(closure, beyond, n) - dot(d, k)
     u = (k + s * d) * (np.conj(z) * (-1 / n))
     return u, s, (closure,)
 
 
-def angle_and_turning_slide(k: Value, z: Value, d: Value, mode: Value) -> Solution:
+def angle_and_turning_slide(k: Value, z: Value, d: Value, mode: Value, beyond: bool = False) -> Solution:
     """Rotation U and displacement s of a slide that turns with it; `mode` is the sign of the slide from its foot."""
     offset = cross(d, z)
     reach = norm2(k)
     closure = reach - offset * offset
-    s = mode * _root(closure, reach) - dot(d, z)
+    s = mode * _root(closure, beyond, reach) - dot(d, z)
     u = np.conj(z + s * d) * k * (-1 / reach)
     return u, s, (closure,)
 

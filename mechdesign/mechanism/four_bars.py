@@ -173,16 +173,16 @@ class FourBar:
         size = np.abs(product)
         return product.imag / size, product.real / size
 
-    def turning(self, configuration: Configuration, rates: Rates) -> Value:
-        """Derivative along `rates` of the angle from the output's arm to the coupler's action (radians)."""
-        return self._turn(configuration, rates, None) - self._turn(configuration, rates, 3)
+    def turning(self, configuration: Configuration, rates: Rates, end: int) -> Value:
+        """Derivative along `rates` of the angle of `squareness` (radians)."""
+        return self._turn(configuration, rates, None) - self._turn(configuration, rates, end)
 
     def _turn(self, configuration: Configuration, rates: Rates, end: int | None) -> Value:
         """Derivative of the direction of the action, or of the arm at `end`."""
         across = self.slide if (self.slide in (1, 2) if end is None else self.slide == end) else -1
         if across >= 0:
             return rates.angles[configuration.graph.edges[self.joints[across].edge].frame]
-        tail, head = (1, 2) if end is None else (3, self._tip(3))
+        tail, head = (1, 2) if end is None else (end, self._tip(end))
         span = self._pin(configuration, head) - self._pin(configuration, tail)
         change = rates.nodes[self.joints[head].node] - rates.nodes[self.joints[tail].node]
         return cross(span, change) / norm2(span)

@@ -16,8 +16,8 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.independence import check_independent
+from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.model import Description, Quantity
-from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import assembly_modes, drawn_value, roots_as_drawn
 from mechdesign.mechanism.structure import Undetermined, compile_structure
@@ -122,10 +122,7 @@ class Mechanism(Core):
 
     def jacobian(self, configuration: Configuration, outputs: Sequence[Coordinate]) -> Floats:
         """Derivatives of outputs with respect to the drives, per radian; shape (..., outputs, drives)."""
-        rates = self.linearize(configuration).drives()
-        full = (len(self.drives), *configuration.shape)
-        rows = [np.broadcast_to(first(configuration, output, rates), full) for output in outputs]
-        return np.moveaxis(np.stack(rows), (0, 1), (-2, -1))
+        return Jacobian.of(self.linearize(configuration), outputs).matrix
 
     def _assemble_sketch(self) -> Configuration:
         plan = self.forward
@@ -141,9 +138,7 @@ class Mechanism(Core):
         guess = roots_as_drawn(self.graph, self.geometry, plan.structure, self.sketch) if plan.iterative else None
         values = [np.asarray(g) for g in given]
         state = plan.run(values, self.geometry.nominal, guess)
-        reached = None
-        if plan.iterative:
-            reached = np.asarray(all(bool(np.all(c)) for c in state.converged))
+        reached = state.solved(()) if plan.iterative else None
         configuration = plan.configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
         if not configuration.valid:
             pose = list(zip(plan.structure.given, given, strict=True))

@@ -12,15 +12,15 @@ from mechdesign.mechanism import chunks
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
-from mechdesign.mechanism.continuation import Start, follow, unknowns_of
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.continuation import Start, follow, guess_of, unknowns_of
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.mechanism.structure import Structure
-from mechdesign.numerics.arrays import Flags, Ints
+from mechdesign.mechanism.turns import nearest
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
@@ -74,13 +74,17 @@ class Plan:
         modes: Sequence[Value] | None = None,
         steps: int = STEPS,
         enough: float = CONVERGED,
+        *,
+        beyond: bool = False,
     ) -> State:
         """Solve all groups, in the assembly as drawn unless `modes` says another."""
         state = start_state(self.core.graph, self.structure, vectors, given)
+        state.beyond = beyond
         size = self.core.size if self.iterative else 1.0
         return run(state, self.modes if modes is None else modes, guess, given, size, steps, enough)
 
-    def _start(self, at: Configuration | None) -> Start:
+    def start(self, at: Configuration | None) -> Start:
+        """A solved pose to continue from; the sketch where left out."""
         at = self.core.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
         guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides, at.nodes)
@@ -153,19 +157,26 @@ class Plan:
         reached: Flags | None = None
         guess: Guess | None = None
         if self.iterative:
-            begin = self._start(start)
+            begin = self.start(start)
             guess, reached = self._follow(values, dims, shape, begin)
         state = self.run(values, vectors, guess, self.modes_at(values))
         if reached is not None:
             # What the path came near to must be a pose, and of the same assembly.
-            for converged, determinant, sign in zip(state.converged, state.determinants, begin.signs, strict=True):
-                reached = reached & converged & (np.sign(determinant) == sign)
+            reached &= state.solved(shape, begin.signs)
         return self.configuration(state, shape, dims, vectors, reached, limits, values)
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """What angles are told near where no motion says more: those given as given, drives within their limits."""
         near = self.core.turns(dims)
         return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+
+    @cached_property
+    def _drawn_angles(self) -> dict[str, float]:
+        return self.core.drawn_angles()
+
+    def near_sketch(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
+        """What angles are told near where no motion says more, the others near those of the sketch."""
+        return self._drawn_angles | self.turns(given, dims)
 
     @cached_property
     def counted(self) -> frozenset[str]:
@@ -189,7 +200,7 @@ class Plan:
         begin = begin.map(flat)
         places = {name: flat(v) for name, v in dims.items()}
 
-        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Guess, Flags]:
+        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Floats, Flags]:
             def some(value: Value) -> Value:
                 return value if rows is None or np.ndim(value) == 0 else value[rows]
 
@@ -209,23 +220,16 @@ class Plan:
         given = [flat(v) for v in values]
         found, reached = solve(given, None)
         # The way as it was given comes first; but a pose is the same whatever turn its angles are told in.
-        nearest = [
-            v - 2 * np.pi * np.round((v - at) / (2 * np.pi)) if c.quantity == "angle" else v
+        turned = [
+            nearest(v, at) if c.quantity == "angle" else v
             for c, v, at in zip(self.structure.given, given, begin.given, strict=True)
         ]
-        turned = np.zeros(count, dtype=bool)
-        for one, other in zip(given, nearest, strict=True):
-            turned |= one != other
-        rows = np.flatnonzero(turned & ~reached)
+        other = np.any([np.broadcast_to(one != two, (count,)) for one, two in zip(given, turned, strict=True)], axis=0)
+        rows = np.flatnonzero(other & ~reached)
         if len(rows):
-            better, there = solve(nearest, rows)
-            for k, kinds in better.items():
-                for kind, kept in zip(kinds, found[k], strict=True):
-                    for new, old in zip(kind, kept, strict=True):
-                        old[rows[there]] = new[there]
-            reached[rows] = there
-        guess = {k: ([v.reshape(shape) for v in a], [v.reshape(shape) for v in s]) for k, (a, s) in found.items()}
-        return guess, reached.reshape(shape)
+            better, there = solve(turned, rows)
+            found[:, rows[there]], reached[rows] = better[:, there], there
+        return guess_of(self.structure, found.reshape(len(found), *shape)), reached.reshape(shape)
 
     def configuration(
         self,
@@ -241,26 +245,22 @@ class Plan:
         graph = self.core.graph
         with np.errstate(invalid="ignore"):
             open_: Value = np.zeros((), dtype=bool)
-            for group in self.structure.groups:
-                # A group that does not close leaves nan in its first unknown.
-                for root in group.angles[:1]:
-                    open_ = open_ | ~np.isfinite(np.real(state.rotations[root]))
-                for slide in group.slides[:1]:
-                    open_ = open_ | ~np.isfinite(state.slides[slide])
-                for base in group.bases[:1]:
-                    open_ = open_ | ~np.isfinite(np.real(state.nodes[base]))
+            # A group that does not close leaves nan in its first unknown.
+            known = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
+            known += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]
+            known += [state.nodes[base] for group in self.structure.groups for base in group.bases[:1]]
+            known += [state.nodes[c.node] for c in self.structure.given if c.kind in ("x", "y")]
+            known += [state.rotations[graph.bodies[c.body][0]] for c in self.structure.given if c.kind == "angle"]
+            for value in known:
+                open_ = open_ | ~np.isfinite(np.real(value))
             for slide in graph.telescopic:
                 open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
             for k, _ in self.structure.spans:
                 open_ = open_ | ~(np.asarray(state.w[k]) >= 0)
-            for value in self.structure.given:
-                open_ = open_ | ~np.isfinite(self._given_value(state, value))
         reason = np.zeros(shape, dtype=np.int8)
         reason[np.broadcast_to(open_, shape)] = Reason.NOT_CLOSED
         if reached is not None:
-            solved = np.ones(shape, dtype=bool)
-            for converged in state.converged:
-                solved &= converged
+            solved = state.solved(shape)
             reason[~reached & solved & (reason == Reason.OK)] = Reason.OTHER_ASSEMBLY
             reason[~reached & ~solved] = Reason.NOT_CLOSED
         nodes, rotations, slides = state.nodes, state.rotations[: graph.classes], state.slides
@@ -286,10 +286,3 @@ class Plan:
                 for _, margin in bound.margins(configuration, places):
                     outside = np.broadcast_to(margin, configuration.shape) < -slack
                     reason[outside & (reason == Reason.OK)] = Reason.LIMIT
-
-    def _given_value(self, state: State, coordinate: Coordinate) -> Value:
-        if coordinate.kind in ("x", "y"):
-            return np.real(state.nodes[coordinate.node])
-        if coordinate.kind == "angle":
-            return np.real(state.rotations[self.core.graph.bodies[coordinate.body][0]])
-        return 0.0

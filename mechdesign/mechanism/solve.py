@@ -52,7 +52,8 @@ def run(
     return state
 
 
-def _closed_form(state: State, group: Group, mode: Value) -> None:
+def loop_vectors(state: State, group: Group) -> tuple[Value, dict[int, Value], dict[int, Value]]:
+    """Around a dyad's loop: the known vector k, and by its unknowns the vectors z that turn and the directions d."""
     structure = state.structure
     loop = group.loops[0]
     k: Value = ZERO if loop.start == loop.end else loop_gap(state, loop.start, loop.end)
@@ -73,9 +74,14 @@ def _closed_form(state: State, group: Group, mode: Value) -> None:
             k = plus(k, sign, state.turned(arm, edge.frame))
             if unknown_slide:
                 d[edge.slide or 0] = sign * state.turned(state.vectors.d[index], edge.frame)
+    return k, z, d
+
+
+def _closed_form(state: State, group: Group, mode: Value) -> None:
+    k, z, d = loop_vectors(state, group)
     if group.form == "two angles":
         first, second = group.angles
-        u1, u2, closures = dyads.two_angles(k, z[first], z[second], mode)
+        u1, u2, closures = dyads.two_angles(k, z[first], z[second], mode, state.beyond)
         state.turn(first, u1)
         state.turn(second, u2)
     elif group.form == "two slides":
@@ -84,6 +90,6 @@ def _closed_form(state: State, group: Group, mode: Value) -> None:
     else:
         solve = dyads.angle_and_fixed_slide if "fixed" in group.form else dyads.angle_and_turning_slide
         (root,), (slide,) = group.angles, group.slides
-        u, state.slides[slide], closures = solve(k, z[root], d[slide], mode)
+        u, state.slides[slide], closures = solve(k, z[root], d[slide], mode, state.beyond)
         state.turn(root, u)
     state.closures.extend(closures)

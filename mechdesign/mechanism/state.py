@@ -24,6 +24,8 @@ class State:
 
     Parameters
     ----------
+    beyond : bool
+        Whether groups with a closed form are told beyond their reach (see `mechdesign.mechanism.dyads`).
     closures : list
         Of the groups with a closed form: positive where they close (see `mechdesign.mechanism.dyads`).
     unknowns, converged, determinants
@@ -39,10 +41,20 @@ class State:
     rotations: list[Any]
     ties: list[Value]
     slides: list[Any]
+    beyond: bool = False
     closures: list[Value] = field(default_factory=list)
     unknowns: dict[int, tuple[list[Value], list[Value]]] = field(default_factory=dict)
     converged: list[Flags] = field(default_factory=list)
     determinants: list[Value] = field(default_factory=list)
+
+    def solved(self, shape: tuple[int, ...], signs: Sequence[Value] | None = None) -> Flags:
+        """Which poses of a batch converged in all groups, with determinants of these signs."""
+        found = np.ones(shape, dtype=bool)
+        for converged in self.converged:
+            found &= converged
+        for determinant, sign in zip(self.determinants, signs or (), strict=False):
+            found &= np.sign(determinant) == sign
+        return found
 
     def arm(self, k: int) -> Value:
         """Vector w + s d of an edge in the frame of its class."""

@@ -1,33 +1,28 @@
 """Where a group without a closed form turns back: the end of its motion along one given coordinate.
 
-There the determinant of the group's equations F(y, s) = 0 vanishes (a fold). With the borders b and c of the matrix J
-of dF/dy chosen once, the number g of
-
-    J w + b g = 0,   c w = 1
-
-is zero exactly where J is singular, and F = 0, g = 0 is regular there (Griewank and Reddien 1984), so that it can be
-solved to the last digit where a search for the last pose that converges cannot.
+There the determinant of the group's equations F(y, s) = 0 vanishes (a fold). F = 0 and det(dF/dy) = 0 together are
+regular there, so that the place can be solved for to the last digit where a search for the last pose that converges
+cannot.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import quiet
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.continuation import unknowns_of
 from mechdesign.mechanism.newton import equations, set_unknowns
+from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.numerics.arrays import Floats
 
-if TYPE_CHECKING:
-    from mechdesign.mechanism.plan import Plan
-
-# Largest errors of the equations (parts of the mechanism's size) and of g that count as solved.
+# Largest errors of the equations (parts of the mechanism's size) and of the determinant (parts of that at the last
+# pose) that count as solved.
 SOLVED = 1e-9
 # The end is sought near the last pose only: this far along the coordinate (radians, or parts of the size).
 NEAR = 0.1
@@ -51,74 +46,52 @@ def turning_point(
         The value, the pose there, and the index of the group in the plan; None where no singularity is near.
     """
     guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides, near.nodes)
-    angles = plan.structure.given[k].quantity == "angle"
-    scale = 1.0 if angles else plan.core.size
-    found = []
-    for index in guess:
-        fold = _Fold(plan, given, k, near, guess, index)
-        solution = fold.solve(scale)
-        if solution is not None:
-            found.append((abs(solution[0] - given[k]), index, solution))
-    if not found:
+    reach = NEAR * (1.0 if plan.structure.given[k].quantity == "angle" else plan.core.size)
+    folds = [(index, _fold(plan, given, k, near, guess, index)) for index in guess]
+    found = [(abs(fold[0] - given[k]), index, fold) for index, fold in folds if fold is not None]
+    distance, index, (value, state) = min(found, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
+    if state is None or distance > reach:
         return None
-    _, index, (value, state) = min(found, key=lambda one: one[0])
-    pose = plan.configuration(state, (), near.places, near.vectors, None, limits=False)
-    return value, pose, index
+    return value, plan.configuration(state, (), near.places, near.vectors, None, limits=False), index
 
 
-class _Fold:
-    def __init__(
-        self, plan: Plan, given: Sequence[float], k: int, near: Configuration, guess: Guess, index: int
-    ) -> None:  # fmt: skip
-        self.plan, self.given, self.k, self.near, self.index = plan, list(given), k, near, index
-        self.group = plan.structure.groups[index]
-        self.guess = guess
-        angles, slides = guess[index]
-        self.start = np.array([*map(float, angles), *map(float, slides)])
-        size = plan.core.size
-        self.weights = np.array([1.0] * len(angles) + [size] * len(slides))
-        matrix, _, _ = self.system(self.start, given[k])
-        left, _, right = np.linalg.svd(matrix)
-        self.b, self.c = left[:, -1], right[-1]
+@quiet
+def _fold(
+    plan: Plan, given: Sequence[float], k: int, near: Configuration, guess: Guess, index: int
+) -> tuple[float, State] | None:
+    """The coordinate's value at a fold of group `index`, and the state there."""
+    from scipy.optimize import root
 
-    @quiet
-    def system(self, y: Floats, s: float) -> tuple[Floats, Floats, State]:
-        """Matrix and errors of the group's equations, lengths in parts of the mechanism's size."""
-        plan, size, count = self.plan, self.plan.core.size, len(self.group.angles)
-        given = [np.asarray(v) for v in self.given]
-        given[self.k] = np.asarray(s)
-        state = start_state(plan.core.graph, plan.structure, self.near.vectors, given)
-        run(state, plan.modes_at(given)[: self.index], self.guess, given, size)
-        set_unknowns(state, self.group, list(y[:count]), list(y[count:]))
-        rows, right = equations(state, self.group, given)
-        matrix = np.array([[float(entry) for entry in row] for row in rows]) * self.weights / size
-        return matrix, np.array([float(entry) for entry in right]) / size, state
+    group, size = plan.structure.groups[index], plan.core.size
+    angles, slides = guess[index]
+    weights = np.array([1.0] * len(angles) + [size] * len(slides))
 
-    def residual(self, z: Floats) -> Floats:
-        """Errors of the equations and g, for unknowns and the coordinate in their own scales."""
-        matrix, errors, _ = self.system(z[:-1] * self.weights, z[-1])
-        n = len(errors)
-        bordered = np.block([[matrix, self.b[:, None]], [self.c[None, :], np.zeros((1, 1))]])
-        try:
-            g = np.linalg.solve(bordered, np.eye(n + 1)[n])[n]
-        except np.linalg.LinAlgError:
-            g = np.nan
-        return np.append(errors, g)
+    def at(value: float) -> list[Value]:
+        return [np.asarray(value if j == k else v) for j, v in enumerate(given)]
 
-    @quiet
-    def solve(self, scale: float) -> tuple[float, State] | None:
-        """The coordinate's value at the fold, and the state there."""
-        from scipy.optimize import root
+    def state_at(unknowns: Floats) -> State:
+        """Everything up to the group, with its unknowns and the coordinate in their own scales."""
+        values, y = at(unknowns[-1]), list(unknowns[:-1] * weights)
+        state = start_state(plan.core.graph, plan.structure, near.vectors, values)
+        run(state, plan.modes_at(values)[:index], guess, values, size)
+        set_unknowns(state, group, y[: len(angles)], y[len(angles) :])
+        return state
 
-        begin = np.append(self.start / self.weights, self.given[self.k])
-        answer: Any = root(self.residual, begin, method="hybr", options={"xtol": 1e-14, "factor": 0.1})
-        errors = self.residual(answer.x)
-        value = float(answer.x[-1])
-        if not np.abs(errors).max() < SOLVED or abs(value - self.given[self.k]) > NEAR * scale:
-            return None
-        _, _, state = self.system(answer.x[:-1] * self.weights, value)
-        state.place(self.group)
-        given = [np.asarray(v) for v in self.given]
-        given[self.k] = np.asarray(value)
-        modes = self.plan.modes_at(given)
-        return value, run(state, modes, self.guess, given, self.plan.core.size, begin=self.index + 1)
+    def system(unknowns: Floats) -> tuple[Floats, float]:
+        """Errors of the group's equations and their determinant, lengths in parts of the mechanism's size."""
+        rows, right = equations(state_at(unknowns), group, at(unknowns[-1]))
+        matrix = np.array(rows, dtype=float) * weights / size
+        return np.array(right, dtype=float) / size, float(np.linalg.det(matrix))
+
+    def residual(unknowns: Floats) -> Floats:
+        errors, determinant = system(unknowns)
+        return np.append(errors, determinant / unit)
+
+    begin = np.append(np.array([*angles, *slides], dtype=float) / weights, given[k])
+    unit = abs(system(begin)[1]) or 1.0
+    answer: Any = root(residual, begin, method="hybr", options={"xtol": 1e-14, "factor": 0.1})
+    if not np.abs(residual(answer.x)).max() < SOLVED:
+        return None
+    value, state = float(answer.x[-1]), state_at(answer.x)
+    state.place(group)
+    return value, run(state, plan.modes_at(at(value)), guess, at(value), size, begin=index + 1)

@@ -29,10 +29,11 @@ def bracketed_roots(
     c, fc : ndarray
         A third point, anywhere (may be nan).
     tolerance : ndarray
-        Wanted accuracy of each root.
+        Wanted accuracy of each root, if its digits hold it.
     """
     a, b, c, fa, fb, fc = (np.array(v, dtype=float) for v in (a, b, c, fa, fb, fc))
     root = np.where(fa == 0, a, np.where(fb == 0, b, 0.5 * (a + b)))
+    tolerance = np.maximum(tolerance, 2 * np.spacing(np.maximum(np.abs(a), np.abs(b))))
     left = np.nonzero((fa != 0) & (fb != 0))[0]
     before = np.abs(b - a)
     for step in range(STEPS):

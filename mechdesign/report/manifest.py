@@ -23,7 +23,7 @@ _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "pydantic", "pint", "pyy
 
 
 @dataclass(frozen=True)
-class Asked:
+class Extras:
     """What else than tables is wanted of a command: pictures, the animation, every assembly mode."""
 
     plots: bool = True
@@ -33,11 +33,11 @@ class Asked:
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
-    found = origin(study, command, Asked())
-    return {key: value for key, value in found.items() if key not in asdict(Asked())}
+    found = origin(study, command, Extras())
+    return {key: value for key, value in found.items() if key not in asdict(Extras())}
 
 
-def origin(study: Study, command: str, asked: Asked) -> dict[str, Any]:
+def origin(study: Study, command: str, asked: Extras) -> dict[str, Any]:
     """Everything that decides the bytes of the results: what `computed_from` says, and what was asked."""
     from mechdesign.study.rewriting import inputs
 
@@ -54,7 +54,9 @@ def origin(study: Study, command: str, asked: Asked) -> dict[str, Any]:
     }
 
 
-def compose(study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, str], asked: Asked) -> bytes:
+def compose(
+    study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, str], asked: Extras
+) -> bytes:
     """The manifest of a result whose files have these SHA-256."""
     content = origin(study, result.command, asked) | {
         "counts": plain(dict(result.counts)),
@@ -94,7 +96,7 @@ def recorded_files(content: Mapping[str, Any]) -> dict[str, str]:
     return {name: str(digest) for name, digest in files.items() if Path(name).name == name}
 
 
-def is_current(directory: Path, study: Study, command: str, asked: Asked) -> dict[str, Any] | None:
+def is_current(directory: Path, study: Study, command: str, asked: Extras) -> dict[str, Any] | None:
     """The manifest of a folder if it holds, whole, what this study would give again or more pictures; else None."""
     content = read(directory)
     if content is None:

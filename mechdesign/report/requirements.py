@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,30 +14,7 @@ from mechdesign.rows import UnknownColumnError, choose
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
-
-
-class Requirement(Protocol):
-    """One entry of the study's ``requirements``."""
-
-    @property
-    def result(self) -> str:
-        """``command.column``, ``command.table.column`` or ``command.table.row.column``."""
-
-    @property
-    def where(self) -> Mapping[str, Any] | None:
-        """Only rows whose columns have these values count."""
-
-    @property
-    def abs(self) -> bool:
-        """Judge the absolute value."""
-
-    @property
-    def at_least(self) -> float | None:
-        """Lower bound."""
-
-    @property
-    def at_most(self) -> float | None:
-        """Upper bound."""
+    from mechdesign.study.schema.optimize import Condition
 
 
 @dataclass(frozen=True)
@@ -66,7 +43,7 @@ class Verdict:
         return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}"
 
 
-def command_of(requirement: Requirement) -> str:
+def command_of(requirement: Condition) -> str:
     """The command whose result a requirement judges."""
     return requirement.result.partition(".")[0]
 
@@ -87,9 +64,7 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
 
     problems: list[Problem] = []
     judged = {command_of(requirement) for requirement in study.requirements}
-    for command in commands:
-        if command not in judged:
-            continue
+    for command in [name for name in commands if name in judged]:
         try:
             # Of so few designs some rows may be missing that all of them have.
             judge(look(study, command), study.requirements, problem=study.problem, whole=command != "optimize")
@@ -104,7 +79,7 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
 
 def judge(
     result: Result,
-    requirements: Iterable[Requirement],
+    requirements: Iterable[Condition],
     *,
     problem: Callable[[str, str, int], Problem] = _unplaced,
     freedom: int = 1,
@@ -144,9 +119,9 @@ def judge(
     return tuple(verdicts)
 
 
-def _judge(result: Result, requirement: Requirement, freedom: int, whole: bool) -> Verdict:
+def _judge(result: Result, requirement: Condition, freedom: int, whole: bool) -> Verdict:
     path = requirement.result.partition(".")[2]
-    chosen = choose(result, path, requirement.where or {}, absolute=requirement.abs)
+    chosen = choose(result, path, requirement.where, absolute=requirement.abs)
     table, name, values = chosen.table, chosen.column, chosen.values
     words = _words(requirement)
     rows = np.flatnonzero(chosen.counts)
@@ -166,14 +141,11 @@ def _judge(result: Result, requirement: Requirement, freedom: int, whole: bool) 
     return Verdict(words, met, float(values[worst]), _place(table, int(worst), name, freedom))
 
 
-def _words(requirement: Requirement) -> str:
+def _words(requirement: Condition) -> str:
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
-    where = ", ".join(f"{column} {wanted}" for column, wanted in (requirement.where or {}).items())
-    bounds = [
-        f"{words} {bound:.12g}"
-        for words, bound in (("at least", requirement.at_least), ("at most", requirement.at_most))
-        if bound is not None
-    ]
+    where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
+    given = (("at least", requirement.at_least), ("at most", requirement.at_most))
+    bounds = [f"{words} {bound:.12g}" for words, bound in given if bound is not None]
     return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
 
 
@@ -181,7 +153,7 @@ def _place(table: Table, row: int, judged: str, freedom: int) -> str:
     """The row in words: its leading columns, which are the pose and words such as the method."""
     parts: list[str] = []
     for column in table.columns:
-        if column.values.dtype.kind in "fiub":
+        if column.numeric:
             freedom -= 1
             if freedom < 0 or column.name == judged:
                 break

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from mechdesign.errors import OutputError, explain
 from mechdesign.files import replace
 from mechdesign.report import manifest
-from mechdesign.report.manifest import Asked
+from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import Result
@@ -45,7 +45,7 @@ def check_writable(directory: Path) -> None:
         )
 
 
-def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Asked) -> tuple[str, ...]:
+def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Extras) -> tuple[str, ...]:
     """Write a result into a directory and return what is to be told of its pictures: those that could not be drawn.
 
     Each file appears whole or not at all. The tables come first, with a manifest that vouches for them alone: whatever
@@ -136,7 +136,7 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[di
         }
         drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study))
         if animate:
-            from mechdesign.report.figures.animation import animation
+            from mechdesign.report.figures.kinematics.animation import animation
 
             drawings[ANIMATION] = lambda: animation(study)
         drawn, failed = render(drawings)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import hashlib
 import math
 import pathlib
@@ -20,22 +21,23 @@ from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study import checks, overrides, pose_checks, poses
-from mechdesign.study.build import build
-from mechdesign.study.builder import Builder
-from mechdesign.study.document import Document, plain, read
-from mechdesign.study.models import MechanismSection, UnitsSection
-from mechdesign.study.numbers import LOST, Context, check_parameter_name, read_number, shown
-from mechdesign.study.optimize_models import OptimizeSection
-from mechdesign.study.parameters import Parameters
-from mechdesign.study.pose_models import PoseSection
-from mechdesign.study.reliability_models import ReliabilitySection
-from mechdesign.study.reporter import Reporter, unknown_key
-from mechdesign.study.sections import KinematicsSection, Requirement, StudyFile
-from mechdesign.study.stiffness_models import StiffnessSection
-from mechdesign.study.targets import Target
-from mechdesign.study.units import Units, units_from
-from mechdesign.study.workspace_models import WorkspaceSection
+from mechdesign.study import overrides
+from mechdesign.study.build.builder import Builder
+from mechdesign.study.build.description import build
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.build.section import MechanismSection, UnitsSection
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.kinematics import KinematicsSection
+from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.stiffness import StiffnessSection
+from mechdesign.study.schema.study_file import StudyFile, check, check_poses
+from mechdesign.study.schema.targets import Target
+from mechdesign.study.schema.workspace import WorkspaceSection
+from mechdesign.study.text.document import Document, plain, read
+from mechdesign.study.text.numbers import LOST, Context, check_parameter_name, read_number, shown
+from mechdesign.study.text.reporter import Reporter, unknown_key
+from mechdesign.study.text.units import Units
 from mechdesign.threads import one_thread
 
 
@@ -65,7 +67,7 @@ class Study:
         Parameters and the places of the geometry that depend on them.
     kinematics, workspace, optimize, reliability, stiffness : section or None
         The questions; None where the study does not ask.
-    requirements : tuple of Requirement
+    requirements : tuple of Condition
         The gate.
     targets : mapping of str to Target
         What outputs should be, by the coordinate or point.
@@ -87,7 +89,7 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[Condition, ...]
     targets: Mapping[str, Target]
     warnings: tuple[Problem, ...] = ()
 
@@ -95,13 +97,6 @@ class Study:
     def questions(self) -> tuple[str, ...]:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
-
-    @cached_property
-    def _nodes(self) -> poses.Poses:
-        # Here, for these poses are themselves the answer to a question.
-        from mechdesign.analyses.workspace.nodes import workspace_nodes
-
-        return workspace_nodes(self)
 
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text as long as the file is what was read."""
@@ -113,28 +108,6 @@ class Study:
         reporter = Reporter(document)
         reporter.report(keys, message)
         return reporter.problems[-1]
-
-    def poses(self, section: str) -> poses.Poses:
-        """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
-
-        A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.
-
-        Raises
-        ------
-        StudyError
-            Where nothing sensible can be assumed.
-        """
-        turn = 2.0 * math.pi / self.units.angle_factor
-        for name in dict.fromkeys((section, "kinematics")):
-            asked: PoseSection | None = getattr(self, name)
-            if asked is not None and asked.at_nodes:
-                return self._nodes
-            if asked is not None:
-                folder = self.path.parent if self.path else pathlib.Path()
-                found = poses.expand(asked, folder, turn)
-                if found is not None:
-                    return found
-        return poses.default(self.mechanism.description, turn)
 
 
 def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:
@@ -203,35 +176,26 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(context.parameters, formulas)
-    parts = checks.check(parts, builder.names, parameters, reporter, path.parent)
+    parts = check(Checker(builder, parameters, parts), path.parent)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
-    pose_checks.check_poses(parts, mechanism, reporter, path.parent, 2.0 * math.pi / context.units.angle_factor)
+    check_poses(parts, mechanism, reporter, path.parent, 2.0 * math.pi / context.units.angle_factor)
     reporter.done()
     name = parts.get("name") or path.stem
     seed = parts["seed"] if seed is None else seed
-    units = context.units
-    resolved = plain(document.data) | {
-        "name": name,
-        "seed": seed,
-        "units": {"length": units.length, "angle": units.angle, "time": units.time, "force": units.force},
-    }
+    named = {"name": name, "seed": seed, "units": dataclasses.asdict(context.units)}
     return Study(
         name=name,
         path=path,
         text_sha256=text_sha256,
         seed=seed,
         overrides=changes,
-        units=units,
-        resolved=resolved,
+        units=context.units,
+        resolved=plain(document.data) | named,
         mechanism=mechanism,
         parameters=parameters,
-        kinematics=parts.get("kinematics"),
-        workspace=parts.get("workspace"),
-        optimize=parts.get("optimize"),
-        reliability=parts.get("reliability"),
-        stiffness=parts.get("stiffness"),
+        **{command: parts.get(command) for command in COMMANDS},
         requirements=parts["requirements"],
         targets=parts["targets"],
         warnings=tuple(reporter.warnings),
@@ -250,13 +214,9 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
 def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
     """Units and parameters, which all other numbers are read with."""
     units = Units()
-    try:
-        given = UnitsSection.model_validate(data.get("units") or {})
-    except ValidationError:
-        given = UnitsSection()
-    units, wrong = units_from(given.length, given.angle, given.time, given.force)
-    for kind, message in wrong.items():
-        reporter.report(("units", kind), message)
+    # A wrong unit is told with the mistakes of the other sections.
+    with contextlib.suppress(ValidationError):
+        units = Units(**UnitsSection.model_validate(data.get("units") or {}).model_dump())
     mechanism = data.get("mechanism")
     raw = mechanism.get("parameters") if isinstance(mechanism, dict) else None
     raw = raw if isinstance(raw, dict) else {}

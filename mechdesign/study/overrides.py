@@ -6,11 +6,10 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from mechdesign.errors import Problem, StudyError
-from mechdesign.study.document import Document, Mark, Path, dotted, parse_value
-from mechdesign.study.numbers import suggestion
-from mechdesign.study.reporter import LIST_FORM, schema_keys
-from mechdesign.study.sections import StudyFile
+from mechdesign.errors import Problem, StudyError, suggestion
+from mechdesign.study.schema.study_file import StudyFile
+from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, parse_value
+from mechdesign.study.text.reporter import LIST_FORM, schema_fields
 
 MAX_LENGTH = 1000
 """Longest dotted name accepted: nothing that a person writes comes near it."""
@@ -44,10 +43,10 @@ def _apply(document: Document, text: str) -> None:
         return
     holder, path = _descend(document, segments, label, making=parsed.data is not None)
     key: Any = path[-1]
-    there = _has(holder, key)
+    there = has(holder, key)
     if isinstance(holder, dict) and parsed.data is None:
         # Nothing takes the entry away: `--set kinematics.sweep=` makes room for other poses.
-        if not there and key not in schema_keys(StudyFile, path[:-1]):
+        if not there and key not in schema_fields(StudyFile, path[:-1]):
             raise StudyError([Problem(f"there is no {dotted(path)} to take away{suggestion(key, holder)}", file=label)])
         holder.pop(key, None)
     elif isinstance(holder, list) and not there:
@@ -64,11 +63,7 @@ def _apply(document: Document, text: str) -> None:
         document.added.add(path)
 
 
-def _has(data: Any, key: Any) -> bool:
-    return key < len(data) if isinstance(data, list) else key in data
-
-
-def _descend(document: Document, segments: list[str], label: str, *, making: bool) -> tuple[Any, Path]:
+def _descend(document: Document, segments: list[str], label: str, *, making: bool) -> tuple[Any, KeyPath]:
     """Find the mapping or list to change and the path of the entry; mappings on the way are made where wanted."""
     data: Any = document.data
     path: list[str | int] = []
@@ -79,7 +74,7 @@ def _descend(document: Document, segments: list[str], label: str, *, making: boo
         key: Any = segment
         if not rest:
             return data, tuple(path)
-        inner = data[key] if _has(data, key) else None
+        inner = data[key] if has(data, key) else None
         if inner is None:
             inner = {}
             if making:
@@ -106,8 +101,8 @@ def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> 
     # A new key that contains dots ends where the schema knows what follows.
     for length in range(1, len(rest)):
         key = ".".join(rest[:length])
-        if rest[length] in schema_keys(StudyFile, [*path, key]):
+        if rest[length] in schema_fields(StudyFile, [*path, key]):
             return key, rest[length:]
-    if schema_keys(StudyFile, path):
+    if schema_fields(StudyFile, path):
         return rest[0], rest[1:]
     return ".".join(rest), []

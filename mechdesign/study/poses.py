@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.study import courses
-from mechdesign.study.path_models import Path as PathModel
-from mechdesign.study.pose_models import PoseSection, Sweep
+from mechdesign.study.schema import paths
+from mechdesign.study.schema.poses import PoseSection, Sweep
 
 MAX_POSES = 10_000_000
 
@@ -181,14 +180,14 @@ def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> 
     return Poses((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
 
 
-def _path(path: Mapping[str, PathModel], folder: Path, turn: float) -> Poses:
+def _path(path: Mapping[str, paths.PathSection], folder: Path, turn: float) -> Poses:
     if not path:
         raise StudyError("an empty path")
     columns: dict[str, Floats] = {}
-    found: dict[str, courses.Course] = {}
+    found: dict[str, paths.Course] = {}
     for name, given in path.items():
-        course = _course(name, given, folder, turn)
-        if isinstance(course, courses.Course):
+        course = paths.course(name, given, folder, turn)
+        if isinstance(course, paths.Course):
             found[name] = course
             columns[f"{name}.x"], columns[f"{name}.y"] = course.places.real, course.places.imag
         else:
@@ -200,103 +199,29 @@ def _path(path: Mapping[str, PathModel], folder: Path, turn: float) -> Poses:
     values = {name: np.broadcast_to(column, (count,)).copy() for name, column in columns.items()}
     for owner in {name.rpartition(".")[0] for name in columns if name.endswith(".x")} - set(found):
         if f"{owner}.y" in columns:
-            found[owner] = courses.polyline(values[f"{owner}.x"] + 1j * values[f"{owner}.y"])
-    slopes: dict[str, Floats] = {}
-    bends: dict[str, Floats] = {}
-    closed = False
+            found[owner] = paths.polyline(values[f"{owner}.x"] + 1j * values[f"{owner}.y"])
+    poses = _single(values, count, (count,))
     # The way of a point that stays where it is says nothing.
-    moving = {owner: course for owner, course in found.items() if len(course.places) == count and course.way[-1] > 0}
-    if len(moving) == 1:
-        ((owner, course),) = moving.items()
-        slopes, bends = _along(values, owner, course)
-        closed = course.closed
-    group = PoseGroup(tuple(values), values, np.arange(count))
-    return Poses((group,), count, False, (count,), motion=count > 1, closed=closed, slopes=slopes, bends=bends)
-
-
-def _course(name: str, given: PathModel, folder: Path, turn: float) -> courses.Course | Floats:
-    """The path of a point, or the values of a coordinate."""
-    point = "." not in name
-    if given.circle is not None:
-        return courses.circle(given.circle, given.points, turn)
-    if given.arc is not None:
-        return courses.arc(given.arc, given.points, turn)
-    if given.line is not None:
-        begin, end = (complex(*place) for place in given.line)
-        if begin == end:
-            raise StudyError(f"path: the line of {name!r} needs two different places")
-        return courses.line(begin, end, given.points)
-    table = read_table(folder / given.file) if given.file is not None else np.array(given.through, dtype=float)
-    if point and table.ndim == 2 and table.shape[1] == 2:
-        places = table[:, 0] + 1j * table[:, 1]
-        if not given.spline:
-            return courses.polyline(places)
-        if len(places) < 3 or not np.diff(places).all():
-            raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
-        return courses.spline(places, given.points)
-    if table.ndim == 1 or table.shape[1] == 1:
-        return np.asarray(table.reshape(-1))
-    raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
-
-
-def _along(
-    values: Mapping[str, Floats], owner: str, course: courses.Course
-) -> tuple[dict[str, Floats], dict[str, Floats]]:  # fmt: skip
-    """Derivatives of all coordinates by the length of a point's path; those listed beside it change evenly between."""
+    moving = [(owner, one) for owner, one in found.items() if len(one.places) == count and one.way[-1] > 0]
+    if len(moving) != 1:
+        return poses
+    ((owner, along),) = moving
     slopes: dict[str, Floats] = {}
-    bends: dict[str, Floats] = {}
     for name, column in values.items():
-        if name in (f"{owner}.x", f"{owner}.y"):
-            part = np.real if name.endswith(".x") else np.imag
-            slopes[name], bends[name] = part(course.directions).copy(), part(course.bends).copy()
-            continue
+        # What is listed beside the point's path changes evenly between the places.
         with np.errstate(divide="ignore", invalid="ignore"):
-            steps = np.diff(column) / np.diff(course.way)
-        steps = np.where(np.diff(column) == 0, 0.0, steps)
-        slopes[name], bends[name] = np.append(steps, steps[-1:]), np.zeros(len(column))
-    return slopes, bends
-
-
-def read_table(file: Path, most: int = 2) -> Floats:
-    """Read a CSV file of one to `most` columns of numbers, with or without a line of names.
-
-    Raises
-    ------
-    StudyError
-        Where it cannot be read or holds anything else.
-    """
-    try:
-        lines = [line.strip() for line in file.read_text(encoding="utf-8-sig").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'not a text file'}") from None
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
-        if not line or line.startswith("#"):
-            continue
-        try:
-            row = [float(part) for part in line.replace(";", ",").split(",")]
-        except ValueError:
-            if rows or number > 1:
-                raise StudyError(f"{file}:{number}: {line!r} is not a row of numbers") from None
-            continue
-        if len(row) > most or (rows and len(row) != len(rows[0])) or not all(map(math.isfinite, row)):
-            columns = "one or two" if most == 2 else f"one to {most}"
-            raise StudyError(f"{file}:{number}: {line!r} is not a row of the same {columns} finite numbers")
-        rows.append(row)
-    if not rows:
-        raise StudyError(f"{file} holds no numbers")
-    return np.array(rows)
+            steps = np.where(np.diff(column) == 0, 0.0, np.diff(column) / np.diff(along.way))
+        slopes[name] = np.append(steps, steps[-1:])
+    bends = dict.fromkeys(values, np.zeros(count))
+    for axis, part in (("x", np.real), ("y", np.imag)):
+        slopes[f"{owner}.{axis}"], bends[f"{owner}.{axis}"] = part(along.directions).copy(), part(along.bends).copy()
+    return replace(poses, closed=along.closed, slopes=slopes, bends=bends)
 
 
 def default(description: Description, turn: float) -> Poses:
     """Poses where a study gives none: a turn of an angle drive in 72 steps, or the drive's limits in 50.
 
-    Parameters
-    ----------
-    description : Description
-        The mechanism.
-    turn : float
-        A full turn in the study's unit.
+    `turn` is a full turn in the study's unit.
 
     Raises
     ------
@@ -314,9 +239,9 @@ def default(description: Description, turn: float) -> Poses:
         low, high = limit.minimum, limit.maximum
         if limit.kind == "drive" and limit.items[0] == drive.name and low is not None and high is not None:
             ends = [(description.places[end].nominal if isinstance(end, str) else end) / factor for end in (low, high)]
-            return _single({drive.name: np.linspace(ends[0], ends[1], 51)}, 51, (51,))
+            return _grid({drive.name: np.linspace(ends[0], ends[1], 51)})
     if drive.kind == "angle":
-        return _single({drive.name: np.linspace(0.0, turn, 73)}, 73, (73,))
+        return _grid({drive.name: np.linspace(0.0, turn, 73)})
     raise StudyError(
         f"the study says no poses, and the drive {drive.name!r} has no limits to move between; "
         "give 'poses', 'sweep' or 'path', or limits of the drive"

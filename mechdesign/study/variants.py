@@ -6,6 +6,7 @@ end, a tolerance, a dimension measured from the sketch) the data is validated ag
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import pathlib
 from collections.abc import Collection, Mapping
@@ -18,11 +19,11 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.model import Fixed
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study.document import Document, Mark, plain
+from mechdesign.study.build.names import GROUND
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.build.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document
-from mechdesign.study.models import LINK_KEYS
-from mechdesign.study.names import GROUND
-from mechdesign.study.parameters import Parameters
+from mechdesign.study.text.document import Document, Mark, leaves, plain
 
 # Sections whose numbers are read once, when the study is loaded.
 SECTIONS = (*(name for name in COMMANDS if name != "optimize"), "requirements")
@@ -41,7 +42,7 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
     MechanismError, AssemblyError
         See `mechdesign.mechanism.variant.Variant`.
     """
-    file = str(study.path or "")
+    file, path = str(study.path or ""), study.path or pathlib.Path()
     check_names(study, changed)
     values = {name: np.asarray(value, dtype=float) for name, value in changed.items()}
     parameters, places = study.parameters.values(values), study.parameters.places(values)
@@ -51,7 +52,6 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
     resolved = changed_data(study, changed)
     if follows(study, changed):
         document = Document(file, resolved, values={(): Mark(file)})
-        path = study.path or pathlib.Path()
         return load_document(document, path, study.text_sha256, study.overrides, study.seed, study.mechanism)
     description = study.mechanism.description
     new = {name: dataclasses.replace(description.places[name], nominal=float(value)) for name, value in places.items()}
@@ -162,16 +162,12 @@ def _drawing(study: Study) -> set[str]:
 
 
 def _mentions(data: Any, names: Collection[str]) -> bool:
-    if isinstance(data, dict):
-        return any(_mentions(value, names) for value in data.values())
-    if isinstance(data, list):
-        return any(_mentions(value, names) for value in data)
-    if not isinstance(data, str) or not names:
-        return False
-    try:
-        return not Expression.parse(data).names.isdisjoint(names)
-    except ExpressionError:
-        return False
+    """Whether a text of the data is an expression in which one of the names stands."""
+    for _, text in leaves(data) if names else ():
+        with contextlib.suppress(ExpressionError):
+            if isinstance(text, str) and not Expression.parse(text).names.isdisjoint(names):
+                return True
+    return False
 
 
 def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
@@ -180,45 +176,37 @@ def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
     mechanism = data["mechanism"]
     for name, value in changed.items():
         owner, _, last = name.rpartition(".")
+        holder: Any = mechanism
+        key: str | int = last
         if name in study.parameters.nominal:
-            mechanism["parameters"][name] = float(value)
+            holder, key = mechanism["parameters"], name
         elif owner.startswith("limits."):
-            mechanism["limits"][int(owner.partition(".")[2])][last] = float(value)
+            holder = mechanism["limits"][int(owner.partition(".")[2])]
         elif last in ("direction", "angle"):
-            mechanism["joints"][owner][last] = float(value)
+            holder = mechanism["joints"][owner]
         elif last == "length":
             link = mechanism["links"][owner]
             if isinstance(link, list):
-                mechanism["links"][owner] = [*link[:2], float(value)]
-            else:
-                link["length"] = float(value)
+                link[2:] = [float(value)]
+                continue
+            holder = link
         else:
             link, _, point = owner.rpartition(".")
-            points = _points(study, mechanism["links"], link)
-            points[point]["xy".index(last)] = float(value)
+            holder, key = _points(study, mechanism["links"], link)[point], "xy".index(last)
+        holder[key] = float(value)
     return data
 
 
 def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[Any]]:
     """The points of a link in its data, brought to the form ``{P: [x, y]}``; those measured become numbers."""
-    described = study.mechanism.description.links[name]
-    raw = links[name]
-    own = raw if isinstance(raw, dict) and not any(key in raw for key in LINK_KEYS) else None
-    given = own if own is not None else raw.get("points") if isinstance(raw, dict) else None
-    given = given if isinstance(given, dict) else {}
-    numbers = study.mechanism.nominal
-    points: dict[str, list[Any]] = {}
-    for point, terms in described.points.items():
-        if described.ends is None or point not in described.ends:
-            known = given.get(point)
-            points[point] = known or [numbers[term] if isinstance(term, str) else term for term in terms]
-    if described.ends is None:
-        links[name] = points
-    else:
-        links[name] = {**_long(raw), "points": points}
+    described, numbers = study.mechanism.description.links[name], study.mechanism.nominal
+    raw = dict(zip(LINK_KEYS, links[name], strict=False)) if isinstance(links[name], list) else dict(links[name])
+    given = raw.get("points") if any(key in raw for key in LINK_KEYS) else raw
+    known = given if isinstance(given, dict) else {}
+    points = {
+        point: known.get(point) or [numbers[term] if isinstance(term, str) else term for term in terms]
+        for point, terms in described.points.items()
+        if point not in (described.ends or ())
+    }
+    links[name] = points if described.ends is None else {**raw, "points": points}
     return points
-
-
-def _long(raw: Any) -> dict[str, Any]:
-    """A binary link with its keys."""
-    return dict(zip(("from", "to", "length"), raw, strict=False)) if isinstance(raw, list) else dict(raw)

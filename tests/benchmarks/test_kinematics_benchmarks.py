@@ -14,6 +14,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.chunks import MANY
 from mechdesign.parallel import map_chunks
@@ -67,6 +68,13 @@ def test_velocities_and_accelerations_a_second(benchmark: Any) -> None:
 
     benchmark.pedantic(whole, rounds=7, warmup_rounds=1)
     benchmark.extra_info["poses_per_second"] = POSES / benchmark.stats.stats.min
+
+
+def test_all_tables_of_a_fine_sweep(benchmark: Any) -> None:
+    study = study_of(FOUR_BAR + "kinematics: {sweep: {theta: {from: 0, to: 360, number: 1000001}}}\n")
+    result = benchmark.pedantic(kinematics, (study,), {"jobs": 2}, rounds=7, warmup_rounds=1)
+    assert {"motion", "extremes", "limits", "loops", "toggles"} <= set(result.tables)
+    benchmark.extra_info["poses_per_second"] = 1_000_001 / benchmark.stats.stats.min
 
 
 def test_pylinkage_steps_a_second(benchmark: Any) -> None:

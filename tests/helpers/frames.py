@@ -20,7 +20,7 @@ from helpers.beam_model import Frame
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.model import Fixed, Link, Prismatic
 from mechdesign.study import Study
-from mechdesign.study.stiffness_models import Profile
+from mechdesign.study.schema.stiffness import Profile
 
 GROUND = "ground"
 

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 from mechdesign.cli.app import app
 from mechdesign.commands import COMMANDS
 from mechdesign.study import template, templates
-from mechdesign.study.document import read
+from mechdesign.study.text.document import read
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SECONDS = 60

@@ -11,7 +11,8 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.analyses.workspace.region import BRISK, answer, questions
+from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.results import Result
 
 Complex = np.ndarray
@@ -363,7 +364,7 @@ def test_pieces_that_were_lost(family: str, seed: int) -> None:
     assert wanted is not None
     # As a design of many, looked at less closely.
     question = questions(study_of(robot.text, "workspace.assembly=any"), 1e-4, ("area",))[0]
-    found = answer(question, {}, 1, BRISK).values["area"][0]
+    found = answer(question, {}, 1, BATCH).values["area"][0]
     assert abs(found - wanted[0]) <= wanted[1], (found, wanted)
 
 

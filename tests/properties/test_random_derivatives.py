@@ -53,7 +53,7 @@ def along(configurations: list[Configuration], coordinate: Coordinate) -> list[F
     return values
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(mechanisms())
 def test_velocities_in_the_pose_drawn_are_those_of_its_own_equations(made: Made) -> None:
     mechanism, layout = made.mechanism, made.layout
@@ -67,7 +67,7 @@ def test_velocities_in_the_pose_drawn_are_those_of_its_own_equations(made: Made)
         assert got == pytest.approx(value, rel=1e-8, abs=1e-8), name
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(mechanisms())
 def test_velocities_and_accelerations_are_derivatives(made: Made) -> None:
     mechanism, h = made.mechanism, 1e-3
@@ -87,7 +87,7 @@ def test_velocities_and_accelerations_are_derivatives(made: Made) -> None:
         agree(second(near[2], coordinate, velocity, acceleration), bends(values, h), 1e-6, f"{name} acceleration")
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(mechanisms())
 def test_a_jacobian_holds_the_derivatives_by_each_drive(made: Made) -> None:
     mechanism, h = made.mechanism, 1e-3

@@ -59,7 +59,7 @@ def same(a: Configuration, b: Configuration) -> None:
         assert np.array_equal(one, two, equal_nan=True)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(mechanisms())
 def test_a_sketch_is_assembled_in_the_pose_it_was_drawn_in(made: Made) -> None:
     mechanism = made.mechanism
@@ -74,7 +74,7 @@ def test_a_sketch_is_assembled_in_the_pose_it_was_drawn_in(made: Made) -> None:
             assert (wrap(miss) if coordinate[0] == "angle" else miss) == pytest.approx(0, abs=1e-9), name
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(mechanisms(), st.sampled_from([0.2, 1.0, 4.0]))
 def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
     time = np.linspace(-reach, reach, 41)
@@ -93,7 +93,7 @@ def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
         assert np.all(np.abs(wrap(off) if made.mechanism.quantity(drive) == "angle" else off) < bound), drive
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(
     mechanisms(),
     st.floats(-3, 4),
@@ -130,7 +130,7 @@ def test_a_drawing_moved_scaled_mirrored_renamed_and_reordered_is_the_same_mecha
         assert np.abs(got - expected)[both].max() < bound, point
 
 
-@settings(max_examples=80)
+@settings(max_examples=40)
 @given(mechanisms())
 def test_a_rough_drawing_chooses_the_same_assembly(made: Made) -> None:
     try:
@@ -144,7 +144,7 @@ def test_a_rough_drawing_chooses_the_same_assembly(made: Made) -> None:
         assert complex(pose.point(point)) == pytest.approx(place, abs=1e-9)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(mechanisms(), st.sampled_from([0.5, 3.0]))
 def test_an_assembly_is_kept_along_a_sweep(made: Made, reach: float) -> None:
     """From pose to pose nothing moves farther than the speeds there allow: another assembly would be a leap."""
@@ -204,7 +204,7 @@ def test_the_order_and_the_chunks_of_a_sweep_change_no_bit(made: Made, reach: fl
     same(made.at(time[k : k + 1]), whole.take(np.array([k])))
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(mechanisms(), st.floats(-0.05, 0.05))
 def test_other_coordinates_given_lead_back_to_the_drives(made: Made, time: float) -> None:
     """Forward to a pose; its points, angles, slides or measures, given in turn, bring the whole of it back."""
@@ -232,7 +232,7 @@ def test_other_coordinates_given_lead_back_to_the_drives(made: Made, time: float
         assert np.abs(back.point(point) - forward.point(point)).max() < 1e-8, (given_names, point)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(mechanisms(triads=False, anyhow=False))
 def test_dyads_agree_with_newton(made: Made) -> None:
     """The same groups, once in closed form and once by Newton's method with continuation from the sketch."""

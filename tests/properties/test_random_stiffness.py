@@ -12,13 +12,13 @@ from helpers.platforms import platform
 from helpers.random_stiffness import Sprung, sprung
 from helpers.stiffness import ask_stiffness, matrix
 from helpers.studies import study_of
-from hypothesis import assume, given, settings
+from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
-from mechdesign.analyses.poses import solve_poses
-from mechdesign.analyses.stiffness.analysis import ask
+from mechdesign.analyses.poses import solve_poses, study_poses
+from mechdesign.analyses.stiffness.analysis import ask, hold
 from mechdesign.analyses.stiffness.force_method import load, twists_of
-from mechdesign.analyses.stiffness.serial import hold_by_legs
+from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.study import Study
 
@@ -28,7 +28,7 @@ NOTHING = 1e-15
 
 def posed(text: str) -> tuple[Study, Configuration]:
     study = study_of(text)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     return study, solved.configuration
 
 
@@ -162,13 +162,17 @@ def test_another_point_of_the_same_body_is_the_same_matrix_seen_from_there(case:
             agree(matrix(there, "K"), transform.T @ matrix(here, "K") @ transform, 1e-6)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_on_serial_legs_reciprocal_wrenches_forces_and_finite_elements_agree(seed: int) -> None:
-    study, configuration = posed(platform(Random(seed)))
+    try:
+        study, configuration = posed(platform(Random(seed)))
+    except StudyError:
+        # Drawn by chance where two assemblies meet.
+        reject()
     asked = ask(study)
     assert asked.legs is not None
-    serial, _ = hold_by_legs(asked.legs, asked.section, configuration, asked.length, 3, False)
+    serial, _ = hold(asked, configuration)
     twists = twists_of(asked.network, asked.section, configuration, asked.length)
     other = load(twists, 3).held
     assume(other.margin > 1e-2)

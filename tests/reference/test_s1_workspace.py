@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.workspace.region import BRISK, CLOSE, answer, questions
-from mechdesign.analyses.workspace.rules import Rule
+from mechdesign.analyses.region.panels import BATCH, SINGLE
+from mechdesign.analyses.region.rules import Rule
+from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
@@ -156,9 +157,9 @@ def test_error_estimates_are_honest() -> None:
     """Never smaller than half of the true error, over many designs, and not idle: within the tolerance asked for."""
     places, count = sample()
     question = questions(study("two_rrr"))[0]
-    exact = answer(replace(question, tolerance=3e-7), places, count, CLOSE)
+    exact = answer(replace(question, tolerance=3e-7), places, count, SINGLE)
     for tolerance in (1e-3, 1e-4, 1e-5):
-        given = answer(replace(question, tolerance=tolerance), places, count, BRISK)
+        given = answer(replace(question, tolerance=tolerance), places, count, BATCH)
         for index in ("GII", "GRI"):
             true = np.abs(given.values[index] - exact.values[index])
             assert (true <= 2 * given.errors[index] + exact.errors[index]).all(), (tolerance, index)
@@ -193,7 +194,7 @@ def test_midpoint_rule_converges_to_the_accurate_integral() -> None:
     sizes = (50, 200, 800)
     errors = {index: [] for index in exact}
     for nodes in sizes:
-        given = answer(replace(question, rule="midpoint", nodes=nodes, rays=2 * nodes), {}, 1, CLOSE)
+        given = answer(replace(question, rule="midpoint", nodes=nodes, rays=2 * nodes), {}, 1, SINGLE)
         for index, value in exact.items():
             errors[index].append(abs(given.values[index][0] - value))
     assert errors["GRI"][1] / errors["GRI"][0] == pytest.approx(0.5, abs=0.08)
@@ -213,7 +214,7 @@ def test_local_indices_on_the_axis_of_symmetry() -> None:
 
 def test_boundary_of_the_2rrr_is_singular_where_a_leg_is_stretched_or_folded() -> None:
     table = mechdesign.workspace(study("two_rrr")).tables["boundary"]
-    assert set(table["kind"]) == {"singularity"}
+    assert set(table["kind"]) == {"dead centre"}
     reach = np.stack([np.hypot(table["x"] - side, table["y"]) for side in (1, -1)])
     outer = table["side"] == "outer"
     assert reach[:, outer].max(axis=0) == pytest.approx(np.full(outer.sum(), 3.15), abs=1e-12)

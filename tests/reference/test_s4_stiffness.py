@@ -13,6 +13,7 @@ import pytest
 from helpers.beam_model import Frame
 
 import mechdesign
+from mechdesign.analyses.poses import study_poses
 from mechdesign.study import Study
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -125,7 +126,7 @@ def test_agrees_with_beam_elements_at_three_poses(kind: str) -> None:
     """Within 0.0001 % at the reference pose and at two displaced ones (Sec. 3.3)."""
     study = load(kind)
     result = mechdesign.stiffness(study)
-    group = study.poses("stiffness").groups[0]
+    group = study_poses(study, "stiffness").groups[0]
     assert len(group.rows) == 3
     pose = study.mechanism.solve(group.values)
     for row in range(3):
@@ -137,7 +138,7 @@ def test_displaced_poses_are_displaced() -> None:
     """0.4 m away along x, and along y where the platform can go there, as in Sec. 3.3; type III moves on a curve."""
     for kind in TYPES:
         study = load(kind)
-        group = study.poses("stiffness").groups[0]
+        group = study_poses(study, "stiffness").groups[0]
         pose = study.mechanism.solve(group.values)
         places = np.asarray(pose["P.x"]) + 1j * np.asarray(pose["P.y"])
         assert places[0] == pytest.approx(1j)

@@ -11,6 +11,8 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
+from mechdesign.analyses.poses import study_poses
+from mechdesign.analyses.workspace.indices import Local
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 
@@ -254,7 +256,7 @@ def test_what_cannot_be_a_load(text: str, override: str, message: str) -> None:
 def test_a_map_over_the_workspace_counts_the_deflection() -> None:
     """The indices of the workspace say what the question itself says at its nodes."""
     from mechdesign.analyses.workspace.indices import prepare
-    from mechdesign.analyses.workspace.region import questions
+    from mechdesign.analyses.workspace.question import questions
 
     text = (
         FIVE_BAR.replace("  poses: [{P.x: 0.05, P.y: 0.45}]\n", "")
@@ -270,9 +272,9 @@ reliability:
 """
     )
     study = study_of(text)
-    poses = study.poses("reliability")
+    poses = study_poses(study, "reliability")
     place = poses.values["P.x"] + 1j * poses.values["P.y"]
-    found = questions(study)[0].field.local(place, {})
+    found = Local.at(questions(study)[0].field, place, {})
     sigma, chance = (np.asarray(index.values(found)) for index in prepare(study, ["sigma_position", "reliability"]))
     result = mechdesign.reliability(study)
     x, y = (pick(result, "moments", "sigma", output=f"P.{axis}") for axis in "xy")

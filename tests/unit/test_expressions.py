@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechdesign.expressions import Expression, ExpressionError
-from mechdesign.linearity import is_linear
+from mechdesign.expressions import Expression, ExpressionError, is_linear
 
 DEGREE = math.pi / 180
 

@@ -13,7 +13,7 @@ import mechdesign
 from mechdesign.analyses.optimize.goals import Evaluator, Goal, goal, goals_of
 from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.study import Study
-from mechdesign.study.optimize_models import Condition
+from mechdesign.study.schema.optimize import Condition
 from mechdesign.study.variants import variant
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -8,10 +8,10 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.designs import Designs
-from mechdesign.report.figures.fronts import front_figure
 from mechdesign.report.figures.optimize import figures
-from mechdesign.report.figures.parallel import MOST, convergence, parallel_axes
+from mechdesign.report.figures.optimize.designs import Designs
+from mechdesign.report.figures.optimize.fronts import front_figure
+from mechdesign.report.figures.optimize.parallel import MOST, convergence, parallel_axes
 from mechdesign.results import Column, Table
 
 ARM = """

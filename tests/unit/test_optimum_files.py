@@ -9,7 +9,7 @@ import pytest
 
 import mechdesign
 from mechdesign.report import manifest, writer
-from mechdesign.report.manifest import Asked
+from mechdesign.report.manifest import Extras
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -47,7 +47,7 @@ def arm(tmp_path: Path) -> Path:
 
 def written(study: mechdesign.study.Study, folder: Path) -> mechdesign.results.Result:
     result = mechdesign.optimize(study)
-    writer.write(folder, study, result, (), Asked(plots=False))
+    writer.write(folder, study, result, (), Extras(plots=False))
     return result
 
 

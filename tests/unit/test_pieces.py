@@ -11,7 +11,7 @@ from scipy import ndimage
 
 import mechdesign
 from mechdesign.analyses.optimize.goals import Evaluator, goal
-from mechdesign.analyses.workspace.nodes import workspace_nodes
+from mechdesign.analyses.region.nodes import workspace_nodes
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 

@@ -10,9 +10,9 @@ from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.workspace.panels import Effort, find_panels
-from mechdesign.analyses.workspace.rays import Designs, trace
-from mechdesign.analyses.workspace.region import BRISK, CLOSE, questions
+from mechdesign.analyses.region.panels import BATCH, SINGLE, Effort, find_panels
+from mechdesign.analyses.region.rays import Designs, trace
+from mechdesign.analyses.workspace.question import questions
 
 ARM = """
 units: {length: dimensionless}
@@ -232,7 +232,7 @@ def test_a_platform_at_constant_orientation(degrees: float) -> None:
     assert found["area"][0] == pytest.approx(common_area(rings_there), rel=1e-8)
 
 
-@pytest.mark.parametrize("effort", [BRISK, CLOSE], ids=["brisk", "close"])
+@pytest.mark.parametrize("effort", [BATCH, SINGLE], ids=["batch", "single"])
 @pytest.mark.parametrize("assembly", ["any", "same"])
 def test_panels_end_at_corners_and_where_rays_touch(assembly: str, effort: Effort) -> None:
     """The rays that touch the holes, of radius b - a about A and B, and those through where the outer circles meet."""
@@ -253,6 +253,6 @@ def test_few_samples_find_a_gap_between_them() -> None:
     study = study_of(FIVE_BAR, "workspace.assembly=same", "mechanism.parameters.b=0.3675195822454308")
     designs = Designs(questions(study)[0].field, {}, 1, 0.2267883835941191j)
     zero, angle, reach = np.zeros(1, dtype=np.intp), np.array([4.377794174748168]), np.array([1.2])
-    few, many = (trace(designs, zero, angle, reach, effort.samples) for effort in (BRISK, CLOSE))
+    few, many = (trace(designs, zero, angle, reach, effort.samples) for effort in (BATCH, SINGLE))
     assert len(many.inner) == 3
     np.testing.assert_allclose([few.inner, few.outer], [many.inner, many.outer], atol=1e-12)

@@ -8,15 +8,16 @@ from helpers.studies import study_of
 from matplotlib.figure import Figure
 
 import mechdesign
+from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.allocation import allocation_figure
-from mechdesign.report.figures.errors.contributions import contributions_figure
-from mechdesign.report.figures.errors.looks import LOOKS
-from mechdesign.report.figures.errors.panels import number
+from mechdesign.report.figures.panels import number
 from mechdesign.report.figures.planes import Plane
 from mechdesign.report.figures.reliability import figures
+from mechdesign.report.figures.reliability.allocation import allocation_figure
+from mechdesign.report.figures.reliability.contributions import contributions_figure
+from mechdesign.report.figures.reliability.looks import LOOKS
 from mechdesign.results import Column, Table
-from mechdesign.study.reliability_models import METHODS
+from mechdesign.study.schema.reliability import METHODS
 
 SLIDER = """
 units: {length: mm}
@@ -325,7 +326,7 @@ def test_contributions_are_ranked_with_sobol_indices_beside() -> None:
     }  # fmt: skip
     table = Table("contributions", tuple(Column(name, np.array(values)) for name, values in columns.items()))
     with style.context():
-        figure = contributions_figure(study, table, study.poses("reliability"))
+        figure = contributions_figure(study, table, study_poses(study, "reliability"))
     (axes,) = figure.axes
     assert [label.get_text() for label in axes.get_yticklabels()] == ["l", "r"]
     widths = [[bar.get_width() for bar in bars] for bars in axes.containers if hasattr(bars, "patches")]

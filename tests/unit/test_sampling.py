@@ -19,7 +19,7 @@ from mechdesign.analyses.reliability.marginals import (
 from mechdesign.analyses.reliability.pins import PIN_LAWS
 from mechdesign.analyses.reliability.sampling import generator
 from mechdesign.errors import StudyError
-from mechdesign.study.reliability_models import DISTRIBUTIONS, Dimension
+from mechdesign.study.schema.reliability import DISTRIBUTIONS, Dimension
 
 SAMPLES = 200_000
 LAWS: dict[str, Marginal] = {

@@ -10,7 +10,7 @@ from helpers.stiffness import ARM, AXIAL, BENDING, FIVE_BAR, METRES, ask_stiffne
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.stiffness.analysis import ask
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.errors import StudyError
@@ -21,7 +21,7 @@ BEAM = "sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}"
 
 def by_elements(text: str, *overrides: str, row: int = 0) -> np.ndarray:
     study = study_of(text, *overrides)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     return Structure(study, solved.configuration, row).compliance()
 
 
@@ -116,7 +116,7 @@ def test_concurrent_legs_leave_a_turn_about_their_common_point(text: str) -> Non
     assert np.isnan(matrix(result, "C")).all()
     assert_allclose(stiff @ [0, 0, 1], 0, atol=1e-9 * np.abs(stiff).max())
     study = study_of(text, UPRIGHT)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     structure = Structure(study, solved.configuration)
     moved, loose = structure.frame.respond(structure.asked, np.array([[1.0, 0], [0, 1.0], [0, 0]]))
     assert loose.shape[1] == 1
@@ -179,7 +179,7 @@ def test_legs_in_one_line_leave_two_twists_free(text: str, how: str) -> None:
     assert np.abs(twist).max() > 0.1
     assert_allclose(stiff[1:], 0, atol=1e-9 * stiff[0, 0])
     study = study_of(text)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     structure = Structure(study, solved.configuration)
     moved, _ = structure.frame.respond(structure.asked, np.array([[1.0], [0], [0]]))
     assert stiff[0, 0] * moved[3 * structure.asked, 0] == pytest.approx(1, rel=1e-6)
@@ -223,7 +223,7 @@ def test_a_flat_parallelogram_is_free_and_held_twice_at_once() -> None:
     result = ask_stiffness(flat)
     assert result.tables["stiffness"]["rank"][0] == 2
     study = study_of(flat)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     structure = Structure(study, solved.configuration)
     here = slice(3 * structure.asked, 3 * structure.asked + 3)
     _, loose = structure.frame.respond(structure.asked)
@@ -269,7 +269,7 @@ def test_a_stretched_knee_carries_along_its_line() -> None:
     assert matrix(result, "C", 1)[0, 0] == pytest.approx(1 / (1e5 + AXIAL), rel=1e-9)
     study = study_of(STRETCHED)
     asked = ask(study)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     for length in (0.1, 1.0, 10.0):
         held = load(twists_of(asked.network, asked.section, solved.configuration, length), 3).held
         assert held.compliance[1] == pytest.approx(matrix(result, "C", 1), rel=1e-9)
@@ -382,7 +382,7 @@ def test_a_tool_that_hangs_on_the_asked_link_goes_along_and_bears_nothing() -> N
     moved = result.tables["displacements"]
     rows = {(link, point): k for k, (link, point) in enumerate(zip(moved["link"], moved["point"], strict=True))}
     study = study_of(text)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     structure = Structure(study, solved.configuration)
     shift, _ = structure.frame.respond(structure.asked, np.array([[3.0], [4.0], [0.0]]))
     for link, point in (("tool", "P"), ("tool", "T"), ("b2", "P"), ("b1", "E1")):

@@ -11,7 +11,7 @@ from helpers.stiffness import ARM, BENT, FIVE_BAR, METRES, SLIDER, SLOTTED, ask_
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.poses import solve_poses, study_poses
 
 SECTIONS = {
     "rectangle": "{E: 200 GPa, width: 0.02, height: 0.04}",
@@ -49,7 +49,7 @@ TEXTS = {"arm": ARM, "slider": SLIDER, "bent": BENT, "slot": SLOTTED, "leg": LEG
 
 def check(text: str, *overrides: str) -> None:
     study = study_of(text, *overrides)
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     expected = Structure(study, solved.configuration).compliance()
     size = np.sqrt(np.abs(np.diag(expected)))
     found = matrix(ask_stiffness(text, *overrides), "C")

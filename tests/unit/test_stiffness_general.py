@@ -12,7 +12,7 @@ from helpers.stiffness import ARM, AXIAL, BENDING, BENT, FIVE_BAR, METRES, SLIDE
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.stiffness.analysis import ask
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 
@@ -143,7 +143,7 @@ def test_the_force_method_gives_what_serial_legs_give(text: str) -> None:
     study = study_of(text)
     asked = ask(study)
     assert asked.legs is not None
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     twists = twists_of(asked.network, asked.section, solved.configuration, asked.length)
     held = load(twists, asked.size).held
     result = ask_stiffness(text)

@@ -11,7 +11,7 @@ from helpers.stiffness import ask_stiffness, matrix
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.stiffness.analysis import ask
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 
@@ -283,7 +283,7 @@ stiffness:
     study = study_of(text)
     asked = ask(study)
     assert asked.legs is not None
-    (solved,) = solve_poses(study, study.poses("stiffness"))
+    (solved,) = solve_poses(study, study_poses(study, "stiffness"))
     twists = twists_of(asked.network, asked.section, solved.configuration, asked.length)
     result = ask_stiffness(text)
     assert result.tables["stiffness"]["method"].tolist() == ["serial legs"]

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from mechdesign.errors import StudyError
-from mechdesign.study.document import read
+from mechdesign.study.text.document import read
 
 
 def data(text):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import StudyError
 
 CRANK = """
@@ -31,7 +32,7 @@ def poses(tmp_path):
     def poses(text, section="kinematics"):
         path = tmp_path / "study.yaml"
         path.write_text(text)
-        return mechdesign.load(path).poses(section)
+        return study_poses(mechdesign.load(path), section)
 
     return poses
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.study import template, templates
-from mechdesign.study.document import read
+from mechdesign.study.text.document import read
 
 STUDIES = [read(template(name).encode(), name).data for name in templates()]
 WORDS = [

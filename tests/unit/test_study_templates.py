@@ -7,9 +7,10 @@ import jsonschema
 import pytest
 
 import mechdesign
+from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import StudyError
 from mechdesign.study import schema, template, template_path, templates
-from mechdesign.study.document import read
+from mechdesign.study.text.document import read
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +26,7 @@ def test_templates_are_studies(name, validator):
     assert study.questions
     for section in ("kinematics", "reliability", "stiffness"):
         if section in study.questions:
-            assert study.poses(section).count
+            assert study_poses(study, section).count
     validator.validate(read(template(name).encode(), name).data)
 
 

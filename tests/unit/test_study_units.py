@@ -6,11 +6,11 @@ import sys
 
 import pytest
 
-from mechdesign.study import units as unit_rules
-from mechdesign.study.units import QuantityError, Units, units_from
+from mechdesign.study.text import units as unit_rules
+from mechdesign.study.text.units import QuantityError, Units
 
-MM = units_from("mm", "deg", "s", "N")[0]
-SI = units_from("m", "rad", "s", "N")[0]
+MM = Units("mm", "deg", "s", "N")
+SI = Units("m", "rad", "s", "N")
 
 
 @pytest.mark.parametrize(
@@ -32,8 +32,8 @@ SI = units_from("m", "rad", "s", "N")[0]
         (SI, "90 deg", math.pi / 2),
         (SI, "1 rev", 2 * math.pi),
         (SI, "1 lbf", 4.4482216152605),
-        (units_from("in", "deg", "ms", "lbf")[0], "1 psi", 1.0),
-        (units_from("in", "deg", "ms", "lbf")[0], "1 in/s", 1e-3),
+        (Units("in", "deg", "ms", "lbf"), "1 psi", 1.0),
+        (Units("in", "deg", "ms", "lbf"), "1 in/s", 1e-3),
     ],
 )
 def test_quantities(units, text, value):
@@ -56,8 +56,7 @@ def test_wrong_units(text, kind, message):
 
 
 def test_dimensionless_lengths_take_no_quantity_with_a_length():
-    units, problems = units_from("dimensionless", "rad", "s", "N")
-    assert not problems
+    units = Units("dimensionless", "rad", "s", "N")
     assert (units.label("length"), units.label("velocity"), units.label("moment")) == ("", "1/s", "N")
     with pytest.raises(QuantityError, match="dimensionless"):
         units.convert("40 mm")

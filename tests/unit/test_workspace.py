@@ -9,9 +9,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.workspace.panels import Effort, find_panels
-from mechdesign.analyses.workspace.rays import Designs, trace
-from mechdesign.analyses.workspace.region import BRISK, answer, questions
+from mechdesign.analyses.region.panels import BATCH, Effort, find_panels
+from mechdesign.analyses.region.rays import Designs, trace
+from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.numerics.roots import bracketed_roots
 
@@ -113,9 +113,9 @@ def test_batch_of_designs_equals_one_by_one() -> None:
     question = questions(study)[0]
     lows = np.array([1.0, 1.2, 1.7, 2.5])
     places = study.parameters.places({"low": lows, "high": lows + 2})
-    together = answer(question, places, 4, BRISK).values
+    together = answer(question, places, 4, BATCH).values
     for k in range(4):
-        alone = answer(question, {name: value[k : k + 1] for name, value in places.items()}, 1, BRISK).values
+        alone = answer(question, {name: value[k : k + 1] for name, value in places.items()}, 1, BATCH).values
         for name, values in together.items():
             assert alone[name][0] == pytest.approx(values[k], rel=1e-10), name
 

@@ -8,11 +8,11 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.inscribed import inscribed_figure
-from mechdesign.report.figures.maps import index_columns
-from mechdesign.report.figures.ranges import loops
-from mechdesign.report.figures.regions import fate, regions
 from mechdesign.report.figures.workspace import figures
+from mechdesign.report.figures.workspace.inscribed import inscribed_figure
+from mechdesign.report.figures.workspace.maps import index_columns
+from mechdesign.report.figures.workspace.ranges import loops
+from mechdesign.report.figures.workspace.regions import fate, regions
 from mechdesign.results import Column, Result, Table
 
 FIVE_BAR = """

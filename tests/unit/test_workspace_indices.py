@@ -10,8 +10,10 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.workspace.indices import OF_JACOBIAN, prepare
-from mechdesign.analyses.workspace.region import BRISK, answer, questions
+from mechdesign.analyses.poses import study_poses
+from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.workspace.indices import OF_JACOBIAN, Local, prepare
+from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import StudyError
 from mechdesign.study import Study
 
@@ -54,7 +56,7 @@ ELASTIC = (
 
 def local(study: Study, *places: complex) -> dict[str, np.ndarray]:
     """The Jacobian's indices and its determinant at points."""
-    found = questions(study)[0].field.local(np.array(places), {})
+    found = Local.at(questions(study)[0].field, np.array(places), {})
     values = {index.name: np.asarray(index.values(found)) for index in prepare(study, OF_JACOBIAN)}
     return values | {"det_J": np.asarray(found.determinant)}
 
@@ -197,10 +199,10 @@ def test_stiffness_and_position_errors_are_indices() -> None:
     study = study_of(FIVE_BAR, ERRORS, ELASTIC, f"workspace.indices=[{', '.join(names)}]", "stiffness.direction=30",
                      "stiffness.loads=[[100, 0], [0, 50]]", "workspace.integrate.tolerance=1e-3")  # fmt: skip
     row = mechdesign.workspace(study).main
-    poses = study.poses("stiffness")
+    poses = study_poses(study, "stiffness")
     place = poses.values["P.x"] + 1j * poses.values["P.y"]
     assert 1000 < poses.count <= 2000
-    found = questions(study)[0].field.local(place, {})
+    found = Local.at(questions(study)[0].field, place, {})
     k_min, k_direction, deflection, sigma, chance = (np.asarray(i.values(found)) for i in prepare(study, names))
     stiff = mechdesign.stiffness(study)
     assert k_min == pytest.approx(stiff.main["k_min"], rel=1e-6)
@@ -230,7 +232,7 @@ def test_stiffness_and_position_errors_are_indices() -> None:
 )
 def test_what_indices_need(change: str, said: str | None) -> None:
     if said is None:
-        assert study_of(FIVE_BAR, change).poses("reliability").grid[1] == 33
+        assert study_poses(study_of(FIVE_BAR, change), "reliability").grid[1] == 33
         return
     with pytest.raises(StudyError, match=said):
         study_of(FIVE_BAR, change)
@@ -275,7 +277,7 @@ def test_order_of_the_quadrature() -> None:
     # Seen from a point of the ring: several intervals a ray, and rays that touch the hole.
     study = study_of(ARM, "workspace.scan.about=[1.3, 0.2]", "workspace.integrate={}")
     for k, tolerance in enumerate(tolerances):
-        found = answer(questions(study, tolerance, names)[0], {}, 1, BRISK)
+        found = answer(questions(study, tolerance, names)[0], {}, 1, BATCH)
         for j, name in enumerate(names):
             errors[k, j] = abs(found.values[name][0] / exact[name] - 1)
             assert errors[k, j] <= found.errors[name][0] / exact[name] + 1e-12, (name, tolerance)
@@ -289,7 +291,7 @@ def test_order_of_the_midpoint_rule() -> None:
     errors = []
     for count in nodes:
         study = study_of(ARM, f"workspace.integrate={{rule: midpoint, nodes: {count}}}", "workspace.scan.rays=8")
-        errors.append(abs(answer(questions(study, wanted=["manipulability_mean"])[0], {}, 1, BRISK)
+        errors.append(abs(answer(questions(study, wanted=["manipulability_mean"])[0], {}, 1, BATCH)
                           .values["manipulability_mean"][0] - exact))  # fmt: skip
     order = -np.polyfit(np.log(nodes), np.log(errors), 1)[0]
     assert order == pytest.approx(1.5, abs=0.1)

@@ -9,9 +9,10 @@ import numpy as np
 
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.extremes import extremes
-from mechdesign.analyses.kinematics.loops import loop_tables
-from mechdesign.analyses.kinematics.motion import Asked, Motion, asked, characteristic_length, entry
+from mechdesign.analyses.kinematics.extremes import extremes, needed
+from mechdesign.analyses.kinematics.lines import PoseLine
+from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
+from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, characteristic_length, entry, motion_question
 from mechdesign.analyses.kinematics.motion_limits import motion_limits
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.poses import judge_failures, pose_in_words
@@ -19,6 +20,7 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
@@ -46,8 +48,10 @@ def kinematics(
     Parameters
     ----------
     study : Study
-    seed, jobs : ignored
-        Kinematics draws no random numbers and is fast enough on one thread.
+    seed : ignored
+        Kinematics draws no random numbers.
+    jobs : int or None
+        Threads that solve a long sweep; None uses every processor.
     all_modes : bool
         Whether to follow every other assembly of the same links as well.
 
@@ -67,13 +71,13 @@ def kinematics(
     StudyError
         If all modes are asked of poses that give different coordinates.
     """
-    question = asked(study)
+    question = motion_question(study)
     poses = question.poses
     if all_modes and len(poses.groups) > 1:
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
     progress.start(poses.count, "poses")
-    motion = move(question, progress)
+    motion = move(question, progress, jobs)
     warnings, failed = judge_failures(study, poses, motion.reason)
     warnings += (
         _conditioning(motion)
@@ -82,15 +86,13 @@ def kinematics(
         + targets.gaps(study, motion.errors, poses, motion.valid)
     )
     tables = {"motion": motion_table(motion)}
-    swept, limits = swept_of(poses), None
+    swept = swept_of(poses)
     if swept is not None:
-        group, reason = poses.groups[0], motion.reason
-        limits = motion_limits(study, group, swept, reason, question.outputs, motion.arrays)
+        limits = motion_limits(motion, swept)
         warnings += limits.warnings
-    tables["extremes"], _ = extremes_table(motion, limits.ends if limits is not None else ())
-    if limits is not None:
         tables["limits"] = limits.table
-    tables |= loop_tables(study, poses, motion.valid, limits)
+    between, _ = tables_between(motion, limits.ends if swept is not None else ())
+    tables = {"motion": tables["motion"], "extremes": between.pop("extremes"), **tables, **between}
     if motion.errors:
         tables["targets"] = targets_table(motion)
     if question.square:
@@ -102,7 +104,7 @@ def kinematics(
     return Result("kinematics", tables, warnings, counts, failed)
 
 
-def _modes(question: Asked, drawn: Motion) -> tuple[Table, list[str], int]:
+def _modes(question: MotionQuestion, drawn: Motion) -> tuple[Table, list[str], int]:
     """The motion of every assembly, the sketch's first; what is to be said of each; and how many they are."""
     study, poses = question.study, question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
@@ -110,7 +112,9 @@ def _modes(question: Asked, drawn: Motion) -> tuple[Table, list[str], int]:
     parts: list[Sequence[Column]] = []
     warnings = []
     for assembly in sorted(found, key=lambda assembly: not assembly.drawn):
-        motion = drawn if assembly.drawn else move(asked(dataclasses.replace(study, mechanism=assembly.mechanism)))
+        motion = (
+            drawn if assembly.drawn else move(motion_question(dataclasses.replace(study, mechanism=assembly.mechanism)))
+        )
         labels += [assembly.label] * poses.count
         parts.append(motion.columns())
         bad = int(np.count_nonzero(motion.reason))
@@ -134,26 +138,50 @@ def motion_table(motion: Motion) -> Table:
     return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
 
 
-def extremes_table(
-    motion: Motion, ends: Sequence[Boundary] = (), names: Collection[str] | None = None
-) -> tuple[Table, Flags]:  # fmt: skip
-    """Smallest and largest values, exact for some outputs or all; see `kinematics.extremes.extremes`."""
-    question, poses = motion.asked, motion.asked.poses
-    return extremes(
-        question.study, question.outputs, motion.errors, motion.arrays, poses, swept_of(poses), motion.reason, ends,
-        names,
-    )  # fmt: skip
+def tables_between(
+    motion: Motion, ends: Sequence[Boundary] = (), wanted: Collection[str] = ("extremes", "loops", "toggles"),
+    names: Collection[str] | None = None,
+) -> tuple[dict[str, Table], Flags]:  # fmt: skip
+    """Tables of what happens between the poses of a sweep, too.
+
+    Parameters
+    ----------
+    ends : sequence of Boundary
+        Limits of motion, of a single design.
+    names : collection of str, optional
+        Outputs and errors whose extremes between the poses are wanted; all where left out.
+
+    Returns
+    -------
+    (dict of str to Table, bool array of shape (designs,))
+        Tables ``extremes``, ``loops`` where there are four-bars and slider-cranks, and of a sweep their ``toggles``;
+        and the designs whose motion ends where no limit is known, so that the tables do not answer for them.
+    """
+    poses, swept, line = motion.question.poses, swept_of(motion.question.poses), None
+    loops = four_bars(motion.question.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
+    torn = np.zeros(poses.designs, dtype=bool)
+    if swept is not None:
+        coordinates = needed(motion, names) if "extremes" in wanted else []
+        line = PoseLine(motion, swept, coordinates, functions(loops), ends)
+    tables = {}
+    if "extremes" in wanted:
+        tables["extremes"] = extremes(motion, swept, line, names)
+    if loops:
+        tables["loops"] = loops_table(motion, loops, line)
+    if loops and line is not None and "toggles" in wanted:
+        tables["toggles"] = toggles_table(motion, loops, line)
+    return tables, torn if line is None else line.torn
 
 
 def targets_table(motion: Motion) -> Table:
     """Errors against the targets."""
-    poses = motion.asked.poses
-    return targets.table(motion.asked.study, motion.errors, poses, swept_of(poses), motion.valid)
+    poses = motion.question.poses
+    return targets.table(motion.question.study, motion.errors, poses, swept_of(poses), motion.valid)
 
 
 def jacobian_table(motion: Motion) -> Table:
     """Every entry of the Jacobian, a row a pose."""
-    question = motion.asked
+    question = motion.question
     columns = motion.pose_columns()
     for output in question.listed:
         for drive in question.drives:
@@ -179,7 +207,7 @@ def _conditioning(motion: Motion) -> list[str]:
         return []
     values = motion.arrays["inverse_condition"]
     regular = motion.valid & (motion.arrays["conditioning"] >= STALLED)
-    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.asked.study) is None:
+    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.question.study) is None:
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
     near = regular & ~(values >= SINGULAR)
     if near.any():
@@ -191,7 +219,7 @@ def _conditioning(motion: Motion) -> list[str]:
 
 def _astray(motion: Motion) -> list[str]:
     """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
-    study, section, poses = motion.asked.study, motion.asked.section, motion.asked.poses
+    study, section, poses = motion.question.study, motion.question.section, motion.question.poses
     if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
         return []
     sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
@@ -212,7 +240,7 @@ def _astray(motion: Motion) -> list[str]:
 
 
 def _stalled(motion: Motion) -> list[str]:
-    study, poses = motion.asked.study, motion.asked.poses
+    study, poses = motion.question.study, motion.question.poses
     stalled = motion.valid & ~motion.smooth & ~(motion.arrays["conditioning"] >= STALLED)
     warnings = []
     rows = np.flatnonzero(stalled)
@@ -223,7 +251,7 @@ def _stalled(motion: Motion) -> list[str]:
             f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
             f"nothing there; the first: {pose_in_words(study, poses, rows[0])}"
         )
-    if motion.asked.of_given:
+    if motion.question.of_given:
         rates = motion.arrays[f"{study.mechanism.drives[0]}_velocity"]
         rows = np.flatnonzero(motion.valid & ~stalled & np.isnan(rates))
         if len(rows):

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
+from mechdesign.analyses.kinematics.motion import Motion
+from mechdesign.analyses.kinematics.moving import NEAR
 from mechdesign.analyses.kinematics.rates import drive_velocities
-from mechdesign.analyses.kinematics.smoothing import NEAR
-from mechdesign.analyses.poses import CHUNK, dimensions, radians, starts
+from mechdesign.analyses.poses import CHUNK, dimensions, in_study_units, radians, starts
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet, wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, regularity
-from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 # How far a link may turn between neighbouring poses (radians), by their places and by its slope at either.
 SURE = 0.3
@@ -32,68 +31,84 @@ ROUNDS = 14
 # Where a pose has no slopes (a dead centre, from which functions start as a root does), looks beside it: parts of the
 # step to the next pose.
 GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
+# Poses of a design's sweep that a line begins with, about: of a finer sweep some are left out, but no step becomes
+# longer than so many radians, or so much of the mechanism's size.
+ENOUGH, LONGEST = 4096, 0.02
 # A limit this near to a pose of the sweep, in rows, is that pose.
 AT_ROW = 1e-9
-# Poses of a design's sweep that a line begins with, about: of a finer sweep some are left out. Where links turn too far
-# between those taken, poses come between them again.
-ENOUGH = 4096
 
 
 @dataclass(frozen=True)
-class Leaf:
-    """A function of the motion whose derivative by the swept coordinate is known.
+class Function:
+    """A function of the motion.
 
     Parameters
     ----------
     value : callable
         Of configurations.
     slope : callable
-        Of configurations and the velocities at unit speed of the swept coordinate.
-    turning : bool
-        Whether it is an angle (radians), known but for whole turns.
+        Derivative by the swept coordinate: of configurations and the velocities at its unit speed.
+    radian : float or None
+        What a radian is in its unit, where it is an angle.
     """
 
     value: Callable[[Configuration], Value]
     slope: Callable[[Configuration, Rates], Value]
-    turning: bool = False
+    radian: float | None = None
 
 
-def leaf_of(coordinate: Coordinate) -> Leaf:
-    """A coordinate that is no expression."""
-    return Leaf(
-        lambda configuration: configuration.value(coordinate),
-        lambda configuration, velocity: first(configuration, coordinate, velocity),
-        coordinate.quantity == "angle",
+def function_of(study: Study, coordinate: Coordinate) -> Function:
+    """A coordinate in the study's units."""
+    return Function(
+        lambda configuration: in_study_units(study, coordinate, configuration.value(coordinate)),
+        lambda configuration, velocity: in_study_units(study, coordinate, first(configuration, coordinate, velocity)),
+        1 / study.units.angle_factor if coordinate.quantity == "angle" else None,
     )
 
 
-def _frames(mechanism: Mechanism) -> list[Leaf]:
-    """The angle of every class of bodies that turn together, but the ground's."""
-
-    def frame(k: int) -> Leaf:
-        return Leaf(lambda c: np.angle(c.rotations[k]), lambda c, v: v.angles[k], True)
-
-    return [frame(k) for k in range(1, mechanism.graph.classes)]
+def _frame(k: int) -> Function:
+    """The angle of a class of bodies that turn together."""
+    return Function(lambda configuration: np.angle(configuration.rotations[k]), lambda _, v: v.angles[k], 1.0)
 
 
-class Line:
+def thinned(motion: Motion, swept: str) -> Flags:
+    """Poses of a sweep that tell the motion: its ends, those where it ceases to be valid, and enough between."""
+    study, poses = motion.question.study, motion.question.poses
+    coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
+    steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
+    longest = LONGEST * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
+    stride = min(-(-each // ENOUGH), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
+    taken: Flags = np.arange(each) % max(stride, 1) == 0
+    taken[-1] = True
+    taken = np.tile(taken, poses.designs)
+    change = valid[1:] != valid[:-1]
+    taken[1:] |= change
+    taken[:-1] |= change
+    return taken
+
+
+class PoseLine:
     """Poses along the sweep of one coordinate, of one design or several, and the segments between them.
 
     Poses are those of the sweep (of a very fine one, some), the limits of motion, and as many between them as the
-    turning of the links and the smoothness of the leaves need.
+    turning of the links and the smoothness of the functions need.
 
     Parameters
     ----------
-    valid : bool array, shape (poses,)
+    coordinates : sequence of Coordinate
+    others : mapping of str to Function
+        Further functions, by names that no coordinate has.
     ends : sequence of Boundary
         Limits of motion, of a single design.
 
     Attributes
     ----------
+    rows : dict of str to int
+        Row of each function in `values` and `slopes`.
     row, position, place : ndarray, shape (n,)
-        A valid pose of the sweep beside each pose, place along the sweep in rows, and swept coordinate (core's units).
-    values, slopes : ndarray, shape (leaves, n)
-        Angles continuous along each piece of the motion; slopes nan where there are none.
+        A pose of the sweep beside each pose, place along the sweep in rows, and swept coordinate (core's units).
+    values, slopes : ndarray, shape (functions, n)
+        In the study's units, angles on the branch of the motion; slopes nan where there are none.
     begin, end : ndarray of int, shape (segments,)
         Poses that each segment lies between.
     torn : bool array, shape (designs,)
@@ -105,15 +120,15 @@ class Line:
     """
 
     def __init__(
-        self, study: Study, poses: Poses, swept: str, valid: Flags, leaves: Sequence[Leaf],
-        ends: Sequence[Boundary] = (),
+        self, motion: Motion, swept: str, coordinates: Sequence[Coordinate],
+        others: Mapping[str, Function], ends: Sequence[Boundary] = (),
     ) -> None:  # fmt: skip
-        self.study, self.poses = study, poses
-        group = poses.groups[0]
+        study, poses = motion.question.study, motion.question.poses
+        self.study, self.poses, self.swept, self.ends = study, poses, swept, ends
+        (group,) = poses.groups
         self.plan = study.mechanism.plan(group.names)
         # Limits that count the turns of angles are judged along the motion; here its ends tell of them.
         self._limits = not study.mechanism.counting
-        # Where a motion is followed through a change point, what lies beside it has lost digits.
         self.followed = self.plan.change_points is not None
         self._steady = NEAR if self.followed else STALLED
         self.which = group.names.index(swept)
@@ -123,50 +138,58 @@ class Line:
         ]
         self.each = poses.count // poses.designs
         self.torn = np.zeros(poses.designs, dtype=bool)
-        self._own = len(leaves)
-        self._leaves = [*leaves, *_frames(study.mechanism)]
-        self.turning = np.array([leaf.turning for leaf in self._leaves])
-        inside = [end for end in ends if 0 < end.position < poses.count - 1]
-        inside = [end for end in inside if abs(end.position - round(end.position)) > AT_ROW]
-        some = self._taken(valid, [int(end.position) for end in inside])
+        # First the angles by whose values at a pose those beside it are told.
+        self._angles = {name: c for name, c in angles_of(coordinates).items() if name not in group.names}
+        functions = {c.name: function_of(study, c) for c in [*self._angles.values(), *coordinates]} | dict(others)
+        self.rows = {name: k for k, name in enumerate(functions)}
+        self._functions = [*functions.values(), *map(_frame, range(1, study.mechanism.graph.classes))]
+        self._radians = np.array([function.radian or np.nan for function in self._functions])
+        self._rows = some = np.flatnonzero(thinned(motion, swept) & motion.valid)
+        beside = np.searchsorted(some, [round(end.position) for end in ends])
+        at_pose = np.isin([round(end.position) for end in ends], some)
+        at_pose &= np.array([abs(end.position % 1 - 0.5) >= 0.5 - AT_ROW for end in ends], dtype=bool)
+        inside = [end for end, here in zip(ends, at_pose, strict=True) if not here]
         self._start: Configuration | None = None
         if self.plan.iterative and len(some):
             own = [values[some] for values in self.given]
             start = starts(study.mechanism, poses, some)
             self._start = self.plan.solve(own, dimensions(poses, some), start=start, limits=self._limits)
-        self._rows, self.limits = some, list[int]()
         self.row, self.position, self.place = some, some.astype(float), self.given[self.which][some]
-        parts = [self.sample(some[k : k + CHUNK], self.place[k : k + CHUNK])[:2] for k in range(0, len(some), CHUNK)]
-        none = np.zeros((len(self._leaves), 0))
-        self.values, self.slopes = (np.concatenate([none, *(part[k] for part in parts)], axis=1) for k in (0, 1))
-        self.begin, self.end = self._segments(valid, inside)
+        near = np.array([motion.arrays[name][some] for name in self._angles]).reshape(len(self._angles), len(some))
+        self.values, self.slopes, _ = self._in_chunks(self.row, self.place, near)
+        self.limits: list[int] = beside[at_pose].tolist()
+        for end in inside:
+            self._add_end(end, motion.valid)
+        self.begin, self.end = self._segments(motion.valid, inside)
         self._refine()
-        self._unwrap()
 
-    def sample(self, row: Ints, place: Floats) -> tuple[Floats, Floats, Flags]:
-        """Values and slopes of all leaves with the swept coordinate at `place`, everything else as in poses `row`."""
+    def sample(self, node: Ints, place: Floats) -> tuple[Floats, Floats, Flags]:
+        """Values and slopes of all functions with the swept coordinate at `place`, beside poses of the line."""
+        return self._in_chunks(self.row[node], place, self._near(node))
+
+    def at(self, node: Ints, place: Floats) -> Floats:
+        """Values of all functions at or beside poses of the line."""
+        return np.where(place == self.place[node], self.values[:, node], self.sample(node, place)[0])
+
+    def _near(self, node: Ints) -> Floats:
+        return self.values[: len(self._angles), node]
+
+    def _in_chunks(self, row: Ints, place: Floats, near: Floats) -> tuple[Floats, Floats, Flags]:
+        if len(row) <= CHUNK:
+            return self._sample(row, place, near)
+        parts = [slice(k, k + CHUNK) for k in range(0, len(row), CHUNK)]
+        values, slopes, valid = zip(*[self._sample(row[p], place[p], near[:, p]) for p in parts], strict=True)
+        return np.concatenate(values, axis=1), np.concatenate(slopes, axis=1), np.concatenate(valid)
+
+    def _sample(self, row: Ints, place: Floats, near: Floats) -> tuple[Floats, Floats, Flags]:
         given = [values[row] for values in self.given]
         given[self.which] = place
         start = None
         if self._start is not None:
             start = self._start.take(np.minimum(np.searchsorted(self._rows, row), len(self._rows) - 1))
-        return self._measured(self.plan.solve(given, dimensions(self.poses, row), start=start, limits=self._limits))
-
-    def align(self, leaf: int, known: Floats) -> None:
-        """Bring an angle to the branch that it has over the poses of the sweep, shape (poses,)."""
-        count = len(self._rows)
-        own = self.values[leaf][:count]
-        beside = np.clip(np.searchsorted(self._rows, self.row), 0, max(count - 1, 0))
-        if count:
-            shift = np.round((known[self._rows] - own) / (2 * np.pi))
-            self.values[leaf] = self.values[leaf] + 2 * np.pi * np.nan_to_num(shift)[beside]
-
-    def near(self, values: Floats, node: Ints) -> Floats:
-        """Values of the leaves with their angles on the branch of poses of the line."""
-        turning = self.turning
-        values = values.copy()
-        values[turning] += 2 * np.pi * np.round((self.values[turning][:, node] - values[turning]) / (2 * np.pi))
-        return values
+        pose = self.plan.solve(given, dimensions(self.poses, row), start=start, limits=self._limits)
+        told = dict(zip(self._angles, near * self.study.units.angle_factor, strict=True))
+        return self._measured(replace(pose, near={**pose.near, **told}))
 
     @quiet
     def _measured(self, configuration: Configuration) -> tuple[Floats, Floats, Flags]:
@@ -174,14 +197,14 @@ class Line:
         linear = mechanism.linearize(configuration)
         unit = [float(k == self.which) for k in range(len(given))]
         velocity = linear.velocity(drive_velocities(mechanism, linear, given, unit))
-        shape = configuration.shape
-        steady = np.broadcast_to(regularity(linear) >= self._steady, shape)
-        values = [np.broadcast_to(leaf.value(configuration), shape) for leaf in self._leaves]
-        slopes = [np.broadcast_to(leaf.slope(configuration, velocity), shape) for leaf in self._leaves]
-        table = np.stack(values), np.where(steady, np.stack(slopes), np.nan)
-        table[1][~np.isfinite(table[1])] = np.nan
-        valid = configuration.valid
-        return np.where(valid, table[0], np.nan), np.where(valid, table[1], np.nan), valid
+        shape, valid = configuration.shape, configuration.valid
+        values, slopes = np.full((2, len(self._functions), *shape), np.nan)
+        steady = valid & (regularity(linear) >= self._steady)
+        for k, function in enumerate(self._functions):
+            values[k] = np.where(valid, function.value(configuration), np.nan)
+            slopes[k] = np.where(steady, function.slope(configuration, velocity), np.nan)
+        slopes[~np.isfinite(slopes)] = np.nan
+        return values, slopes, valid
 
     def _add(self, row: Ints, position: Floats, place: Floats, values: Floats, slopes: Floats) -> Ints:
         index = len(self.row) + np.arange(len(row))
@@ -191,145 +214,101 @@ class Line:
         self.slopes = np.concatenate([self.slopes, slopes], axis=1)
         return index
 
-    def _taken(self, valid: Flags, steps: Sequence[int]) -> Ints:
-        """Valid poses of the sweep that the line begins with: its ends, those beside its limits, and some between."""
-        at = np.arange(len(valid)) % self.each
-        taken = at % -(-self.each // ENOUGH) == 0
-        taken[self.each - 1 :: self.each] = True
-        # Beside a pose that fails the motion ends.
-        taken[1:] |= ~valid[:-1]
-        taken[:-1] |= ~valid[1:]
-        for step in steps:
-            taken[step : step + 2] = True
-        return np.flatnonzero(taken & valid)
+    def _add_end(self, end: Boundary, valid: Flags) -> None:
+        """A limit as a pose; where the motion goes to infinity, poses as near to it as its numbers are good."""
+        step = int(end.position)
+        beside = int(np.searchsorted(self._rows, step if valid[step] else step + 1))
+        beside = min(beside, len(self._rows) - 1)
+        row = self._rows[[beside]]
+        if end.configuration is not None:
+            values, slopes, _ = self._measured(end.configuration)
+            self.limits += self._add(
+                row, np.array([end.position]), np.array([end.place]), values[:, None], np.nan * slopes[:, None]
+            ).tolist()  # fmt: skip
+            return
+        a, b = self.given[self.which][[step, step + 1]]
+        for side in (-GRADED[0], GRADED[0]):
+            at = np.array([end.place + side * (b - a)])
+            values, slopes, good = self.sample(np.array([beside]), at)
+            if good.all():
+                self._add(row, np.array([end.position + side]), at, values, slopes)
 
     def _segments(self, valid: Flags, inside: Sequence[Boundary]) -> tuple[Ints, Ints]:
-        """Pairs of poses between which the motion goes on: of the sweep, and its limits."""
-        node = np.full(self.poses.count, -1)
-        node[self._rows] = np.arange(len(self._rows))
-        one, other = self._rows[:-1], self._rows[1:]
-        # Poses that fail before each row: as many before both ends of a pair where all between them are valid.
-        failed = np.cumsum(~valid)
-        plain = (failed[one] == failed[other]) & (one // self.each == other // self.each)
+        """Pairs of poses between which the motion goes on."""
+        order = np.argsort(self.position, kind="stable")
+        one, other = order[:-1], order[1:]
+        # Poses that fail up to each: as many up to both of a pair where none between them does.
+        failed = np.cumsum(~valid)[self.position.astype(int)]
+        same = (failed[one] == failed[other]) & (self.row[one] // self.each == self.row[other] // self.each)
         if self.poses.designs > 1:
             # Whether one pose fails where its neighbour does not: the limit between them is not known.
             edge = np.flatnonzero(valid[:-1] != valid[1:])
             self.torn[np.unique(edge[(edge + 1) % self.each != 0] // self.each)] = True
-        steps = sorted({int(end.position) for end in inside})
-        plain &= ~np.isin(one, steps)
-        pairs = [np.stack([node[one[plain]], node[other[plain]]])]
-        for step in steps:
-            pairs += self._divided(step, node, [end for end in inside if int(end.position) == step])
-        begin, end = np.concatenate(pairs, axis=1)
-        moving = self.place[begin] != self.place[end]
-        return begin[moving], end[moving]
-
-    def _divided(self, step: int, node: Ints, ends: Sequence[Boundary]) -> Iterator[Ints]:
-        """Pairs of poses within a step that holds limits of motion."""
-        at = [int(node[step])]
-        for end in ends:
-            row = step if node[step] >= 0 or node[step + 1] < 0 else step + 1
+        for end in inside:
             if end.configuration is None:
-                # The motion goes to infinity: as near to it as its numbers are good.
-                side = [self._beside(row, step, end.place, part) for part in (-1, 1)]
-                at += [side[0], -1, side[1]]
-                continue
-            values, _, _ = self._measured(end.configuration)
-            index = self._add(
-                np.array([row]), np.array([end.position]), np.array([end.place]), values[:, None],
-                np.full((len(self._leaves), 1), np.nan),
-            )  # fmt: skip
-            at.append(int(index[0]))
-            self.limits.append(int(index[0]))
-        at.append(int(node[step + 1]))
-        for one, other in pairwise(at):
-            if one < 0 or other < 0:
-                continue
-            middle = (self.place[[one]] + self.place[[other]]) / 2
-            if self.sample(self.row[[one]], middle)[2].all():
-                yield np.array([[one], [other]])
-
-    def _beside(self, row: int, step: int, place: float, side: int) -> int:
-        a, b = self.given[self.which][[step, step + 1]]
-        at = np.array([place + side * GRADED[0] * (b - a)])
-        values, slopes, valid = self.sample(np.array([row]), at)
-        if not valid.all():
-            return -1
-        return int(self._add(np.array([row]), step + (at - a) / (b - a), at, values, slopes)[0])
+                same &= ~((self.position[one] < end.position) & (self.position[other] > end.position))
+        one, other = one[same], other[same]
+        moving = self.place[one] != self.place[other]
+        beside = np.flatnonzero(np.isin(one, self.limits) | np.isin(other, self.limits))
+        if len(beside):
+            middle = (self.place[one[beside]] + self.place[other[beside]]) / 2
+            moving[beside] &= self.sample(one[beside], middle)[2]
+        return one[moving], other[moving]
 
     def divide(self, segment: Ints, parts: Floats) -> None:
-        """Put poses into some segments, at `parts` of their length, shape (segments, parts) or (parts,).
+        """Put poses into some segments, at `parts` of their length.
 
         A segment that holds a pose that is not valid is dropped.
         """
         if not len(segment):
             return
         begin, end = self.begin[segment], self.end[segment]
-        parts = np.broadcast_to(parts, (len(segment), np.shape(parts)[-1]))
-        count = parts.shape[1]
-        row = np.repeat(self.row[begin], count)
-        place, position = (
-            (at[begin][:, None] + parts * (at[end] - at[begin])[:, None]).ravel() for at in (self.place, self.position)
-        )
-        found = [self.sample(row[k : k + CHUNK], place[k : k + CHUNK]) for k in range(0, len(row), CHUNK)]
-        values, slopes = (np.concatenate([part[k] for part in found], axis=1) for k in (0, 1))
-        good = np.concatenate([part[2] for part in found]).reshape(len(segment), count).all(axis=1)
-        self.torn[np.unique(row.reshape(-1, count)[~good] // self.each)] = True
-        keep = np.repeat(good, count)
-        values = self.near(values[:, keep], np.repeat(begin[good], count))
-        index = self._add(row[keep], position[keep], place[keep], values, slopes[:, keep])
-        chain = np.concatenate([begin[good, None], index.reshape(-1, count), end[good, None]], axis=1)
+        node, other, part = np.repeat(begin, len(parts)), np.repeat(end, len(parts)), np.tile(parts, len(segment))
+        place, position = (at[node] + part * (at[other] - at[node]) for at in (self.place, self.position))
+        near = self._near(node) + part * (self._near(other) - self._near(node))
+        values, slopes, valid = self._in_chunks(self.row[node], place, near)
+        good = valid.reshape(len(segment), len(parts)).all(axis=1)
+        self.torn[self.row[begin[~good]] // self.each] = True
+        keep = np.repeat(good, len(parts))
+        index = self._add(self.row[node[keep]], position[keep], place[keep], values[:, keep], slopes[:, keep])
+        chain = np.concatenate([begin[good, None], index.reshape(-1, len(parts)), end[good, None]], axis=1)
         others = np.ones(len(self.begin), dtype=bool)
         others[segment] = False
         self.begin = np.concatenate([self.begin[others], chain[:, :-1].ravel()])
         self.end = np.concatenate([self.end[others], chain[:, 1:].ravel()])
 
     def _refine(self) -> None:
-        """Put poses into segments until no link turns far within one and the leaves are smooth there."""
-        lost = np.isnan(self.slopes).all(axis=0)
-        self.divide(np.flatnonzero(lost[self.begin]), GRADED)
-        lost = np.isnan(self.slopes).all(axis=0)
-        self.divide(np.flatnonzero(lost[self.end]), 1 - GRADED[::-1])
-        scale = self._scales()
+        """Put poses into segments until no link turns far within one and the functions are smooth there."""
+        self.divide(np.flatnonzero(~self.sharp()[self.begin]), GRADED)
+        self.divide(np.flatnonzero(~self.sharp()[self.end]), 1 - GRADED[::-1])
+        span = -self.least(self.values) - self.least(-self.values)
+        scale = np.where(np.isnan(self._radians)[:, None], np.where(span > 0, span, np.inf), self._radians[:, None])
         for _ in range(ROUNDS):
             length = self.place[self.end] - self.place[self.begin]
             rise = self.values[:, self.end] - self.values[:, self.begin]
-            rise[self.turning] = wrap(rise[self.turning])
+            rise[len(self.rows) :] = wrap(rise[len(self.rows) :])
             one, other = self.slopes[:, self.begin] * length, self.slopes[:, self.end] * length
             with np.errstate(invalid="ignore"):
-                frames = slice(self._own, None)
-                far = (np.maximum(np.abs(one), np.abs(other))[frames] > SURE) | (np.abs(rise[frames]) > SURE)
+                steep = np.fmax(np.fmax(np.abs(one), np.abs(other)), np.abs(rise))
                 rough = np.abs(rise - (one + other) / 2) > SMOOTH * scale[:, self.row[self.begin] // self.each]
             # What is this near to a dead centre has been looked at already.
             wide = np.abs(self.position[self.end] - self.position[self.begin]) > GRADED[1]
-            split = np.flatnonzero((far.any(axis=0) | rough.any(axis=0)) & wide)
+            split = np.flatnonzero(((steep[len(self.rows) :] > SURE).any(axis=0) | rough.any(axis=0)) & wide)
             if not len(split):
                 return
             self.divide(split, np.array([0.5]))
 
-    def _scales(self) -> Floats:
-        """Range of each leaf over each design, shape (leaves, designs); a radian for angles."""
-        span = -self.least(self.values) - self.least(-self.values)
-        return np.where(self.turning[:, None], 1.0, np.where(span > 0, span, np.inf))
+    def sharp(self) -> Flags:
+        """Poses that have slopes."""
+        return np.asarray(~np.isnan(self.slopes).all(axis=0))
 
     def least(self, values: Floats) -> Floats:
         """Smallest value over each design's poses, shape (functions, designs); infinite where it has none."""
-        values = np.where(np.isnan(values), np.inf, values)
         found = np.full((len(values), self.poses.designs), np.inf)
         design = self.row // self.each
         order = np.argsort(design, kind="stable")
-        some, first = np.unique(design[order], return_index=True)
+        some, first_of = np.unique(design[order], return_index=True)
         if len(some):
-            found[:, some] = np.minimum.reduceat(values[:, order], first, axis=1)
+            known = np.where(np.isnan(values), np.inf, values)[:, order]
+            found[:, some] = np.minimum.reduceat(known, first_of, axis=1)
         return found
-
-    def _unwrap(self) -> None:
-        """Angles without jumps along each design's line, from its first pose on."""
-        order = np.lexsort((self.position, self.row // self.each))
-        start = np.append(True, np.diff(self.row[order] // self.each) != 0)
-        heads = np.maximum.accumulate(np.where(start, np.arange(len(order)), 0))
-        for k in np.flatnonzero(self.turning):
-            values = self.values[k][order]
-            steps = np.append(0.0, np.diff(values))
-            turns = np.cumsum(np.where(start, 0.0, np.round(np.nan_to_num(-steps / (2 * np.pi)))))
-            self.values[k][order] = values + 2 * np.pi * (turns - turns[heads])

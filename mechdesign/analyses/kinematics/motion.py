@@ -4,25 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.jacobians import determinant, homogeneous, inverse_condition, jacobian, mixes
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.targets import Error, needed
-from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns
+from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, study_poses
 from mechdesign.mechanism import Mechanism, Reason
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.jacobians import Jacobian, mixes
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Poses, Study
-from mechdesign.study.sections import KinematicsSection
+from mechdesign.study.schema.kinematics import KinematicsSection
+
+# A place this near to a pose or to zero, as a part of the sweep, is there.
+AT_POSE = 1e-12
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
@@ -44,7 +49,7 @@ def characteristic_length(study: Study) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class MotionQuestion:
     """What a study asks of every pose.
 
     Parameters
@@ -79,7 +84,7 @@ class Asked:
         return [self.study.mechanism.coordinate(name) for name in self.study.mechanism.drives]
 
 
-def asked(study: Study) -> Asked:
+def motion_question(study: Study) -> MotionQuestion:
     """Read a study's questions about its motion.
 
     Raises
@@ -90,14 +95,14 @@ def asked(study: Study) -> Asked:
         If no poses are given and none can be assumed.
     """
     section = study.kinematics or KinematicsSection()
-    mechanism, poses = study.mechanism, study.poses("kinematics")
+    mechanism, poses = study.mechanism, study_poses(study, "kinematics")
     listed = expand_outputs(study, section.outputs or default_outputs(mechanism))
     shown = {output.name: output for output in listed}
     for target in study.targets.values():
         shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
     names = dict.fromkeys([*mechanism.drives, *shown, *needed(study, poses)])
     watched = {name: mechanism.coordinate(name) for name in names}
-    return Asked(
+    return MotionQuestion(
         study,
         section,
         poses,
@@ -123,11 +128,16 @@ class Motion:
         Poses at a change point whose values are those of the motion that goes through it.
     """
 
-    asked: Asked
+    question: MotionQuestion
     arrays: dict[str, Floats] = field(default_factory=dict)
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
     smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    @cached_property
+    def given(self) -> dict[str, Floats]:
+        """Values of the coordinates that the poses give."""
+        return self.question.poses.values
 
     @property
     def valid(self) -> Flags:
@@ -137,17 +147,17 @@ class Motion:
     def put(self, name: str, rows: Ints, values: object) -> None:
         """Set some rows of a column."""
         if name not in self.arrays:
-            self.arrays[name] = np.full(self.asked.poses.count, np.nan)
+            self.arrays[name] = np.full(self.question.poses.count, np.nan)
         self.arrays[name][rows] = np.broadcast_to(np.asarray(values, dtype=float), rows.shape)
 
     def fill(self, solved: SolvedPoses) -> None:
         """Take up poses that give the same coordinates."""
-        study, rows, configuration = self.asked.study, solved.rows, solved.configuration
+        study, rows, configuration = self.question.study, solved.rows, solved.configuration
         self.reason[rows] = configuration.reason
-        for coordinate in self.asked.watched:
+        for coordinate in self.question.watched:
             if coordinate.name in solved.given:
                 # As the study gives it, not there and back through radians; also where the pose fails.
-                self.put(coordinate.name, rows, self.asked.poses.values[coordinate.name][rows])
+                self.put(coordinate.name, rows, self.given[coordinate.name][rows])
             else:
                 self.put(coordinate.name, rows, in_study_units(study, coordinate, configuration.value(coordinate)))
         linear = study.mechanism.linearize(configuration)
@@ -155,57 +165,59 @@ class Motion:
         conditioning = np.where(assembled, regularity(linear), np.nan)
         self.put("conditioning", rows, conditioning)
         regular = conditioning >= STALLED
-        section = self.asked.section
+        section = self.question.section
         if section.rates or section.accelerations or section.speed:
             self._rates(linear, solved, regular)
-        if self.asked.square or self.asked.section.loads:
+        if self.question.square or self.question.section.loads:
             self._statics(linear, rows, regular)
 
     def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> None:
-        drives = drive_rates(self.asked.study, self.asked.section, self.asked.poses, solved, linear)
+        drives = drive_rates(self.question.study, self.question.section, self.question.poses, solved, linear)
         velocity = linear.velocity(drives.velocities)
         acceleration = linear.acceleration(velocity, drives.accelerations)
         configuration = linear.configuration
-        found = {o.name: o for o in [*(self.asked.drives if self.asked.of_given else []), *self.asked.outputs]}
+        found = {o.name: o for o in [*(self.question.drives if self.question.of_given else []), *self.question.outputs]}
         for output in found.values():
             for order, value in (
                 ("velocity", first(configuration, output, velocity)),
                 ("acceleration", second(configuration, output, velocity, acceleration)),
             ):
-                value = np.where(regular, in_study_units(self.asked.study, output, value), np.nan)
+                value = np.where(regular, in_study_units(self.question.study, output, value), np.nan)
                 self.put(f"{output.name}_{order}", solved.rows, value)
 
     def _statics(self, linear: Linearization, rows: Ints, regular: Flags) -> None:
-        mechanism, configuration = self.asked.study.mechanism, linear.configuration
-        rates, drives = linear.drives(), self.asked.drives
-        if self.asked.square:
-            matrix = np.where(regular[:, None, None], jacobian(linear, rates, self.asked.listed), np.nan)
-            for i, output in enumerate(self.asked.listed):
-                for j, drive in enumerate(drives):
-                    self.put(entry(output, drive), rows, matrix[:, i, j])
-            self.put("det_J", rows, determinant(matrix))
-            if mixes(self.asked.listed, drives):
-                length = characteristic_length(self.asked.study)
-                matrix = homogeneous(matrix, self.asked.listed, drives, np.nan if length is None else length)
-            self.put("inverse_condition", rows, inverse_condition(matrix))
-        if self.asked.section.loads:
-            work = np.zeros((len(drives), *configuration.shape))
-            for load in self.asked.section.loads:
-                if load.at is not None and load.force is not None:
-                    for axis, force in zip("xy", load.force, strict=True):
-                        work = work + force * first(configuration, mechanism.coordinate(f"{load.at}.{axis}"), rates)
-                if load.link is not None and load.moment is not None:
-                    work = work + load.moment * first(configuration, mechanism.coordinate(f"{load.link}.angle"), rates)
-            for drive, effort in zip(drives, work, strict=True):
-                self.put(f"{drive.name}_effort", rows, np.where(regular, -effort, np.nan))
+        study, listed, drives = self.question.study, self.question.listed, self.question.drives
+
+        def put(name: str, values: Value) -> None:
+            self.put(name, rows, np.where(regular, values, np.nan))
+
+        if self.question.square:
+            length = characteristic_length(study)
+            arc = (np.nan if length is None else length) if mixes(listed, drives) else None
+            jacobian = Jacobian.of(linear, listed, arc)
+            for output, line in zip(listed, jacobian.entries, strict=True):
+                for drive, value in zip(drives, line, strict=True):
+                    put(entry(output, drive), value)
+            put("det_J", jacobian.determinant)
+            put("inverse_condition", jacobian.inverse_condition)
+        work: dict[str, float] = {}
+        for load in self.question.section.loads:
+            if load.at is not None and load.force is not None:
+                work |= {f"{load.at}.{axis}": work.get(f"{load.at}.{axis}", 0.0) + force
+                         for axis, force in zip("xy", load.force, strict=True)}  # fmt: skip
+            if load.link is not None and load.moment is not None:
+                work[f"{load.link}.angle"] = work.get(f"{load.link}.angle", 0.0) + load.moment
+        moved = Jacobian.of(linear, [study.mechanism.coordinate(name) for name in work]).entries
+        for k, drive in enumerate(drives if work else ()):
+            put(f"{drive.name}_effort", -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True)))
 
     def columns(self) -> list[Column]:
         """The columns of the motion table, `valid` last."""
-        asked, arrays, label = self.asked, self.arrays, self.asked.study.units.label
-        shown = {output.name: output for output in asked.outputs}
-        drives = {drive.name: drive for drive in asked.drives}
+        question, arrays, label = self.question, self.arrays, self.question.study.units.label
+        shown = {output.name: output for output in question.outputs}
+        drives = {drive.name: drive for drive in question.drives}
         columns = [column for column in self.pose_columns() if column.name in drives or column.name not in shown]
-        for name, output in ((drives if asked.of_given else {}) | shown).items():
+        for name, output in ((drives if question.of_given else {}) | shown).items():
             if name not in drives:
                 columns.append(Column(name, arrays[name], label(output.quantity), f"value of {name}"))
             for order in ("velocity", "acceleration"):
@@ -223,7 +235,7 @@ class Motion:
         ):  # fmt: skip
             if name in arrays:
                 columns.append(Column(name, arrays[name], "", meaning))
-        for drive in asked.drives:
+        for drive in question.drives:
             name = f"{drive.name}_effort"
             if name in arrays:
                 unit = label("moment" if drive.quantity == "angle" else "force")
@@ -233,19 +245,37 @@ class Motion:
 
     def pose_columns(self) -> list[Column]:
         """The drives, and the coordinates that the study gives."""
-        asked, units = self.asked, self.asked.study.units
-        columns = [Column(c.name, self.arrays[c.name], units.label(c.quantity), "drive") for c in asked.drives]
+        question, units = self.question, self.question.study.units
+        columns = [Column(c.name, self.arrays[c.name], units.label(c.quantity), "drive") for c in question.drives]
         named = {column.name for column in columns}
-        for column in pose_columns(asked.study, asked.poses):
+        for column in pose_columns(question.study, question.poses):
             if column.name not in named:
                 columns.append(replace(column, values=self.arrays.get(column.name, column.values)))
         return columns
 
     def _error(self, error: Error) -> Column:
-        study = self.asked.study
+        study = self.question.study
         far = error.output in study.mechanism.points
         meaning = f"distance of {error.output} from its target" if far else f"{error.output} less its target"
         return Column(error.name, error.values, study.units.label(error.quantity), meaning)
+
+
+def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> Floats:
+    """Places on a sweep in the study's unit; those at a pose as the study gives it, not there and back through radians.
+
+    Parameters
+    ----------
+    places : ndarray
+        In the core's units.
+    positions : ndarray
+        Where they are along the sweep, in rows.
+    """
+    (group,), study = motion.question.poses.groups, motion.question.study
+    given = group.values[swept]
+    values = in_study_units(study, study.mechanism.coordinate(swept), places)
+    beside, near = given[np.round(positions).astype(int)], AT_POSE * np.ptp(given)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(beside - values) <= near, beside, np.where(np.abs(values) <= near, 0.0, values))
 
 
 _RATES: Mapping[tuple[Quantity, str], str] = {

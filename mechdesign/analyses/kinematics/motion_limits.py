@@ -2,47 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.boundaries import Boundary, ChangePoint, boundaries
-from mechdesign.analyses.kinematics.margins import Margins
+from mechdesign.analyses.kinematics.lines import thinned
+from mechdesign.analyses.kinematics.motion import Motion, as_given
 from mechdesign.analyses.poses import in_study_units, radians
-from mechdesign.mechanism import Reason
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.margins import SweepMargins
 from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
-from mechdesign.study.poses import PoseGroup
 
-# A place this near to a pose or to zero, as a part of the sweep, is there.
-AT_POSE = 1e-12
 # A change point this near to zero, as a part of the sweep, is there.
 SMALL = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """The table of limits and what is to be said beside it; the sweep, and its ends for what else is sought on it."""
+    """The table of limits and what is to be said beside it, and the ends of the motion."""
 
     table: Table
     warnings: list[str]
-    margins: Margins
     ends: list[Boundary]
 
 
-def motion_limits(
-    study: Study,
-    group: PoseGroup,
-    swept: str,
-    reason: NDArray[np.int8],
-    outputs: Sequence[Coordinate],
-    arrays: Mapping[str, Floats],
-) -> Limits:
+def motion_limits(motion: Motion, swept: str) -> Limits:
     """Every value of the swept coordinate at which the motion ends, with the pose there, and change points as warnings.
 
     `kind` is ``dead centre`` (a group of links is stretched or folded), ``singularity`` (links that are solved
@@ -52,63 +40,37 @@ def motion_limits(
     Parameters
     ----------
     swept : str
-        The one coordinate of the group that moves.
-    reason : int8 array
-        See `mechdesign.mechanism.Reason`, over all poses.
-    outputs : sequence of Coordinate
-        Whose values at the limits are told.
-    arrays : mapping of str to ndarray, shape (poses,)
-        Their values over all poses, in the study's units.
+        The one coordinate that moves.
     """
+    study, outputs = motion.question.study, motion.question.outputs
+    (group,) = motion.question.poses.groups
     mechanism = study.mechanism
     angles = angles_of([*outputs, *mechanism.counting])
-    near = {name: radians(study, c, arrays[name][group.rows]) for name, c in angles.items()}
-    margins = Margins(study, group, swept, near)
-    ends, changes = boundaries(margins, reason[group.rows] == Reason.OK)
+    rows = np.flatnonzero(thinned(motion, swept))
+    near = {name: radians(study, c, motion.arrays[name][rows]) for name, c in angles.items()}
+    given = {name: radians(study, mechanism.coordinate(name), group.values[name][rows]) for name in group.names}
+    margins = SweepMargins(mechanism, given, swept, near)
+    found, changes = boundaries(margins, motion.valid[rows])
+    ends = [replace(end, position=float(np.interp(end.position, np.arange(len(rows)), rows))) for end in found]
     unit = study.units.label(mechanism.quantity(swept))
-    places = as_given(study, margins, group.values[swept], [end.place for end in ends], [end.row for end in ends])
+    places = as_given(motion, swept, np.array([e.place for e in ends]), np.array([e.position for e in ends]))
     columns = [
-        Column(swept, np.array(places, dtype=float), unit, "value at the limit of motion"),
+        Column(swept, places, unit, "value at the limit of motion"),
         Column("kind", np.array([end.cause.kind for end in ends], dtype=str), "", "what ends the motion"),
         Column("joint", np.array([end.cause.joint for end in ends], dtype=str), "", "where"),
     ]
     columns += [
         Column(
-            output.name,
-            _values(study, output, ends),
-            study.units.label(output.quantity),
-            f"{output.name} at the limit",
+            output.name, _values(study, output, ends), study.units.label(output.quantity), f"{output.name} at the limit"
         )
         for output in outputs
         if output.name != swept
     ]
     table = Table("limits", tuple(columns), "limits of motion found along the sweep")
-    follows = mechanism.description.branch == "follow"
-    warnings = _hidden(swept, unit, places, ends, margins, reason[group.rows] == Reason.OK)
-    if not follows:
+    warnings = _hidden(swept, unit, places, ends, motion.valid)
+    if mechanism.description.branch != "follow":
         warnings += _warnings(study, margins, swept, changes)
-    return Limits(table, warnings, margins, ends)
-
-
-def as_given(
-    study: Study, margins: Margins, given: Floats, places: Sequence[float], rows: Sequence[int]
-) -> list[float]:
-    """Places on a sweep in the study's unit; those at a pose as the study gives it, not there and back through radians.
-
-    Parameters
-    ----------
-    given : ndarray, shape (poses,)
-        The sweep in the study's unit.
-    rows : sequence of int
-        A pose beside each place, or the first of the two.
-    """
-    found = []
-    for place, row in zip(places, rows, strict=True):
-        value = float(in_study_units(study, margins.coordinate, place))
-        beside = given[max(row - 1, 0) : row + 2]
-        at = beside[np.abs(beside - value) <= AT_POSE * np.ptp(given)]
-        found.append(float(at[0]) if len(at) else 0.0 if abs(value) <= AT_POSE * np.ptp(given) else value)
-    return found
+    return Limits(table, warnings, ends)
 
 
 def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> Floats:
@@ -118,15 +80,12 @@ def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> Floats:
     return np.array(found, dtype=float)
 
 
-def _hidden(
-    swept: str, unit: str, places: list[float], ends: list[Boundary], margins: Margins, valid: Flags
-) -> list[str]:
+def _hidden(swept: str, unit: str, places: Floats, ends: list[Boundary], valid: Flags) -> list[str]:
     """A warning where the motion ends between neighbouring poses that are both valid: their rows do not tell."""
-    steps = [int(end.position) for end in ends]
     hidden = [
         f"{swept} = {place:.6g} {unit}".rstrip()
-        for place, step, end in zip(places, steps, ends, strict=True)
-        if step + 1 < len(valid) and end.position > step and valid[step] and valid[step + 1]
+        for place, end in zip(places.tolist(), ends, strict=True)
+        if end.position % 1 > 0 and valid[int(end.position)] and valid[int(end.position) + 1]
     ]
     if not hidden:
         return []
@@ -134,7 +93,7 @@ def _hidden(
     return [f"the motion ends between poses that are both valid, at {', '.join(hidden[:4])}{more}: see the limits"]
 
 
-def _warnings(study: Study, margins: Margins, swept: str, changes: list[ChangePoint]) -> list[str]:
+def _warnings(study: Study, margins: SweepMargins, swept: str, changes: list[ChangePoint]) -> list[str]:
     unit = study.units.label(study.mechanism.quantity(swept))
     places: dict[str, dict[str, None]] = {}
     for change in sorted(changes, key=lambda change: change.place):

@@ -1,23 +1,24 @@
-"""Smallest and largest values of functions along a line of poses: at its limits, and where their slopes are zero."""
+"""Where functions along a line of poses turn back or are zero, and their smallest values."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.lines import Line
+from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.minima import lowest
 from mechdesign.numerics.roots import bracketed_roots
 
-# Value and slope of a function from the values and slopes of a line's leaves, shape (leaves, n).
-Curve = Callable[[Floats, Floats], tuple[Floats, Floats]]
+# Which segments are of interest: of a sign, the functions times it at both ends, of shape (functions, 2, segments), and
+# how far each may fall below both.
+Wanted = Callable[[int, Floats, Floats], Flags]
 # Values of functions, shape (functions, n), beside poses of a line with the swept coordinate elsewhere.
 Along = Callable[[Ints, Floats], Floats]
 
-# How far from its place an extreme may be found, as a part of its segment.
+# How far from its place an extreme or a zero may be found, as a part of its segment.
 PRECISION = 1e-13
 # A range below this part of a function's size is rounding.
 STILL = 1e-12
@@ -26,10 +27,38 @@ LOOKS = np.array([0.25, 0.5, 0.75])
 
 
 @dataclass(frozen=True, eq=False)
-class Peak:
-    """The smallest value of each function over each design's line, between its poses of the sweep.
+class Places:
+    """Places on a line: function, the poses of the line on both sides, swept coordinate, and value there.
 
-    Arrays have the shape (functions, designs); values are nan where there is nothing but poses of the sweep.
+    `sign` is 1 where the function is smallest beside the place, -1 where it is largest, 0 where it is zero.
+    """
+
+    function: Ints
+    node: Ints
+    other: Ints
+    place: Floats
+    value: Floats
+    sign: Ints
+
+    def take(self, index: Ints | Flags) -> Places:
+        """Some of them."""
+        return Places(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
+
+    @staticmethod
+    def joined(*parts: Places) -> Places:
+        """All of several."""
+        return Places(*(np.concatenate([getattr(p, name) for p in parts]) for name in Places.__dataclass_fields__))
+
+    def position(self, line: PoseLine) -> Floats:
+        """Place along the sweep in rows."""
+        begin, span = line.place[self.node], line.place[self.other] - line.place[self.node]
+        part = np.where(span != 0, (self.place - begin) / np.where(span != 0, span, 1.0), 0.0)
+        return np.asarray(line.position[self.node] + part * (line.position[self.other] - line.position[self.node]))
+
+
+@dataclass(frozen=True, eq=False)
+class Peak:
+    """The smallest value of each function over each design's line; of shape (functions, designs), nan where none is.
 
     Parameters
     ----------
@@ -46,112 +75,114 @@ class Peak:
     position: Floats
     node: Ints
 
-    def better(
-        self, value: Floats, row: Ints, still: Floats, moving: Flags
-    ) -> Flags:  # fmt: skip
-        """Where it is smaller than at the best pose of the sweep, or is that pose's extreme but beside it.
 
-        Parameters
-        ----------
-        value, row : ndarray, shape (functions, designs)
-            Smallest value over the poses of the sweep, and the pose.
-        still : ndarray
-            What is rounding.
-        moving : bool array
-            Whether the function moves between the poses of the sweep.
-        """
-        away = np.abs(self.position - row)
-        with np.errstate(invalid="ignore"):
-            beside = (np.abs(self.value - value) <= still) & (away < 1) & (away > 1e-9)
-            return np.isfinite(self.value) & ((self.value < value - still) | (moving & beside))
-
-
-def peaks(
-    line: Line, curves: Sequence[Curve], still: Floats, told: Sequence[Curve] | None = None
-) -> list[Peak]:  # fmt: skip
-    """Smallest values of curves, and of them times -1, where a slope is zero or the motion ends.
+def turns(line: PoseLine, rows: Ints, wanted: Wanted) -> Places:
+    """Places between the poses of a line at which slopes of functions (rows of its values) change their sign.
 
     A segment cannot hold a value below both its ends by more than half its length times its largest slope: links
-    hardly turn within it. Those that may hold the smallest of all are divided where their slope does not change evenly,
-    so that it might be zero twice: by its parabola, in the middle by a quarter of its larger end.
+    hardly turn within it. Wanted segments are divided where their slope does not change evenly, so that it might be
+    zero twice: by its parabola, in the middle by a quarter of its larger end.
+    """
+    some: list[Flags] = []
+    for looks in (LOOKS, None):
+        values, slopes = (table[rows][:, np.stack([line.begin, line.end])] for table in (line.values, line.slopes))
+        slopes = slopes * (line.place[line.end] - line.place[line.begin])
+        steep = np.fmax(np.abs(slopes[:, 0]), np.abs(slopes[:, 1]))
+        drop = np.nan_to_num(steep) / 2
+        some = [wanted(sign, sign * values, drop) for sign in (1, -1)]
+        if looks is not None:
+            with np.errstate(invalid="ignore"):
+                bent = ~(6 * np.abs(values[:, 1] - values[:, 0] - slopes.mean(axis=1)) <= steep)
+            line.divide(np.flatnonzero(((some[0] | some[1]) & bent).any(axis=0)), looks)
+    which, function, segment = np.nonzero([
+        flags & (sign * slopes[:, 0] < 0) & (sign * slopes[:, 1] > 0) for sign, flags in zip((1, -1), some, strict=True)
+    ])  # fmt: skip
+    begin, end, sign = line.begin[segment], line.end[segment], 1 - 2 * which
+    slopes = line.slopes[rows]
+    place = _roots(
+        lambda lane, x: line.sample(begin[lane], x)[1][rows[function[lane]], np.arange(len(lane))],
+        (line.place[begin], line.place[end]), (slopes[function, begin], slopes[function, end]),
+    )  # fmt: skip
+    value = line.sample(begin, place)[0][rows[function], np.arange(len(place))]
+    known = np.isfinite(value)
+    return Places(function, begin, end, place, value, sign).take(known)
+
+
+def _roots(
+    evaluate: Callable[[Ints, Floats], Floats], at: tuple[Floats, Floats], ends: tuple[Floats, Floats]
+) -> Floats:
+    """Roots between places `at`, with values `ends` of opposite signs there."""
+    rising = np.where(ends[0] > 0, -1.0, 1.0)
+    none = np.full(len(rising), np.nan)
+    return bracketed_roots(
+        lambda lane, x: rising[lane] * evaluate(lane, x),
+        at[0], rising * ends[0], at[1], rising * ends[1], none, none, PRECISION * np.abs(at[1] - at[0]),
+    )  # fmt: skip
+
+
+def zeros(line: PoseLine, rows: Ints, at_pose: float, touching: float) -> Places:
+    """Places along a line at which functions are zero.
 
     Parameters
     ----------
-    still : ndarray, shape (curves, designs)
-        What is rounding.
-    told : sequence of callable, optional
-        Rising functions of the curves whose values are wanted instead; then those of the sweep's own poses too.
+    at_pose : float
+        What is zero at a pose of the line.
+    touching : float
+        What is zero where a function does not cross it: at a limit of motion, and where it turns back.
     """
-    signs = (1, -1)
-    for looks in (LOOKS, None):
-        values, slopes = _curves(curves, line.values, line.slopes)
-        length = line.place[line.end] - line.place[line.begin]
-        design = line.row[line.begin] // line.each
-        one, other = slopes[:, line.begin] * length, slopes[:, line.end] * length
-        drop = np.nan_to_num(np.fmax(np.abs(one), np.abs(other)), nan=0.0) / 2
-        likely = []
-        for sign in signs:
-            best = line.least(sign * values)[:, design]
-            least = np.fmin(sign * values[:, line.begin], sign * values[:, line.end]) - drop
-            likely.append(least < best)
-        rise = values[:, line.end] - values[:, line.begin]
-        with np.errstate(invalid="ignore"):
-            bent = ~(6 * np.abs(rise - (one + other) / 2) <= np.fmax(np.abs(one), np.abs(other)))
-        if looks is not None and len(design):
-            line.divide(np.flatnonzero((np.logical_or.reduce(likely) & bent).any(axis=0)), looks)
-    which, curve, segment = np.nonzero([
-        some & (sign * one < 0) & (sign * other > 0) for sign, some in zip(signs, likely, strict=True)
-    ])  # fmt: skip
-    times = np.array(signs)[which]
+    turned = turns(line, rows, lambda _, values, drop: (values >= 0).all(axis=1) & (values.min(axis=1) <= drop))
+    values = line.values[rows]
+    within = np.full(len(line.row), at_pose)
+    within[line.limits] = touching
+    function, node = np.nonzero(np.abs(values) <= within)
+    at_nodes = Places(function, node, node, line.place[node], values[function, node], 0 * node)
+    touched, beyond = turned.take(np.abs(turned.value) <= touching), turned.take(turned.sign * turned.value < 0)
+    # Changes of sign: between the ends of segments, and between where a function turns back beyond zero and both ends.
+    one, two = values[:, line.begin], values[:, line.end]
+    function, segment = np.nonzero(((one >= 0) != (two >= 0)) & np.isfinite(one) & np.isfinite(two))
+    function = np.concatenate([function, beyond.function, beyond.function])
+    begin = np.concatenate([line.begin[segment], beyond.node, beyond.node])
+    end = np.concatenate([line.end[segment], beyond.other, beyond.other])
+    low, high = line.place[begin], line.place[end]
+    at_low, at_high = values[function, begin], values[function, end]
+    first, second = slice(len(segment), len(segment) + len(beyond.node)), slice(len(function) - len(beyond.node), None)
+    low[second] = high[first] = beyond.place
+    at_low[second] = at_high[first] = beyond.value
 
-    def at(which: Sequence[Curve], lane: Ints, x: Floats) -> tuple[Floats, Floats]:
-        return _at(line, which, curve[lane], line.begin[segment[lane]], x)
+    def value(lane: Ints, x: Floats) -> Floats:
+        found: Floats = line.sample(begin[lane], x)[0][rows[function[lane]], np.arange(len(lane))]
+        return found
 
-    low, high = line.place[line.begin[segment]], line.place[line.end[segment]]
-    none = np.full(len(segment), np.nan)
-    # Along the sweep, whichever way it goes.
-    ahead = times * np.sign(high - low)
-    place = bracketed_roots(
-        lambda lane, x: ahead[lane] * at(curves, lane, x)[1],
-        low, times * one[curve, segment], high, times * other[curve, segment], none, none,
-        PRECISION * np.abs(high - low),
-    )  # fmt: skip
-    value = times * at(told or curves, np.arange(len(segment)), place)[0]
-    first = line.position[line.begin[segment]]
-    position = first + (place - low) / (high - low) * (line.position[line.end[segment]] - first)
-    if told is not None:
-        values, _ = _curves(told, line.values, line.slopes)
-    found = []
-    for k, this in enumerate(signs):
-        mine = np.flatnonzero((which == k) & np.isfinite(value))
-        here, node = _best_poses(line, this * values, still, told is not None)
-        found.append(_first_smallest(
-            line, still,
-            np.concatenate([here, curve[mine]]),
-            np.concatenate([node, line.begin[segment[mine]]]),
-            np.concatenate([this * values[here, node], value[mine]]),
-            np.concatenate([line.place[node], place[mine]]),
-            np.concatenate([line.position[node], position[mine]]),
-        ))  # fmt: skip
-    return found
+    place = _roots(value, (low, high), (at_low, at_high))
+    found = value(np.arange(len(function)), place)
+    crossed = Places(function, begin, end, place, found, 0 * begin)
+    # What jumps from side to side is not zero between.
+    return Places.joined(at_nodes, crossed.take(np.abs(found) <= touching), touched)
 
 
-def _best_poses(line: Line, values: Floats, still: Floats, rows: bool) -> tuple[Ints, Ints]:
-    """Function and pose where a pose of the line is the best; those of the sweep itself only if `rows`."""
-    design = line.row // line.each
-    with np.errstate(invalid="ignore"):
-        best = values <= (line.least(values) + still)[:, design]
-    if not rows:
-        best &= line.position != np.round(line.position)
-    if line.followed:
-        sharp = ~np.isnan(line.slopes).all(axis=0)
-        sharp[line.limits] = True
-        best &= sharp
-    function, node = np.nonzero(best)
-    return function, node
+def peaks(line: PoseLine, rows: Ints, still: Floats, *, all_poses: bool = False) -> tuple[Peak, Peak]:
+    """Smallest values of functions (rows of the line's values), and of them times -1.
+
+    Parameters
+    ----------
+    still : ndarray, shape (functions, designs)
+        What is rounding.
+    all_poses : bool
+        Whether those at the sweep's own poses are wanted, too.
+    """
+
+    def likely(sign: int, values: Floats, drop: Floats) -> Flags:
+        best = line.least(sign * line.values[rows])[:, line.row[line.begin] // line.each]
+        return np.asarray(np.fmin(values[:, 0], values[:, 1]) - drop < best)
+
+    turned = turns(line, rows, likely)
+    return tuple(  # type: ignore[return-value]
+        _best(line, still, sign, sign * line.values[rows], turned.take(turned.sign == sign), all_poses)
+        for sign in (1, -1)
+    )
 
 
-def searched(line: Line, along: Along, table: Floats, still: Floats) -> Peak:
+def searched(line: PoseLine, along: Along, table: Floats, still: Floats) -> Peak:
     """Smallest values of functions without slopes, by golden section beside the poses that are below their neighbours.
 
     Parameters
@@ -177,61 +208,44 @@ def searched(line: Line, along: Along, table: Floats, still: Floats) -> Peak:
     at = np.stack([line.place[before[node]], line.place[node], line.place[after[node]]])
     low, high = at.min(axis=0), at.max(axis=0)
     place, least = lowest(value, low, high) if len(node) else (low, low)
-    least = np.where(np.isfinite(least), least, np.nan)
     # Which of the two segments beside the pose it lies in.
     ahead = (place - line.place[node]) * (line.place[after[node]] - line.place[node]) > 0
-    side = np.where(ahead, after[node], before[node])
-    span = line.place[side] - line.place[node]
-    part = np.where(span != 0, (place - line.place[node]) / np.where(span != 0, span, 1.0), 0.0)
-    position = line.position[node] + part * (line.position[side] - line.position[node])
-    here, inner = _best_poses(line, table, still, False)
-    good = np.isfinite(least)
-    return _first_smallest(
-        line, still,
-        np.concatenate([here, function[good]]),
-        np.concatenate([inner, node[good]]),
-        np.concatenate([table[here, inner], least[good]]),
-        np.concatenate([line.place[inner], place[good]]),
-        np.concatenate([line.position[inner], position[good]]),
-    )  # fmt: skip
+    found = Places(function, node, np.where(ahead, after[node], before[node]), place, least, np.ones_like(node))
+    return _best(line, still, 1, table, found.take(np.isfinite(least)), False)
 
 
-def _curves(curves: Sequence[Curve], values: Floats, slopes: Floats) -> tuple[Floats, Floats]:
-    found = [curve(values, slopes) for curve in curves]
-    shape = (len(curves), values.shape[1])
-    return (
-        np.array([np.broadcast_to(value, shape[1]) for value, _ in found]).reshape(shape),
-        np.array([np.broadcast_to(slope, shape[1]) for _, slope in found]).reshape(shape),
-    )
+def _best(line: PoseLine, still: Floats, sign: int, values: Floats, between: Places, all_poses: bool) -> Peak:
+    """Of a line's poses and of places between them, the first along the sweep of the smallest but for rounding.
 
-
-def _at(line: Line, curves: Sequence[Curve], which: Ints, node: Ints, place: Floats) -> tuple[Floats, Floats]:
-    """Value and slope of curve `which` of each lane at `place`, beside a pose of the line."""
-    values, slopes, _ = line.sample(line.row[node], place)
-    values = line.near(values, node)
-    value, slope = np.empty(len(which)), np.empty(len(which))
-    for k in np.unique(which):
-        mine = which == k
-        value[mine], slope[mine] = curves[k](values[:, mine], slopes[:, mine])
-    return value, slope
-
-
-def _first_smallest(
-    line: Line, still: Floats, function: Ints, node: Ints, value: Floats, place: Floats, position: Floats
-) -> Peak:  # fmt: skip
-    """Of many candidates, the first along the sweep of those that are the smallest but for rounding."""
-    shape = still.shape
-    lane = function * shape[1] + line.row[node] // line.each
+    Parameters
+    ----------
+    values : ndarray, shape (functions, n)
+        Of the poses, times the sign.
+    """
+    candidates = np.isfinite(values)
+    if not all_poses:
+        candidates &= line.position != np.round(line.position)
+    if line.followed:
+        sharp = line.sharp()
+        sharp[line.limits] = True
+        candidates &= sharp
+    with np.errstate(invalid="ignore"):
+        candidates &= values <= (line.least(values) + still)[:, line.row // line.each]
+    function, node = np.nonzero(candidates)
+    function, node = np.concatenate([function, between.function]), np.concatenate([node, between.node])
+    count = len(node) - len(between.node)
+    table = np.stack([
+        np.concatenate([values[function[:count], node[:count]], sign * between.value]),
+        np.concatenate([line.place[node[:count]], between.place]),
+        np.concatenate([line.position[node[:count]], between.position(line)]),
+    ])  # fmt: skip
+    lane = function * still.shape[1] + line.row[node] // line.each
     least = np.full(still.size, np.inf)
-    np.minimum.at(least, lane, np.where(np.isnan(value), np.inf, value))
-    tie = np.flatnonzero(value <= (least + still.ravel())[lane])
-    tie = tie[np.lexsort((position[tie], lane[tie]))]
+    np.minimum.at(least, lane, table[0])
+    tie = np.flatnonzero(table[0] <= (least + still.ravel())[lane])
+    tie = tie[np.lexsort((table[2, tie], lane[tie]))]
     lanes, chosen = np.unique(lane[tie], return_index=True)
-    best = tie[chosen]
-    found = [np.full(still.size, np.nan) for _ in range(3)]
-    nodes = np.zeros(still.size, dtype=np.intp)
-    for table, column in zip(found, (value, place, position), strict=True):
-        table[lanes] = column[best]
-    nodes[lanes] = node[best]
-    best_value, best_place, best_position = (table.reshape(shape) for table in found)
-    return Peak(best_value, best_place, best_position, nodes.reshape(shape))
+    found, nodes = np.full((3, still.size), np.nan), np.zeros(still.size, dtype=np.intp)
+    found[:, lanes], nodes[lanes] = table[:, tie[chosen]], node[tie[chosen]]
+    value, place, position = found.reshape(3, *still.shape)
+    return Peak(value, place, position, nodes.reshape(still.shape))

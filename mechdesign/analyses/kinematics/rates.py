@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.jacobians import determinant, jacobian
 from mechdesign.analyses.poses import SolvedPoses, radians
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
+from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.reliability_models import ReliabilitySection
-from mechdesign.study.sections import KinematicsSection
+from mechdesign.study.schema.kinematics import KinematicsSection
+from mechdesign.study.schema.reliability import ReliabilitySection
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,25 +104,18 @@ def drive_velocities(
     return _solve(*_inverted(mechanism, linear, given), velocities)
 
 
-def _inverted(
-    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]
-) -> tuple[Floats, Flags]:  # fmt: skip
-    """J of the given coordinates, and where it is regular."""
-    matrix = jacobian(linear, linear.drives(), given)
-    drives = [mechanism.coordinate(name) for name in mechanism.drives]
-    return matrix, _solvable(matrix, given, drives, mechanism.size)
+def _inverted(mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]) -> tuple[Floats, Flags]:
+    """J of the given coordinates, and where it is regular.
 
-
-def _solvable(
-    matrix: Floats, given: Sequence[Coordinate], drives: Sequence[Coordinate], size: float
-) -> Flags:  # fmt: skip
-    """Whether J is regular: its determinant over the lengths of its rows (at least 1), all without units."""
+    It is so by its determinant over the lengths of its rows (at least 1), all without units.
+    """
+    matrix, size = Jacobian.of(linear, given).matrix, mechanism.size
     rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
-    columns = np.array([size if c.quantity == "length" else 1.0 for c in drives])
+    columns = np.array([size if mechanism.quantity(name) == "length" else 1.0 for name in mechanism.drives])
     pure = matrix * rows[:, None] * columns
     lengths = np.maximum(np.sqrt(np.einsum("...ij,...ij->...i", pure, pure)), 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
-        return np.asarray(np.abs(determinant(pure / lengths[..., None])) >= STALLED)
+        return matrix, np.abs(np.linalg.det(np.nan_to_num(pure / lengths[..., None]))) >= STALLED
 
 
 def _solve(matrix: Floats, good: Flags, right: Sequence[Value]) -> list[Floats]:

@@ -15,7 +15,7 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.targets import Target, timing
+from mechdesign.study.schema.targets import Target, timing
 
 # Distances between poses and pieces of a path that are held at once.
 BLOCK = 1 << 20

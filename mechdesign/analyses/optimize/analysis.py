@@ -16,7 +16,7 @@ from mechdesign.analyses.optimize.judging import CHUNK, Batch, Designs, Judge
 from mechdesign.analyses.optimize.sensitivity import active_bounds, neighbours, sensitivity_table
 from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
 from mechdesign.analyses.workspace.analysis import index_meanings
-from mechdesign.analyses.workspace.region import GRID_TOLERANCE, questions
+from mechdesign.analyses.workspace.question import GRID_TOLERANCE, questions
 from mechdesign.errors import AssemblyError, Interrupted, StudyError
 from mechdesign.journal import Journal
 from mechdesign.numerics.arrays import Floats

@@ -13,8 +13,9 @@ from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.assembling import assembly_margins, shortfall
 from mechdesign.analyses.optimize.objectives import Goal, bounds_of, goal, goals_of
-from mechdesign.analyses.poses import solve_poses
-from mechdesign.analyses.workspace.region import BRISK, GRID_TOLERANCE, Question, answer, questions, split
+from mechdesign.analyses.poses import solve_poses, study_poses
+from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, questions, split
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -107,7 +108,7 @@ class Evaluator:
         # By command of which every pose must be valid: the columns of its assembly margins.
         self._clear: dict[str, slice] = {}
         for command, tables in self._together.items() if most_rows else ():
-            poses = study.poses(command)
+            poses = study_poses(study, command)
             if poses.listed or any(table not in SOME for table in tables):
                 begin = self.assembly_margins
                 self.assembly_margins += assembly_margins(study, poses).shape[1]
@@ -225,7 +226,7 @@ class Evaluator:
                 self._workspaces(batch, half)
 
     def _regional(self, batch: _Batch, rows: Ints, question: Question, places: dict[str, Floats]) -> None:
-        given = answer(question, places, len(rows), BRISK)
+        given = answer(question, places, len(rows), BATCH)
         for each in self.goals:
             if each.regional:
                 batch.values[each][rows] = given.values[each.column]
@@ -311,7 +312,7 @@ class Evaluator:
     def _reason(self, batch: _Batch, k: int, study: Study, command: str) -> str:
         """Why poses of one design fail, and by how much; empty where none does."""
         if self._graded and command != "workspace":
-            (batch.shortfall[k],) = shortfall(assembly_margins(study, study.poses(command)))
+            (batch.shortfall[k],) = shortfall(assembly_margins(study, study_poses(study, command)))
         return _pose_reason(study, command)
 
 
@@ -374,7 +375,7 @@ def _pose_reason(study: Study, command: str) -> str:
     """Why poses of a command fail; empty where none does, or where it is not asked of poses."""
     if command == "workspace":
         return EMPTY
-    found = [solved.configuration.reason for solved in solve_poses(study, study.poses(command))]
+    found = [solved.configuration.reason for solved in solve_poses(study, study_poses(study, command))]
     return FAILED[int(_first(np.concatenate(found)[None])[0])]
 
 

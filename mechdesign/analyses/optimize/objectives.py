@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.region import COLUMNS, batched, split
+from mechdesign.analyses.workspace.question import COLUMNS, batched, split
 from mechdesign.commands import COMMANDS
 from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
-from mechdesign.study.optimize_models import Condition, OptimizeSection
+from mechdesign.study.schema.optimize import Condition, OptimizeSection
 
 
 @dataclass(frozen=True)

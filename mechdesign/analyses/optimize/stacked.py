@@ -11,20 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.analyses.kinematics import analysis as kinematics
-from mechdesign.analyses.kinematics.motion import Motion, asked
+from mechdesign.analyses.kinematics.motion import Motion, motion_question
 from mechdesign.analyses.kinematics.moving import move
-from mechdesign.analyses.kinematics.transmission import transmission_table
 from mechdesign.analyses.optimize.assembling import assembly_margins
-from mechdesign.analyses.poses import SolvedPoses
+from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
-from mechdesign.expressions import Expression
-from mechdesign.linearity import is_linear
+from mechdesign.expressions import Expression, is_linear
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
-from mechdesign.study.units import QUANTITY
+from mechdesign.study.text.units import QUANTITY
 from mechdesign.study.variants import follows, places_of
 
 Formulas = Mapping[tuple[int, str], Expression]
@@ -90,7 +88,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
         return False
     if any(s is not None and s.at_nodes for s in (getattr(study, command), study.kinematics)):
         return False  # The nodes follow each design's own boundary.
-    if any(mechanism.plan(group.names).change_points for group in study.poses(command).groups):
+    if any(mechanism.plan(group.names).change_points for group in study_poses(study, command).groups):
         return False
     if command == "reliability":
         return _first_order(study, names)
@@ -134,7 +132,7 @@ def poses_of(
     formulas: Formulas,
 ) -> Poses:  # fmt: skip
     """Poses of a command for designs whose places and parameters have the given values, of shape (designs,)."""
-    one = study.poses(command)
+    one = study_poses(study, command)
     poses = stacked(one, designs, places, parameters)
     values: Mapping[str, Any] = {**study.parameters.nominal, **parameters}
     for group in poses.groups if formulas else ():
@@ -175,7 +173,7 @@ def _poses_from_limits(study: Study, command: str) -> bool:
 
 def size(study: Study, command: str) -> int:
     """Number of designs that are solved together."""
-    return max(1, BLOCK // study.poses(command).count)
+    return max(1, BLOCK // study_poses(study, command).count)
 
 
 def tables(
@@ -196,7 +194,7 @@ def tables(
     graded : bool
         Whether the assembly margins are wanted, too.
     """
-    one = study.poses(command)
+    one = study_poses(study, command)
     poses = poses_of(study, command, designs, places, parameters, formulas or {})
     torn = np.zeros(designs, dtype=bool)
     solved: list[SolvedPoses] = []
@@ -220,7 +218,7 @@ def _motion(
     also: Callable[[SolvedPoses], object] | None,
 ) -> tuple[dict[str, Table], NDArray[np.int8], Flags]:  # fmt: skip
     """Tables, reasons, and the designs whose motion ends where no limit is known."""
-    question = dataclasses.replace(asked(study), poses=poses)
+    question = dataclasses.replace(motion_question(study), poses=poses)
     motion = move(question, also=also)
     made = {name: make for name, make in _OF_MOTION.items() if name in wanted}
     if not motion.errors:
@@ -228,13 +226,5 @@ def _motion(
     if not question.square:
         made.pop("jacobian", None)
     found = {name: make(motion) for name, make in made.items()}
-    torn = np.zeros(poses.designs, dtype=bool)
-    if "extremes" in wanted:
-        found["extremes"], torn = kinematics.extremes_table(motion, names=outputs)
-    if "loops" in wanted:
-        failed = np.asarray(motion.reason.reshape(poses.designs, -1).any(axis=1))
-        loops = transmission_table(study, poses, kinematics.swept_of(poses), ~failed)
-        if loops is not None:
-            found["loops"], more = loops
-            torn = torn | more
-    return found, motion.reason, torn
+    between, torn = kinematics.tables_between(motion, (), wanted, outputs)
+    return found | between, motion.reason, torn

@@ -25,11 +25,11 @@ from mechdesign.analyses.reliability.tolerances import retold, tolerances
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
-from mechdesign.study.document import Document, Mark
 from mechdesign.study.loading import load_document
 from mechdesign.study.poses import Poses
-from mechdesign.study.reliability_models import Precision
 from mechdesign.study.rewriting import rewritten
+from mechdesign.study.schema.reliability import Precision
+from mechdesign.study.text.document import Document, Mark
 
 # How often a target is corrected, and the failures that the study's own samples must show to confirm one.
 _ROUNDS = 5

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.rates import drive_rates
-from mechdesign.analyses.poses import SolvedPoses, in_study_units, judge_failures, solve_poses
+from mechdesign.analyses.poses import SolvedPoses, in_study_units, judge_failures, solve_poses, study_poses
 from mechdesign.analyses.reliability import sobol, tables
 from mechdesign.analyses.reliability.allocation import Allocated, allocate
 from mechdesign.analyses.reliability.answer import Answer
@@ -75,7 +75,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     section = study.reliability
     assert section is not None
     question = ask(study, section)
-    poses = study.poses("reliability")
+    poses = study_poses(study, "reliability")
     nominal, elastic, doubts = loaded(study, NominalPoses.solve(study, poses, question), question)
     warnings += [*doubts, *unsaid(study, question)]
     failures, failed = judge_failures(study, poses, nominal.reason)
@@ -192,7 +192,8 @@ class NominalPoses:
             found = nominal_values(study.mechanism, configuration, question.channels, rates)
             for row, value in zip(values, found, strict=True):
                 row[solved.rows] = value
-            drives = np.stack([np.broadcast_to(d, configuration.shape) for d in solved.drives], axis=-1)
+            each = [configuration.value(study.mechanism.coordinate(name)) for name in study.mechanism.drives]
+            drives = np.stack([np.broadcast_to(value, configuration.shape) for value in each], axis=-1)
             forward = set(solved.given) == set(study.mechanism.drives)
             groups.append((solved.rows, configuration, drives, forward, rates))
         return NominalPoses(reason, tuple(groups), values)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.reliability.error_limits import Channel
-from mechdesign.analyses.stiffness.analysis import Asked
+from mechdesign.analyses.stiffness.analysis import Body
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
@@ -22,7 +22,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.rates import Rates
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.reliability_models import LOADS
+from mechdesign.study.schema.reliability import LOADS
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class Elasticity:
     """
 
     mechanism: Mechanism
-    asked: Asked
+    asked: Body
     load: Floats
     nodes: Mapping[int, str]
     bodies: Mapping[str, str]

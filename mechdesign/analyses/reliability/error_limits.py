@@ -8,7 +8,7 @@ import numpy as np
 
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.reliability_models import SUFFIXES
+from mechdesign.study.schema.reliability import SUFFIXES
 
 
 @dataclass(frozen=True)

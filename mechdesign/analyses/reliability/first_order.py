@@ -17,7 +17,7 @@ from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.study.reliability_models import LOADS
+from mechdesign.study.schema.reliability import LOADS
 
 ORDERS = ("position", "velocity", "acceleration")
 

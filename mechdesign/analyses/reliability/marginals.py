@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.reliability_models import Spread
+from mechdesign.study.schema.reliability import Spread
 
 # A tolerance is three standard deviations of a normal law, which `truncated_normal` is cut at [S2, eq. 5].
 SIGMAS = 3.0

@@ -16,9 +16,9 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.study import Study
-from mechdesign.study.lists import as_list
-from mechdesign.study.pin_links import others
-from mechdesign.study.reliability_models import ReliabilitySection, split_order
+from mechdesign.study.schema.reliability import ReliabilitySection, split_order
+from mechdesign.study.schema.reliability_checks import others
+from mechdesign.study.text import fields
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
 def unsaid(study: Study, question: Question) -> list[str]:
     """A sentence for each output whose pin has a clearance, where the study does not say which link's point it is."""
     section: dict[str, Any] = study.resolved["reliability"]
-    names = [*as_list(section.get("outputs")), *(section.get("limits") or {})]
+    names = [*fields.as_list(section.get("outputs")), *(section.get("limits") or {})]
     sentences = []
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         node = study.mechanism.graph.node(point)

@@ -30,7 +30,7 @@ from mechdesign.parallel import map_chunks
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.reliability_models import SAMPLING, ReliabilitySection
+from mechdesign.study.schema.reliability import SAMPLING, ReliabilitySection
 
 REPLICATES = 16
 # Mechanisms solved a pose, and poses, where the study does not say how many points.

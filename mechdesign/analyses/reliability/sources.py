@@ -16,7 +16,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
-from mechdesign.study.reliability_models import LOADS, Clearance
+from mechdesign.study.schema.reliability import LOADS, Clearance
 
 # Of all that varies, in radians or in sizes of the mechanism; of loads.
 MOST, HEAVY = 1e6, 1e100

@@ -12,7 +12,7 @@ from mechdesign.analyses.reliability.simulation import Setting, Sums
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import Progress
-from mechdesign.study.reliability_models import Precision
+from mechdesign.study.schema.reliability import Precision
 
 # Samples that `auto` draws at most where the study says nothing, and its precision.
 MOST, RELATIVE = 2_000_000, 0.05

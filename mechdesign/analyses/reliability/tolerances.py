@@ -14,8 +14,8 @@ from mechdesign.analyses.reliability.marginals import Lognormal, Marginal, Norma
 from mechdesign.analyses.reliability.sources import Scalar, Sources
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
-from mechdesign.study.document import plain
-from mechdesign.study.reliability_models import Clearance, Cost, Dimension
+from mechdesign.study.schema.reliability import Clearance, Cost, Dimension
+from mechdesign.study.text.document import plain
 
 # Digits that allocated numbers are written with, rounded down: what is tighter keeps what was asked.
 DIGITS = 6

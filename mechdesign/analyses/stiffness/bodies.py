@@ -7,13 +7,13 @@ of them the ground or the asked body, a massless body to which each is hinged.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description, Drive, Fixed, Prismatic
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
 ASKED = ":asked"
 _PIN = "pin:"
@@ -53,10 +53,6 @@ class Contact:
     def at(self, body: str) -> str:
         """The point at which it sits on a body."""
         return self.mount if self.mount is not None and body == self.a else self.point
-
-    def through(self, pin: str, onward: Contact) -> Contact:
-        """The hinge between the two bodies that this contact and `onward` join to a massless pin."""
-        return replace(self, a=self.other(pin), b=onward.other(pin), give=self.give + onward.give)
 
 
 @dataclass(frozen=True)

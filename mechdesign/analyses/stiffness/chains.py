@@ -7,12 +7,13 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from mechdesign.analyses.stiffness.beams import Course, course_of
-from mechdesign.analyses.stiffness.legs import Beam, Bearing, Element, Guide, Leg, Shift
+from mechdesign.analyses.stiffness.elements import Beam, Bearing, Element, Guide, Shift
+from mechdesign.analyses.stiffness.legs import Leg
 from mechdesign.analyses.stiffness.screws import Chain, hinge_twist, slide_twist
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.study.stiffness_models import Profile, StiffnessSection
+from mechdesign.study.schema.stiffness import Profile, StiffnessSection
 
 # A point this many times as far from the joints as they lie apart is far away.
 FAR = 10.0

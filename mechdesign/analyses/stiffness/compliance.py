@@ -1,23 +1,18 @@
-"""Stiffness and compliance of a body on serial legs, from their reciprocal wrenches.
+"""How a body is held; and its stiffness on serial legs that bear as many wrenches as it has freedoms.
 
-With W the wrenches of all legs and C_c their compliances (block diagonal), the body's twist X under a wrench w solves
-
-    [[0, W], [W^T, -C_c]] [X; lambda] = [w; 0],
-
-which needs no inverse of C_c: rigid directions are zeros in it. Where W is square and regular (a body held by exactly
-as many wrenches as it has freedoms) the solution is lambda = W^-1 w, X = W^-T C_c lambda, in closed form. Everything
-else (over- or under-constrained, nearly singular) goes through singular values: first what rigid legs leave free, then
-the system on that space. [S4, eqs. 17-22]
+With W the wrenches of all legs and C_c their compliances (block diagonal), a wrench w on the body gives the legs
+lambda = W^-1 w and the body the twist W^-T C_c lambda: no inverse of C_c is needed, rigid directions are zeros in it.
+[S4, eqs. 17-22]
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.screws import RANK, RIGID, screw_product
+from mechdesign.analyses.stiffness.screws import RIGID, screw_product
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Wrenches of unit size with a determinant above this are solved in closed form, the others by singular values.
@@ -48,6 +43,23 @@ class Held:
     free: Floats
     margin: Floats
 
+    @staticmethod
+    def unknown(n: int, size: int) -> Held:
+        """Room for n poses: of rank 0, all else nan."""
+        matrix = (n, size, size)
+        return Held(
+            np.full(matrix, np.nan),
+            np.full(matrix, np.nan),
+            np.zeros(n, dtype=np.intp),
+            np.full((n, size), np.nan),
+            np.full(n, np.inf),
+        )
+
+    def put(self, rows: Ints, part: Held) -> None:
+        """Fill in some poses."""
+        self.stiffness[rows], self.compliance[rows], self.rank[rows] = part.stiffness, part.compliance, part.rank
+        self.free[rows], self.margin[rows] = part.free, part.margin
+
     def seen_from(self, arm: Complexes) -> Held:
         """The same body asked at points that are `arm` (n,) away; a pin is asked where it is.
 
@@ -71,40 +83,25 @@ def moved_to(arm: Complexes) -> Floats:
     return found
 
 
-def hold(wrenches: Sequence[Floats], compliances: Sequence[Floats], length: float, size: int = 3) -> Held:
-    """Stiffness and compliance from the wrenches (3, m, n) and compliances (m, m, n) of all legs.
+def by_wrenches(
+    wrenches: Sequence[Floats], compliances: Sequence[Floats], length: float, size: int = 3
+) -> tuple[Floats, Floats, Flags]:
+    """Stiffness and compliance, shape (n, size, size), where as many wrenches as needed hold the body, and where so.
 
     Parameters
     ----------
+    wrenches, compliances : sequence of ndarray, shape (3, m, n) and (m, m, n)
+        Of all legs.
     length : float
         Moments are divided by it wherever sizes are compared.
     size : int
         3 for a body; 2 for a pin, on which no leg exerts a moment.
     """
-    n = wrenches[0].shape[2]
     scale = np.array([1.0, 1.0, 1.0 / length])[:size]
-    legs = [w[:size] * scale[:, None, None] for w in wrenches]
-    full = np.concatenate(legs, axis=1)
-    stiffness = np.full((n, size, size), np.nan)
-    compliance = np.full((n, size, size), np.nan)
-    rank = np.full(n, size, dtype=np.intp)
-    free = np.full((n, size), np.nan)
-    margin = np.full(n, np.inf)
-    regular = np.zeros(n, dtype=bool)
-    if full.shape[1] == size:
-        inverse, regular = _inverse(full)
-        compliance[:] = _exact(inverse, compliances)
-        stiffness[:] = _sum_of_legs(legs, compliances)
-    rest = np.flatnonzero(~regular)
-    if len(rest):
-        found = _general([leg[:, :, rest] for leg in legs], [c[:, :, rest] for c in compliances], size)
-        stiffness[rest], compliance[rest], rank[rest], margin[rest] = found[:3] + found[4:]
-        free[rest] = found[3] * scale
-        if size == 3:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                free = np.where(free[:, 2:] != 0, free / free[:, 2:], free)
     outer = np.outer(scale, scale)
-    return Held(stiffness / outer, compliance * outer, rank, free, margin)
+    legs = [w[:size] * scale[:, None, None] for w in wrenches]
+    inverse, regular = _inverse(np.concatenate(legs, axis=1))
+    return _sum_of_legs(legs, compliances) / outer, _exact(inverse, compliances) * outer, regular
 
 
 def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
@@ -189,78 +186,3 @@ def _inverse_of_three(block: Floats) -> Floats:
     with np.errstate(divide="ignore"):
         inverse = np.where(values > RIGID * values[:, -1:], 1 / values, np.nan)
     return np.moveaxis(np.einsum("nij,nj,nkj->nik", vectors, inverse, vectors), 0, 2)
-
-
-def _general(legs: Sequence[Floats], compliances: Sequence[Floats], size: int) -> tuple[Floats, ...]:
-    """Stiffness, compliance, rank, free twist and margin by singular values, in scaled coordinates."""
-    n = legs[0].shape[2]
-    wrenches, values = _independent(legs, compliances)
-    left, singular, _ = np.linalg.svd(wrenches)
-    singular = np.concatenate([singular, np.zeros((n, max(0, size - singular.shape[1])))], axis=1)
-    rank = (singular > RANK * np.maximum(singular[:, :1], RANK)).sum(axis=1)
-    free = np.where(np.abs(left[:, :, -1]) > RANK, left[:, :, -1], 0.0)
-    free[rank == size] = np.nan
-    rigid = values <= 0
-    stiffness = np.full((n, size, size), np.nan)
-    soft = ~rigid.any(axis=1)
-    stiffness[soft] = np.einsum("nai,ni,nbi->nab", wrenches[soft], 1 / values[soft], wrenches[soft])
-    compliance = np.full((n, size, size), np.nan)
-    for rows in _alike(rigid, np.flatnonzero(rank == size)):
-        fixed = rigid[rows[0]]
-        compliance[rows] = _compliance(
-            wrenches[rows][:, :, fixed], wrenches[rows][:, :, ~fixed], values[rows][:, ~fixed]
-        )
-    return stiffness, compliance, rank, free, singular[:, size - 1]
-
-
-def _independent(legs: Sequence[Floats], compliances: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Wrenches (n, size, M) of unit length on which C_c is diagonal, and its diagonal (n, M), zero where rigid."""
-    wrenches, values = [], []
-    for leg, block in zip(legs, compliances, strict=True):
-        unit = 1 / np.linalg.norm(leg, axis=0)
-        value, vectors = np.linalg.eigh(np.moveaxis(block * unit[:, None] * unit[None], 2, 0))
-        wrench = np.moveaxis(leg * unit, 2, 0) @ vectors
-        norm = np.linalg.norm(wrench, axis=1)
-        rigid = value <= RIGID * value[:, -1:]
-        wrenches.append(wrench / norm[:, None])
-        values.append(np.where(rigid, 0.0, value / norm**2))
-    return np.concatenate(wrenches, axis=2), np.concatenate(values, axis=1)
-
-
-def _alike(pattern: Flags, rows: Ints) -> Iterator[Ints]:
-    """Rows of equal patterns together."""
-    if len(rows):
-        _, which = np.unique(pattern[rows], axis=0, return_inverse=True)
-        for k in range(which.max() + 1):
-            yield rows[which.reshape(-1) == k]
-
-
-def _compliance(fixed: Floats, elastic: Floats, values: Floats) -> Floats:
-    """Compliance where `fixed` wrenches are rigid and `elastic` ones have compliances `values` > 0."""
-    n, size, _ = fixed.shape
-    left, singular, _ = (
-        np.linalg.svd(fixed) if fixed.shape[2] else (np.tile(np.eye(size), (n, 1, 1)), np.zeros((n, 0)), 0)
-    )
-    lost = (singular > RANK).sum(axis=1)
-    result = np.zeros((n, size, size))
-    for count in np.unique(lost):
-        rows = np.flatnonzero(lost == count)
-        if count == size:
-            continue
-        moves = left[rows][:, :, count:]
-        result[rows] = moves @ _saddle(moves.swapaxes(1, 2) @ elastic[rows], values[rows]) @ moves.swapaxes(1, 2)
-    return result
-
-
-def _saddle(wrenches: Floats, values: Floats) -> Floats:
-    """X of [[0, W], [W^T, -C_c]] [X; lambda] = [w; 0] for unit wrenches w, where W has full rank and C_c is regular."""
-    n, size, count = wrenches.shape
-    largest = values.max(axis=1)
-    matrix = np.zeros((n, size + count, size + count))
-    matrix[:, :size, size:] = wrenches
-    matrix[:, size:, :size] = wrenches.swapaxes(1, 2)
-    matrix[:, np.arange(size, size + count), np.arange(size, size + count)] = -values / largest[:, None]
-    right = np.zeros((size + count, size))
-    right[:size] = np.eye(size)
-    solution = np.linalg.solve(matrix, np.broadcast_to(right, (n, *right.shape)))[:, :size]
-    return np.asarray((solution + solution.swapaxes(1, 2)) / 2 * largest[:, None, None])

@@ -28,10 +28,12 @@ from mechdesign.analyses.stiffness.screws import RANK, RIGID
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
-# Of states of self-stress, those with less than this share of the largest compliance are rounding: rigid.
+# Of states of self-stress, those with less than this share of the largest one's energy are rounding: rigid.
 SELF_STRESS = 1e-13
+# All of them are rounding below this share (squared rounding) of the energy that wrenches of the loops could store.
+STORED = 1e-26
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +294,8 @@ def _least_energy(statics: _Statics, loops: Floats, way: Floats, compliance: Flo
     weighted = statics.stress @ loops
     energy = (weighted * compliance[:, None]) @ weighted.swapaxes(1, 2)
     values, vectors = np.linalg.eigh((energy + energy.swapaxes(1, 2)) / 2)
-    kept = values > SELF_STRESS * values[:, -1:]
+    most = STORED * ((loops**2).sum(axis=1) * compliance).max(axis=1, initial=0.0)
+    kept = values > np.maximum(SELF_STRESS * values[:, -1:], most[:, None])
     inverse = (vectors * np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
     more = statics.stress @ inverse @ (weighted @ (compliance[:, :, None] * bears))
     return bears - loops.swapaxes(1, 2) @ more, stress + more

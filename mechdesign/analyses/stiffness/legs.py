@@ -1,68 +1,19 @@
-"""From links and joints to serial-chain legs: what carries a wrench from the asked body to the ground.
+"""The serial chains that a body stands on, found in the network of what carries it.
 
-Bodies are the vertices of a graph and joints its edges. Taking away the ground and the asked body leaves one piece a
-leg; a leg is serial if its piece, without its dangling ends, is a plain path. No names of mechanisms occur: what is not
-such a path is told as such.
+Taking away the ground and the asked body leaves one piece a leg; a leg is serial if its piece is a plain path.
 
 [S4, section 2]
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from mechdesign.analyses.stiffness.beams import Beams, beams_of
-from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.mechanism.graph import GROUND, rod_of
-from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.study.stiffness_models import StiffnessSection
-
-
-@dataclass(frozen=True)
-class Hinge:
-    """A revolute joint at a point; driven if `drive` names a drive."""
-
-    point: str
-    drive: str | None = None
-
-
-@dataclass(frozen=True)
-class Guide:
-    """A slide of the mechanism's graph (its index); driven if `drive` names a drive."""
-
-    slide: int
-    drive: str | None = None
-
-
-@dataclass(frozen=True)
-class Beam:
-    """The beams of an elastic link between the feet of two points; see `mechdesign.analyses.stiffness.beams`."""
-
-    beams: Beams
-    tail: str
-    head: str
-    section: str
-
-
-@dataclass(frozen=True)
-class Shift:
-    """A free displacement along a direction of the world: between links that only a motor holds to each other."""
-
-    direction: complex
-
-
-@dataclass(frozen=True)
-class Bearing:
-    """The give of a joint itself, so many times; across its slide, or in all directions of a pin."""
-
-    name: str
-    point: str
-    slide: int | None = None
-    give: float = 1.0
-
-
-Element = Hinge | Guide | Beam | Shift | Bearing
+from mechdesign.analyses.stiffness.bodies import Bodies
+from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, Shift
+from mechdesign.analyses.stiffness.network import Edge
+from mechdesign.mechanism.graph import GROUND
 
 
 @dataclass(frozen=True)
@@ -73,10 +24,6 @@ class Leg:
     ----------
     name : str
         Its links, from the base, joined by ``+``; that of its joint where it has none.
-    links : tuple of str
-        Links in the chain.
-    drives : tuple of str
-        Drives at its joints.
     base, tip : str
         Points of its first and last joint.
     elements : tuple
@@ -84,181 +31,76 @@ class Leg:
     """
 
     name: str
-    links: tuple[str, ...]
-    drives: tuple[str, ...]
     base: str
     tip: str
     elements: tuple[Element, ...]
 
 
-class NotSerialError(Exception):
-    """The body does not stand on serial chains; says why."""
-
-
-def find_legs(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> tuple[Leg, ...]:
-    """Find the legs that carry a body, by structure alone.
+def find_legs(edges: Sequence[Edge], bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
+    """The legs that carry a body, in the order of their links; None where they are not serial chains.
 
     Parameters
     ----------
-    link : str or None
-        The asked link; None for the pin `at` itself.
-    at : str
-        The asked point.
-    section : StiffnessSection
-        What is elastic.
-
-    Raises
-    ------
-    NotSerialError
-        Where the legs are not serial chains.
+    edges : sequence of Edge
+        Those that carry.
+    links : sequence of str
+        All links, in the study's order.
     """
-    description = mechanism.description
-    bodies = build_bodies(mechanism, link, at, section)
-    builder = _LegBuilder(mechanism, bodies, section)
-    legs = [builder.build(path) for path in _paths(bodies)]
-    order = {name: k for k, name in enumerate(description.links)}
-    legs.sort(key=lambda leg: min((order[name] for name in leg.links), default=len(order)))
-    return tuple(legs)
-
-
-def _paths(bodies: Bodies) -> Iterator[tuple[list[str], list[Contact]]]:
-    """Per leg, bodies from the ground to the asked body and the contacts between them."""
-    target = bodies.asked
-    contacts = bodies.contacts
-    for contact in contacts:
-        if {contact.a, contact.b} == {GROUND, target}:
-            _no_motor([contact])
-            yield [GROUND, target], [contact]
-    seen: set[str] = set()
-    for root in bodies.names:
-        if root in seen or root in (GROUND, target):
+    found: list[tuple[int, Leg]] = []
+    for piece in _pieces(edges, bodies.asked):
+        ends = {end for edge in piece for end in (edge.a, edge.b)}
+        if not {GROUND, bodies.asked} <= ends:
             continue
-        piece = _piece(root, contacts, target)
-        seen |= piece
-        mine = [c for c in contacts if c.a in piece or c.b in piece]
-        mine = _without_dangling(mine, target)
-        ends = {end for c in mine for end in (c.a, c.b)}
-        if not {GROUND, target} <= ends:
-            continue
-        _no_motor(mine)
-        yield _as_path(mine, target, bodies)
+        path = _path(piece, bodies.asked)
+        if path is None or any(isinstance(element, Shift) for edge in piece for element in edge.elements):
+            return None
+        names = [name for end in path[1:-1] if (name := bodies.link_of(end.split("@")[0]))]
+        first = min(map(links.index, names), default=len(links))
+        name = "+".join(dict.fromkeys(names)) or piece[0].name
+        found.append((first, Leg(name, piece[0].point, piece[-1].point, tuple(_elements(piece, path, bodies)))))
+    return tuple(leg for _, leg in sorted(found, key=lambda each: each[0]))
 
 
-def _no_motor(contacts: Iterable[Contact]) -> None:
-    for contact in contacts:
-        if contact.kind == "motor":
-            raise NotSerialError(f"drive '{contact.drive}' holds an angle between links that no joint of a leg joins")
+def _pieces(edges: Sequence[Edge], asked: str) -> Iterator[list[Edge]]:
+    """Edges that hang together otherwise than through the ground or the asked body."""
+    left = list(edges)
+    while left:
+        piece, reached = [left.pop(0)], set[str]()
+        while True:
+            reached |= {end for edge in piece for end in (edge.a, edge.b)} - {GROUND, asked}
+            more = [edge for edge in left if edge.a in reached or edge.b in reached]
+            if not more:
+                break
+            piece += more
+            left = [edge for edge in left if edge not in more]
+        yield piece
 
 
-def _piece(root: str, contacts: Sequence[Contact], target: str) -> set[str]:
-    """Bodies joined to `root` otherwise than through the ground or the asked body."""
-    piece, stack = {root}, [root]
-    while stack:
-        body = stack.pop()
-        for contact in contacts:
-            if body in (contact.a, contact.b):
-                other = contact.other(body)
-                if other not in piece and other not in (GROUND, target):
-                    piece.add(other)
-                    stack.append(other)
-    return piece
-
-
-def _without_dangling(contacts: list[Contact], target: str) -> list[Contact]:
-    """Contacts that can carry a wrench: bodies held in one place only are taken off, again and again."""
-    while True:
-        degree: dict[str, int] = {}
-        for contact in contacts:
-            for end in (contact.a, contact.b):
-                degree[end] = degree.get(end, 0) + 1
-        loose = {body for body, count in degree.items() if count == 1 and body not in (GROUND, target)}
-        if not loose:
-            return contacts
-        contacts = [c for c in contacts if c.a not in loose and c.b not in loose]
-
-
-def _as_path(contacts: list[Contact], target: str, bodies: Bodies) -> tuple[list[str], list[Contact]]:
-    path, used = [GROUND], list[Contact]()
-    while path[-1] != target:
-        onward = [c for c in contacts if path[-1] in (c.a, c.b) and c not in used]
+def _path(piece: list[Edge], asked: str) -> list[str] | None:
+    """Vertices from the ground to the asked body, the edges put in their order; None where they are no plain path."""
+    path, left = [GROUND], list(piece)
+    piece.clear()
+    while path[-1] != asked:
+        onward = [edge for edge in left if path[-1] in (edge.a, edge.b)]
         if len(onward) != 1:
-            break
-        used.append(onward[0])
-        path.append(onward[0].other(path[-1]))
-    if path[-1] != target or len(used) != len(contacts):
-        links = sorted({bodies.link_of(end) for c in contacts for end in (c.a, c.b)} - {GROUND, ""})
-        what = f"link '{bodies.link}'" if bodies.link else f"pin '{bodies.at}'"
-        raise NotSerialError(
-            f"links {', '.join(links)} between the ground and {what} branch or form a loop, so they are no serial chain"
-        )
-    return path, used
+            return None
+        piece += onward
+        left.remove(onward[0])
+        path.append(onward[0].b if onward[0].a == path[-1] else onward[0].a)
+    return None if left else path
 
 
-@dataclass(frozen=True)
-class _LegBuilder:
-    mechanism: Mechanism
-    bodies: Bodies
-    section: StiffnessSection
-
-    def build(self, path: tuple[list[str], list[Contact]]) -> Leg:
-        names, contacts = self._without_pins(*path)
-        drives = [contact.drive for contact in contacts]
-        elements: list[Element] = []
-        for k, contact in enumerate(contacts):
-            if k:
-                elements += self._beams(names[k], contacts[k - 1], contact)
-            elements += joint_elements(self.mechanism, contact, self.section)
-        links = tuple(dict.fromkeys(filter(None, map(self.bodies.link_of, names[1:]))))
-        if names[-1] != ASKED:
-            links = tuple(link for link in links if link != self.bodies.link)
-        slide = contacts[0].slide
-        joint = contacts[0].point if slide is None else self.mechanism.graph.slides[slide]
-        return Leg(
-            "+".join(links) or joint, links, tuple(filter(None, drives)), contacts[0].point,
-            contacts[-1].point, tuple(elements),
-        )  # fmt: skip
-
-    def _without_pins(self, names: list[str], contacts: list[Contact]) -> tuple[list[str], list[Contact]]:
-        """Join the two contacts of a compound pin, of which only two links carry, into one."""
-        kept, joints = [names[0]], [contacts[0]]
-        for k in range(1, len(names) - 1):
-            if self.bodies.is_pin(names[k]):
-                joints[-1] = joints[-1].through(names[k], contacts[k])
-            else:
-                kept.append(names[k])
-                joints.append(contacts[k])
-        return [*kept, names[-1]], joints
-
-    def _beams(self, body: str, entry: Contact, leave: Contact) -> list[Element]:
-        """Beams of one body between its two contacts; of a telescopic leg, its whole length at its second body."""
-        name = self.bodies.link_of(body)
-        section = self.section.elastic.get(name)
-        if section is None:
-            return []
-        link = self.mechanism.description.links[name]
-        if link.telescopic and link.ends is not None:
-            if body != name:
-                return []
-            own = {c.other(body) == rod_of(name): c for c in (entry, leave)}
-            if True not in own or own[False].point != link.ends[0]:
-                raise NotSerialError(f"elastic leg '{name}' is joined elsewhere than at its ends")
-            return [Beam(beams_of(link), *link.ends, section)]
-        return [Beam(beams_of(link), entry.at(body), leave.at(body), section)]
-
-
-def joint_elements(mechanism: Mechanism, contact: Contact, section: StiffnessSection) -> list[Element]:
-    """What gives at a joint: its freedom, unless a rigid drive holds it, and its bearing, that of a leg at its base."""
-    found: list[Element] = []
-    drive = contact.drive
-    if contact.kind == "clamp":
-        return found
-    if contact.kind == "motor":
-        found += [Shift(1.0 + 0j), Shift(1j)]
-    if drive is None or drive in section.actuators:
-        found.append(Hinge(contact.point, drive) if contact.slide is None else Guide(contact.slide, drive))
-    description = mechanism.description
-    name = contact.point if contact.slide is None else mechanism.graph.slides[contact.slide]
-    if name in section.bearings and contact.kind != "motor":
-        ends = description.links[name].ends if name in description.links else None
-        found.append(Bearing(name, contact.point if ends is None else ends[0], contact.slide, contact.give))
-    return found
+def _elements(edges: Sequence[Edge], path: Sequence[str], bodies: Bodies) -> Iterator[Element]:
+    """What gives along a path: of an elastic link its beams from the one joint to the other."""
+    entry: str | None = None
+    for k, (edge, vertex) in enumerate(zip(edges, path, strict=False)):
+        beam = edge.beam
+        if beam is None:
+            # The two hinges of a massless pin are one.
+            yield from (e for e in edge.elements if not (bodies.is_pin(vertex) and isinstance(e, Hinge)))
+            continue
+        tail, head = (beam.tail, beam.head) if edge.a == vertex else (beam.head, beam.tail)
+        entry = entry or tail
+        if edges[k + 1].name != edge.name or not edges[k + 1].beam:
+            yield Beam(beam.beams, entry, head, beam.section)
+            entry = None

@@ -8,7 +8,7 @@ of their own: free to shift, held in turning.
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,12 +16,12 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.analyses.stiffness.beams import beams_of
-from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact, build_bodies
-from mechdesign.analyses.stiffness.legs import Beam, Element, Hinge, joint_elements
+from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact
+from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, joint_elements
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
 Way = tuple[tuple[int, int], ...]
 
@@ -89,22 +89,21 @@ class Network:
         return found
 
 
-def build_network(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> Network:
-    """The network of a mechanism; parts that carry nothing have no edges and go along with what they hang on.
-
-    Parameters
-    ----------
-    link : str or None
-        The asked link; None for the pin `at` itself.
-    section : StiffnessSection
-        What is elastic.
-    """
-    bodies = build_bodies(mechanism, link, at, section)
+def build_network(mechanism: Mechanism, bodies: Bodies, section: StiffnessSection) -> Network:
+    """The network of a mechanism; parts that carry nothing have no edges and go along with what they hang on."""
     builder = _Builder(mechanism, bodies, section)
     edges = builder.edges()
-    carrying = _pinned(_carrying(edges, bodies.asked), bodies)
-    network = _looped(tuple(carrying), bodies.asked, builder.points())
+    kept = _carrying(edges, bodies.asked)
+    # Along beams that carry, the way to a place where nothing is borne stays: what is bent before it moves it.
+    bent = {edge.name for edge in kept if edge.beam}
+    kept = [edge for edge in edges if edge in kept or (edge.beam and edge.name in bent)]
+    network = _looped(tuple(_pinned(kept, bodies)), bodies.asked, builder.points())
     return replace(network, paths=_with_idle(edges, network.paths))
+
+
+def carrying_edges(mechanism: Mechanism, bodies: Bodies, section: StiffnessSection) -> list[Edge]:
+    """Joints and beams that can carry a load from the asked body."""
+    return _carrying(_Builder(mechanism, bodies, section).edges(), bodies.asked)
 
 
 @dataclass(frozen=True)
@@ -183,21 +182,13 @@ class _Builder:
 
 
 def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
-    """Edges that can carry a load from the asked vertex: what hangs by one edge is taken off, again and again.
-
-    Along beams that carry, the way to a place where nothing is borne stays: what is bent before it moves it.
-    """
-    kept = edges
+    """Edges that can carry a load from the asked vertex: what hangs by one edge is taken off, again and again."""
     while True:
-        degree: dict[str, int] = {}
-        for edge in kept:
-            for end in (edge.a, edge.b):
-                degree[end] = degree.get(end, 0) + 1
+        degree = Counter(end for edge in edges for end in (edge.a, edge.b))
         loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, asked)}
         if not loose:
-            bent = {edge.name for edge in kept if edge.beam}
-            return [edge for edge in edges if edge in kept or (edge.beam and edge.name in bent)]
-        kept = [edge for edge in kept if edge.a not in loose and edge.b not in loose]
+            return edges
+        edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
 
 
 def _pinned(edges: list[Edge], bodies: Bodies) -> list[Edge]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechdesign.analyses.stiffness.chains import chain_of, looked_at_from
-from mechdesign.analyses.stiffness.compliance import Held, hold
+from mechdesign.analyses.stiffness.compliance import Held, by_wrenches
 from mechdesign.analyses.stiffness.legs import Leg
 from mechdesign.analyses.stiffness.screws import (
     RIGID,
@@ -19,14 +19,14 @@ from mechdesign.analyses.stiffness.screws import (
 from mechdesign.analyses.stiffness.tables import Springs
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Ints
-from mechdesign.study.stiffness_models import StiffnessSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 
 
 def hold_by_legs(
     legs: Sequence[Leg], section: StiffnessSection, configuration: Configuration, length: float, size: int,
     condensed: bool,
 ) -> tuple[Held, list[Springs]]:  # fmt: skip
-    """Stiffness and springs in a batch of assembled poses of shape (n,).
+    """Springs in a batch of assembled poses of shape (n,), and how they hold the body: rank 0 where not in closed form.
 
     Parameters
     ----------
@@ -43,25 +43,24 @@ def hold_by_legs(
     origin = at if body == 2 else looked_at_from(ends, at, configuration, length)
     chains = [chain_of(leg, section, configuration, origin) for leg in legs]
     ranks = [np.broadcast_to(joint_rank(chain.passive, length), (n,)) for chain in chains]
-    if not chains:
-        return _restrict(hold([np.zeros((3, 0, n))], [np.zeros((0, 0, n))], length, body), condensed), []
     springs: list[Springs] = []
-    parts: list[tuple[Ints, Held]] = []
-    every = np.stack(ranks, axis=1)
-    for signature, rows in _signatures(every):
+    held = Held.unknown(n, body)
+    for signature, rows in _signatures(np.stack(ranks, axis=1)):
         here = chains if len(rows) == n else [chain.take(rows) for chain in chains]
         wrenches = [
             reciprocal_wrenches(chain.passive, rank, length, len(rows))
             for chain, rank in zip(here, signature, strict=True)
         ]
-        blocks = [constraint_compliance(w, chain) for w, chain in zip(wrenches, here, strict=True)]
-        parts.append((rows, hold(wrenches, blocks, length, body)))
+        if sum(w.shape[1] for w in wrenches) == body:
+            blocks = [constraint_compliance(w, chain) for w, chain in zip(wrenches, here, strict=True)]
+            held.stiffness[rows], held.compliance[rows], regular = by_wrenches(wrenches, blocks, length, body)
+            held.rank[rows] = body * regular
         for k, (w, chain) in enumerate(zip(wrenches, here, strict=True)):
             for spring in equivalent_springs(w, chain, length):
                 springs.append(
                     Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + origin[rows], spring.angle)
                 )
-    return _restrict(_join(parts, n).seen_from(at - origin), condensed), springs
+    return _restrict(held.seen_from(at - origin), condensed), springs
 
 
 def _signatures(ranks: Ints) -> list[tuple[list[int], Ints]]:
@@ -70,14 +69,6 @@ def _signatures(ranks: Ints) -> list[tuple[list[int], Ints]]:
         return [(ranks[0].tolist(), np.arange(len(ranks)))]
     kinds, which = np.unique(ranks, axis=0, return_inverse=True)
     return [(kind.tolist(), np.flatnonzero(which.reshape(-1) == k)) for k, kind in enumerate(kinds)]
-
-
-def _join(parts: Sequence[tuple[Ints, Held]], n: int) -> Held:
-    if len(parts) == 1:
-        return parts[0][1]
-    order = np.argsort(np.concatenate([rows for rows, _ in parts]))
-    names = ("stiffness", "compliance", "rank", "free", "margin")
-    return Held(*(np.concatenate([getattr(held, name) for _, held in parts])[order] for name in names))
 
 
 def _restrict(held: Held, condensed: bool) -> Held:
@@ -90,5 +81,4 @@ def _restrict(held: Held, condensed: bool) -> Held:
     with np.errstate(invalid="ignore"):
         good = determinant > RIGID * compliance[:, 0, 0] * compliance[:, 1, 1]
     stiffness[good] = np.linalg.inv(compliance[good])
-    rank = np.where(np.isfinite(determinant), 2, np.minimum(held.rank, 1))
-    return Held(stiffness, compliance, rank, held.free[:, :2], held.margin)
+    return Held(stiffness, compliance, np.minimum(held.rank, 2), held.free[:, :2], held.margin)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.analyses.poses import pose_columns
-from mechdesign.analyses.stiffness.compliance import directional, principal
+from mechdesign.analyses.stiffness.compliance import Held, directional, principal
 from mechdesign.analyses.stiffness.legs import Leg
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.results import Column, Table
@@ -42,18 +42,11 @@ def _entries(study: Study, letter: str, matrix: Floats, what: str, meaning: str)
 
 
 def stiffness_table(
-    study: Study,
-    poses: Poses,
-    stiff: Floats,
-    soft: Floats,
-    rank: Ints,
-    free: Floats,
-    valid: Flags,
-    method: str,
-    direction: float | None,
+    study: Study, poses: Poses, held: Held, valid: Flags, method: str, direction: float | None
 ) -> Table:
-    units = study.units
-    size = stiff.shape[1]
+    """``stiffness.csv``; `direction` in the study's units."""
+    units, soft = study.units, held.compliance
+    size = soft.shape[1]
     low, high, angle = principal(soft)
     with np.errstate(divide="ignore"):
         direct = [1 / soft[:, k, k] for k in range(size)]
@@ -74,17 +67,17 @@ def stiffness_table(
         columns.append(
             Column(
                 "k_direction",
-                directional(soft, direction),
+                directional(soft, direction * units.angle_factor),
                 unit,
                 "force in the asked direction over displacement along it",
             )
         )
-    columns += _entries(study, "K", stiff, "stiffness", "stiffness matrix at the asked point; nan where rigid")
-    columns.append(Column("rank", rank, "", "number of independent wrenches that hold the body"))
+    columns += _entries(study, "K", held.stiffness, "stiffness", "stiffness matrix at the asked point; nan where rigid")
+    columns.append(Column("rank", held.rank, "", "number of independent wrenches that hold the body"))
     for k, name in enumerate(("free_x", "free_y", "free_phi")[:size]):
         per = "" if k == 2 else units.label("length")
         columns.append(
-            Column(name, free[:, k], per, "the free twist, per radian where it turns; nan where none is free")
+            Column(name, held.free[:, k], per, "the free twist, per radian where it turns; nan where none is free")
         )
     columns.append(Column("valid", valid, "", "1 where the pose is assembled and within its limits"))
     columns.append(

@@ -7,24 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.workspace.curves import Patch, patches_of_pieces
-from mechdesign.analyses.workspace.degenerate import singular_everywhere, without_indices
-from mechdesign.analyses.workspace.indices import INDICES, prepare
+from mechdesign.analyses.region.curves import Patch, patches_of_pieces
+from mechdesign.analyses.region.panels import SINGLE
+from mechdesign.analyses.region.regions import RAYS
+from mechdesign.analyses.workspace.indices import INDICES, Local, prepare
 from mechdesign.analyses.workspace.indices.index import determinant_power, power_of_length
 from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
-from mechdesign.analyses.workspace.region import (
-    CLOSE,
-    COLUMNS,
-    RAYS,
-    Answer,
-    Question,
-    answer,
-    areas_of_pieces,
-    questions,
-    split,
-)
+from mechdesign.analyses.workspace.question import COLUMNS, Answer, Question, answer, areas_of_pieces, questions, split
+from mechdesign.analyses.workspace.singularities import singular_everywhere
 from mechdesign.analyses.workspace.tables import (
     PIECE,
     held_columns,
@@ -39,7 +31,7 @@ from mechdesign.errors import AssemblyError
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import Over
+from mechdesign.study.schema.workspace import Over
 from mechdesign.threads import one_thread
 
 # An error of the area beyond this part of it is told.
@@ -83,17 +75,19 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     several = False
     warnings: list[str] = []
     for question in asked:
-        if singular_everywhere(question):
+        if singular_everywhere(question.field):
             question = replace(question, field=replace(question.field, same_assembly=False))
-            given = without_indices(question, CLOSE)
+            given = answer(replace(question, indices=(), wanted=("SUI", "area", "box_area")), {}, 1, SINGLE)
+            nothing = {name: np.full(1, np.nan) for name in question.wanted}
+            given = replace(given, values=nothing | given.values, errors=nothing | given.errors)
             warnings.append(f"every pose{where(question)} is a forward singularity: indices have no value")
         else:
-            given = answer(question, {}, 1, CLOSE)
+            given = answer(question, {}, 1, SINGLE)
             warnings += _doubts(question, given)
         answers.append(given)
         if given.panels.closes[0]:
             assert given.pieces is not None
-            found = patches_of_pieces(given.pieces, question.rays or RAYS, CLOSE.samples)
+            found = patches_of_pieces(given.pieces, question.rays or RAYS, SINGLE.samples)
             local.append(_local(study, question, found))
             counted = [patch for patch in found if patch.piece == 1 or not question.field.same_assembly]
             others = [patch for patch in found if patch not in counted]
@@ -104,7 +98,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
                     f"the largest circle or rectangle inside the region{where(question)} was not found: where a limit "
                     "jumps (an angle's turn ends there) no slope leads along the boundary"
                 )
-            areas, drawn = areas_of_pieces(question, given, CLOSE), bool(given.pieces.drawn[0])
+            areas, drawn = areas_of_pieces(question, given, SINGLE), bool(given.pieces.drawn[0])
             pieces.append(piece_columns(study, question, found, areas, drawn))
             several |= len(areas) > 1
             if others:
@@ -202,7 +196,7 @@ _STATISTICS = {"mean": "mean", "min": "infimum", "max": "supremum", "std": "stan
 def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
     grids = [patch.grid(question.about) for patch in found]
     z = np.concatenate([grid.ravel() for grid in grids])
-    local = question.field.local(z, {})
+    local = Local.at(question.field, z, {})
     names = dict.fromkeys(("inverse_condition", "resistivity", *(index.name for index in question.indices)))
     node = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)) for grid in grids])
     ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
@@ -211,7 +205,7 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     determinant = np.broadcast_to(local.determinant, z.shape)
     if question.field.same_assembly:
         # It has one sign all over a patch; at a tip where no node is off the boundary rounding would choose another.
-        middle = question.field.local(np.array([patch.middle(question.about) for patch in found]), {}).determinant
+        middle = Local.at(question.field, np.array([patch.middle(question.about) for patch in found]), {}).determinant
         determinant = np.copysign(determinant, np.broadcast_to(middle, len(found))[patch])
     columns = [
         Column(index.name, np.broadcast_to(index.values(local), z.shape), index.index.unit(study, question.field),

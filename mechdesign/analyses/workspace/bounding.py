@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.analyses.workspace.panels import Panels
-from mechdesign.analyses.workspace.rays import Designs, trace
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.rays import Designs, trace
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.minima import dips
 
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9
 ROUNDING = 1e-12
-STEPS = 8
 # Directions in which the region is widest: right, left, up, down.
 _TURNS = np.array([1, -1, -1j, 1j])
 
@@ -64,32 +64,16 @@ def _best(distance: Floats, design: Ints, theta: Floats, count: int) -> tuple[Fl
 def _climb(
     designs: Designs, reach: Floats, which: Ints, low: Floats, middle: Floats, high: Floats, turn: complex, samples: int
 ) -> Floats:
-    """Largest distance between two rays, by successive parabolas; one a design."""
-    low, middle, high = low[which], middle[which], high[which]
+    """Largest distance of designs between two rays."""
 
-    def height(theta: Floats) -> Floats:
-        traced = trace(designs, which, theta, reach[which], samples, SLACK)
-        found = np.full(len(which), -np.inf)
+    def depth(lane: Ints, theta: Floats) -> Floats:
+        traced = trace(designs, which[lane], theta, reach[which[lane]], samples, SLACK)
+        found = np.full(len(lane), np.inf)
         for radius in (traced.inner, traced.outer):
             place = designs.about + radius * np.exp(1j * theta[traced.ray])
-            np.maximum.at(found, traced.ray, (place * turn).real)
+            np.minimum.at(found, traced.ray, -(place * turn).real)
         return found
 
-    at_low, at_middle, at_high = height(low), height(middle), height(high)
-    for _ in range(STEPS):
-        with np.errstate(invalid="ignore", divide="ignore"):
-            left, right = (middle - low) * (at_middle - at_high), (middle - high) * (at_middle - at_low)
-            step = -0.5 * ((middle - low) * left - (middle - high) * right) / (left - right)
-        trial = middle + step
-        usable = np.isfinite(trial) & (trial > low) & (trial < high) & (np.abs(step) > 1e-9)
-        if not usable.any():
-            break
-        trial = np.where(usable, trial, middle)
-        at_trial = np.where(usable, height(trial), at_middle)
-        better, right_of = at_trial > at_middle, trial > middle
-        low, at_low = (np.where(better & right_of, a, np.where(~better & ~right_of & usable, b, c))
-                       for a, b, c in ((middle, trial, low), (at_middle, at_trial, at_low)))  # fmt: skip
-        high, at_high = (np.where(better & ~right_of, a, np.where(~better & right_of & usable, b, c))
-                         for a, b, c in ((middle, trial, high), (at_middle, at_trial, at_high)))  # fmt: skip
-        middle, at_middle = np.where(better, trial, middle), np.where(better, at_trial, at_middle)
-    return at_middle
+    rays = np.stack([low, middle, high])[:, which]
+    depths = np.stack([depth(np.arange(len(which)), theta) for theta in rays])
+    return -dips(depth, rays, depths, np.full(len(which), -np.inf))[1]

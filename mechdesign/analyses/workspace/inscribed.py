@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.workspace.curves import Patch
-from mechdesign.analyses.workspace.field import Field
+from mechdesign.analyses.region.curves import Patch
+from mechdesign.analyses.region.field import Field
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Cells of the raster along each side, and how many of its best places are tried.

@@ -8,21 +8,21 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.region.curves import Patch, patches_of_pieces
+from mechdesign.analyses.region.panels import Effort, Panels, find_panels
+from mechdesign.analyses.region.pieces import Pieces
+from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.workspace.bounding import bounding_box
-from mechdesign.analyses.workspace.curves import Patch, patches_of_pieces
-from mechdesign.analyses.workspace.loci import causes
-from mechdesign.analyses.workspace.panels import Effort, Panels, find_panels
-from mechdesign.analyses.workspace.pieces import Pieces
 from mechdesign.analyses.workspace.quadrature import FINEST_AREA, Integral, integrate
+from mechdesign.analyses.workspace.question import Question, questions
 from mechdesign.analyses.workspace.ranged import Every, Ranged, Some, SomeDesigns
-from mechdesign.analyses.workspace.rays import Designs
-from mechdesign.analyses.workspace.region import Question, questions
+from mechdesign.analyses.workspace.singularities import causes
 from mechdesign.analyses.workspace.tables import PIECE, held_columns, left_out, piece_columns, stacked
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.progress import Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.workspace_models import Over
+from mechdesign.study.schema.workspace import Over
 
 EFFORT = Effort(48, 16, 96)
 # Rays of the table of the boundary, and the tolerance of means of which the area gets a tenth.

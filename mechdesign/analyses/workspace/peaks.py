@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.rays import Designs, trace
+from mechdesign.analyses.region.rules import cosine, cubic, spread
 from mechdesign.analyses.workspace.indices import Local, Prepared
-from mechdesign.analyses.workspace.panels import Panels
-from mechdesign.analyses.workspace.rays import Designs, trace
-from mechdesign.analyses.workspace.rules import cosine, cubic, spread
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Places in the maps stay this far from the ends: rounding leaves nothing nearer to corners, or to the boundary.
@@ -114,14 +114,14 @@ def _at_ends(
     theta = (panels.low + u * (panels.high - panels.low)).ravel()
     design = np.tile(panels.design, len(u))
     traced = trace(designs, design, theta, panels.reach[design], samples)
-    singular = np.append([kind == "singularity" for kind, _ in designs.field.labels], False)
+    singular = np.append([kind != "limit" for kind, _ in designs.field.labels], False)
     for margin, end, side in ((traced.enters, traced.inner, 1.0), (traced.leaves, traced.outer, -1.0)):
         at = np.flatnonzero(singular[margin])
         if not at.size:
             continue
         ray = traced.ray[at]
         radius = end[at] + side * NEAR[:, None] * (traced.outer - traced.inner)[at]
-        local = designs.field.local(designs.about + radius * np.exp(1j * theta[ray]), designs.of(design[ray]))
+        local = Local.at(designs.field, designs.about + radius * np.exp(1j * theta[ray]), designs.of(design[ray]))
         for k, index in enumerate(indices):
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 near, far = np.broadcast_to(np.asarray(index.values(local), dtype=float), radius.shape)
@@ -163,7 +163,7 @@ def _grid(designs: Designs, panels: Panels, samples: int) -> tuple[_Places, Loca
     v = np.repeat(RADII, len(traced.ray))
     places = _Places(design[ray], panel[ray], np.tile(slot, len(RADII)), u.ravel()[ray], v)
     z = designs.about + radius * np.exp(1j * theta[ray])
-    return places, designs.field.local(z, designs.of(places.design))
+    return places, Local.at(designs.field, z, designs.of(places.design))
 
 
 def _best(design: Ints, height: Floats, count: int) -> Ints:
@@ -244,7 +244,7 @@ def _values(
     shape = (len(us), 1, len(at.design))
     inner, outer = (np.append(end, np.nan)[place].reshape(shape) for end in (traced.inner, traced.outer))
     z = designs.about + spread(inner, outer, vs, cosine)[0] * np.exp(1j * theta.reshape(shape))
-    local = designs.field.local(z, designs.of(at.design))
+    local = Local.at(designs.field, z, designs.of(at.design))
     found = np.full(z.shape, np.nan)
     for k in np.unique(which):
         found = np.where(which == k, indices[k].values(local), found)

@@ -9,15 +9,14 @@ from itertools import pairwise
 import numpy as np
 
 from mechdesign.analyses.kinematics.boundaries import Boundary, boundaries
-from mechdesign.analyses.kinematics.margins import Margins
-from mechdesign.analyses.poses import in_study_units
+from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.errors import AssemblyError, Problem, StudyError
+from mechdesign.mechanism.margins import SweepMargins
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.poses import PoseGroup
 
 # Poses in which the motion is looked for, a turn; rows of the table of one path.
 POSES, ROWS = 720, 361
@@ -47,7 +46,7 @@ class _Path:
     Where the drive turns back (a dead centre) the point moves as the root of what is left of the range: smooth in t.
     """
 
-    margins: Margins
+    margins: SweepMargins
     outputs: tuple[str, str]
     piece: Piece
 
@@ -142,7 +141,7 @@ def point_path(study: Study) -> Result:
     return Result("workspace", {table.name: table for table in tables}, (), {"paths": len(pieces)})
 
 
-def _pieces(study: Study, drive: str) -> tuple[Margins, list[Piece]]:
+def _pieces(study: Study, drive: str) -> tuple[SweepMargins, list[Piece]]:
     """The motions of the mechanism: that of the sketch, or of every range in which it can be assembled."""
     mechanism, unit = study.mechanism, study.units.angle_factor
     coordinate = mechanism.coordinate(drive)
@@ -154,10 +153,9 @@ def _pieces(study: Study, drive: str) -> tuple[Margins, list[Piece]]:
         low, high = _range(study, drive)
         number = POSES + 1
     place = np.linspace(low, high, number) / (unit if turning else 1.0)
-    group = PoseGroup((drive,), {drive: place}, np.arange(number))
     # The whole path is wanted, however many turns the limits leave the drive.
     near = {name: np.full(number, value) for name, value in mechanism.drawn_angles().items()}
-    margins = Margins(study, group, drive, near, counted=False)
+    margins = SweepMargins(mechanism, {drive: radians(study, coordinate, place)}, drive, near, counted=False)
     valid = margins.solve(margins.at).valid
     ends = boundaries(margins, valid)[0]
     if not valid.any() and not ends:
@@ -173,7 +171,7 @@ def _pieces(study: Study, drive: str) -> tuple[Margins, list[Piece]]:
     return margins, own[:1] if own and wanted else pieces
 
 
-def _between(margins: Margins, ends: list[Boundary], low: float, high: float, drive: str) -> Iterator[Piece]:
+def _between(margins: SweepMargins, ends: list[Boundary], low: float, high: float, drive: str) -> Iterator[Piece]:
     """Stretches between neighbouring ends whose middle is valid."""
     told = [(end.place, f"{end.cause.kind}: {end.cause.joint}") for end in ends]
     marks = [(low, f"end of the range of {drive}"), *told, (high, f"end of the range of {drive}")]

@@ -2,12 +2,12 @@
 
 In polar coordinates about the scan's centre, with each panel's angle and each interval's radius written as
 
-    theta = low + (high - low) q(u),   r = inner + (outer - inner) (1 - cos pi t)/2,   0 <= u, t <= 1
+    theta = low + (high - low) q(u),   r = inner + (outer - inner) (1 - cos pi v)/2,   0 <= u, v <= 1
 
 where q has threefold points at 0 and 1: inverse square roots at the boundary (resistivity where a leg is stretched or
-folded) become smooth in t, and cusps, tangent rays and the logarithms that two such boundaries leave in their corner
-nearly so in u. The rule is Gauss-Legendre in u and in t. Kinks inside (isotropic points and curves) are met by
-splitting the intervals of rays and the panels.
+folded) become smooth in v, and cusps, tangent rays and the logarithms that two such boundaries leave in their corner
+nearly so in u. The rule is Gauss-Legendre in u and in v. Cells of panels and segments of rays are halved until their
+estimated errors are small; a segment that crosses a forward singularity is divided there.
 
 The error estimate adds the errors along each ray by absolute value to those in the angle.
 """
@@ -16,30 +16,60 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mechdesign.analyses.workspace.integrands import Integrand
-from mechdesign.analyses.workspace.panels import Panels
-from mechdesign.analyses.workspace.radial import BLOCK, RADII, along, evaluate, pieces
-from mechdesign.analyses.workspace.rays import Designs, trace
-from mechdesign.analyses.workspace.rules import Rule, cubic, spread
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.rays import Designs, Intervals, trace
+from mechdesign.analyses.region.rules import Rule, cosine, cubic, spread
+from mechdesign.analyses.workspace.indices import Local, Prepared
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 ANGLES = Rule.of(20, 4, 6.0)
+RADII = Rule.of(11, 2, 0.5)
 MOST_PASSES = 24
-# Cells are not halved more often than this.
+# Cells and segments are not halved more often than this.
 MOST_HALVINGS = 12
-# Shares of the tolerance: of errors along all rays, and of the area (the divisor of every mean).
-ALONG, AREA = 0.6, 0.1
-# The area is integrated at least to this relative tolerance.
+# Share of the tolerance for the errors along all rays.
+ALONG = 0.6
+# Share of the tolerance for the area, the divisor of every mean; and its relative tolerance at most.
+AREA = 0.1
 FINEST_AREA = 1e-6
 # A piece smaller than this part of the whole region is measured by the whole: its boundary may be rough all over.
 SLIVER = 1e-3
 # Places at which the integrals of one design may look; what is in doubt then stays so, and its error tells.
 BUDGET = 2_000_000
 # Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
-SINGLE = 0.01
+SINGLE_RAY = 0.01
+# Segments evaluated at once (11 nodes each).
+BLOCK = 4096
+# Nearer to the boundary than this fraction of the radius, rounding spoils an index that is infinite there.
+NEAREST = 3e-14
+# Step of the difference that finds a forward singularity, as a fraction of the segment.
+STEP = 0.01
+
+# Parts of panels: which of [low, high] for u in [start, stop], and whether the means count it.
+CELL = np.dtype([("design", np.intp), *((name, float) for name in ("low", "high", "start", "stop", "counted"))])
+# Parts of intervals of rays: those of [inner, outer] for v in [start, stop].
+SEGMENT = np.dtype([("ray", np.intp), *((name, float) for name in ("inner", "outer", "start", "stop"))])
+Parts = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Integrand:
+    """An index, or its square (for the standard deviation)."""
+
+    index: Prepared
+    power: int = 1
+
+    def values(self, local: Local) -> Floats:
+        """Values at points; 0 where there is none: on the boundary itself rounding leaves an interval of no width."""
+        found = np.broadcast_to(np.asarray(self.index.values(local), dtype=float), local.configuration.shape)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = found**self.power
+        return np.where(np.isfinite(found), found, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,28 +93,11 @@ class Integral:
     boundary: tuple[Ints, Floats, Floats]
 
 
-@dataclass(frozen=True, eq=False)
-class _Cells:
-    """Parts of panels: design, panel, range of u within [0, pi], and whether the means count it."""
-
-    design: Ints
-    low: Floats
-    high: Floats
-    start: Floats
-    stop: Floats
-    counted: Floats
-
-    def pick(self, index: Ints) -> _Cells:
-        return _Cells(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
-
-    def halves(self) -> _Cells:
-        middle = 0.5 * (self.start + self.stop)
-        return _join(_Cells(self.design, self.low, self.high, self.start, middle, self.counted),
-                     _Cells(self.design, self.low, self.high, middle, self.stop, self.counted))  # fmt: skip
-
-
-def _join(one: _Cells, other: _Cells) -> _Cells:
-    return _Cells(*(np.concatenate([getattr(one, n), getattr(other, n)]) for n in one.__dataclass_fields__))
+def _divided(parts: Parts, at: Floats) -> Parts:
+    """Every part as two, divided at `at`; all first parts come first."""
+    lower, upper = parts.copy(), parts.copy()
+    lower["stop"] = upper["start"] = at
+    return np.concatenate([lower, upper])
 
 
 def integrate(
@@ -112,15 +125,15 @@ def integrate(
     """
     count = designs.count
     middle = 0.5 * (panels.low + panels.high)
-    inside = ((middle > counted[0]) & (middle < counted[1])).astype(float)
-    zero = np.zeros(len(panels.low))
-    fresh = _Cells(panels.design, panels.low, panels.high, zero, zero + 1, inside)
+    fresh = np.zeros(len(middle), dtype=CELL)
+    fresh["design"], fresh["low"], fresh["high"], fresh["stop"] = panels.design, panels.low, panels.high, 1.0
+    fresh["counted"] = (middle > counted[0]) & (middle < counted[1])
     span = np.bincount(panels.design, panels.high - panels.low, count).astype(float)
-    done: _Cells | None = None
+    done = fresh[:0]
     # Rows: area, area within the margins, and the integrands; of the values and of their errors.
     values = errors = np.zeros((2 + len(integrands), 0))
-    of_area = min(AREA * tolerance, FINEST_AREA)
     each = np.where(endless, np.inf, tolerance)
+    of_area = min(AREA * tolerance, FINEST_AREA)
     allowed: Floats | None = None
     boundary: tuple[Ints, Floats, Floats] | None = None
     spent = np.zeros(count)
@@ -130,30 +143,30 @@ def integrate(
         )
         boundary = met if boundary is None else boundary
         spent += looked
-        done = fresh if done is None else _join(done, fresh)
+        done = np.concatenate([done, fresh])
         values, errors = np.concatenate([values, value], axis=1), np.concatenate([errors, error], axis=1)
-        total, doubt = (np.stack([np.bincount(done.design, row, count) for row in rows]) for rows in (values, errors))
+        owner = done["design"]
+        total, doubt = (np.stack([np.bincount(owner, row, count) for row in rows]) for rows in (values, errors))
         with np.errstate(invalid="ignore"):
-            least = of_area * SLIVER * whole
-            wanted = np.stack([*np.maximum(of_area * total[:2], least), *np.fmax(each * total[2:], 0.0)])
-            wanted[2:][endless] = np.inf
+            area_wanted = np.maximum(of_area * total[:2], of_area * SLIVER * whole)
+            wanted = np.concatenate([area_wanted, np.where(endless, np.inf, np.fmax(each * total[2:], 0.0))])
         late = (doubt > wanted).any(axis=0) & (spent < BUDGET)
         if not late.any():
             break
         # What is left of errors along rays looks like roughness in the angle: they get smaller with the cells.
         allowed = np.where(late, 0.5, 1.0) * allowed
-        cells = np.bincount(done.design, minlength=count)
-        share = errors / np.maximum(wanted, 1e-300)[:, done.design]
+        share = errors / np.maximum(wanted, 1e-300)[:, owner]
         worst = np.zeros((len(wanted), count))
         for row in range(len(wanted)):
-            np.maximum.at(worst[row], done.design, share[row])
+            np.maximum.at(worst[row], owner, share[row])
         # The worst cell, and those that exceed their equal share of the tolerance.
-        over = (share >= np.minimum(worst, 1 / np.maximum(cells, 1))[:, done.design]) & (doubt > wanted)[:, done.design]
-        split = over.any(axis=0) & (done.stop - done.start > 2.0**-MOST_HALVINGS) & late[done.design]
+        equal = 1 / np.maximum(np.bincount(owner, minlength=count), 1)
+        over = (share >= np.minimum(worst, equal)[:, owner]) & (doubt > wanted)[:, owner]
+        split = over.any(axis=0) & (done["stop"] - done["start"] > 2.0**-MOST_HALVINGS) & late[owner]
         if not split.any():
             break
-        fresh = done.pick(np.nonzero(split)[0]).halves()
-        done, values, errors = done.pick(np.nonzero(~split)[0]), values[:, ~split], errors[:, ~split]
+        fresh = _divided(done[split], 0.5 * (done["start"] + done["stop"])[split])
+        done, values, errors = done[~split], values[:, ~split], errors[:, ~split]
     assert boundary is not None
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = total[2:] / total[1]
@@ -165,7 +178,7 @@ def integrate(
 def _evaluate(
     designs: Designs,
     integrands: Sequence[Integrand],
-    cells: _Cells,
+    cells: Parts,
     reach: Floats,
     samples: int,
     tolerance: Floats,
@@ -176,26 +189,24 @@ def _evaluate(
 
     And how many places of each design were looked at. `tolerance` is of each integrand and design.
     """
-    nodes, count = len(ANGLES.nodes), len(cells.low)
-    middle, half = 0.5 * (cells.start + cells.stop), 0.5 * (cells.stop - cells.start)
-    place, density = spread(cells.low, cells.high, middle + half * ANGLES.nodes[:, None], cubic)
+    nodes, count = len(ANGLES.nodes), len(cells)
+    middle, half = 0.5 * (cells["start"] + cells["stop"]), 0.5 * (cells["stop"] - cells["start"])
+    place, density = spread(cells["low"], cells["high"], middle + half * ANGLES.nodes[:, None], cubic)
     theta, weight = place.ravel(), (half * density).ravel()
-    design, counted = np.tile(cells.design, nodes), np.tile(cells.counted, nodes)
+    design, counted = np.tile(cells["design"], nodes), np.tile(cells["counted"], nodes)
     intervals = trace(designs, design, theta, reach[design], samples)
     ray, inner, outer = intervals.ray, intervals.inner, intervals.outer
     area = np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta))
     value = error = np.zeros((len(integrands), len(theta)))
     looked: Floats = samples * np.bincount(design, minlength=designs.count).astype(float)
     if integrands:
-        parts = pieces(intervals, reach[design], designs.field.singular)
-        at = parts.ray
-        pilot = evaluate(designs, integrands, design[at], theta[at], parts)
+        first = _segments(designs, integrands, design, theta, _whole(intervals))
         if allowed is None:
             share = weight * np.repeat(ANGLES.weights, count)
-            sums = [np.bincount(design[at], row * share[at], designs.count) for row in pilot[0]]
+            sums = [np.bincount(design[ray], row * share[ray], designs.count) for row in first[0]]
             allowed = np.asarray(ALONG * tolerance * np.maximum(sums, np.finfo(float).tiny), dtype=float)
-        each = allowed[:, design] * np.maximum(1 / span[design], SINGLE / weight)
-        value, error, places = along(designs, integrands, design, theta, parts, pilot, each)
+        each = allowed[:, design] * np.maximum(1 / span[design], SINGLE_RAY / weight)
+        value, error, places = _along(designs, integrands, design, theta, _whole(intervals), first, each)
         looked += np.bincount(design, places, designs.count)
     rows = (area, area * counted, *(value * counted))
     total, doubt = np.empty((2, len(rows), count))
@@ -205,6 +216,109 @@ def _evaluate(
         doubt[2 + k] += ANGLES.weights @ (error[k] * weight * counted).reshape(nodes, -1)
     met = (np.tile(design[ray], 2), np.tile(theta[ray], 2), np.concatenate([inner, outer]))
     return total, doubt, np.zeros_like(tolerance) if allowed is None else allowed, met, looked
+
+
+def _whole(intervals: Intervals) -> Parts:
+    """Every interval as one segment."""
+    segments = np.zeros(len(intervals.ray), dtype=SEGMENT)
+    segments["ray"], segments["stop"] = intervals.ray, 1.0
+    segments["inner"], segments["outer"] = intervals.inner, intervals.outer
+    return segments
+
+
+def _along(
+    designs: Designs,
+    integrands: Sequence[Integrand],
+    design: Ints,
+    theta: Floats,
+    segments: Parts,
+    evaluated: tuple[Floats, Floats, Floats],
+    allowed: Floats,
+) -> tuple[Floats, Floats, Ints]:
+    """Integrals along rays and their estimated errors, shape (integrands, rays), and how many places were looked at.
+
+    Parameters
+    ----------
+    evaluated
+        What `_segments` gives for the segments.
+    allowed : ndarray, shape (integrands, rays)
+        Error that a segment may have; those with a larger one are divided.
+    """
+    value, error = np.zeros((2, len(integrands), len(theta)))
+    found, doubt, crossing = evaluated
+    looked = np.bincount(segments["ray"], minlength=len(theta))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # What an inverse square root has within `NEAREST` of the boundary.
+        noise = np.sqrt(NEAREST * segments["outer"] / (segments["outer"] - segments["inner"])) * np.abs(found)
+    for halvings in range(MOST_HALVINGS + 1):
+        ray = segments["ray"]
+        split = (doubt > np.maximum(allowed[:, ray], noise)).any(axis=0) & (halvings < MOST_HALVINGS)
+        for k in range(len(integrands)):
+            value[k] += np.bincount(ray[~split], found[k, ~split], len(theta))
+            error[k] += np.bincount(ray[~split], doubt[k, ~split], len(theta))
+        if not split.any():
+            break
+        rough, at = segments[split], 0.5 * (segments["start"] + segments["stop"])[split]
+        crossed = np.flatnonzero(np.isfinite(crossing[split]))
+        if crossed.size:
+            there = rough[crossed]
+            at[crossed] = _crossing(designs, design[there["ray"]], theta[there["ray"]], there, crossing[split][crossed])
+        segments, noise = _divided(rough, at), np.tile(noise[:, split], 2)
+        looked += np.bincount(segments["ray"], minlength=len(theta))
+        found, doubt, crossing = _segments(designs, integrands, design, theta, segments)
+    return value, error, looked * len(RADII.nodes)
+
+
+def _segments(
+    designs: Designs, integrands: Sequence[Integrand], design: Ints, theta: Floats, segments: Parts
+) -> tuple[Floats, Floats, Floats]:
+    """Integrals of indices times radius over segments, and their errors, both of shape (integrands, segments).
+
+    And v near which a forward singularity divides a segment; nan where none does.
+    """
+    found, doubt = np.empty((2, len(integrands), len(segments)))
+    crossing = np.full(len(segments), np.nan)
+    for k in range(0, len(segments), BLOCK):
+        at = slice(k, k + BLOCK)
+        part = segments[at]
+        ray, inner, outer = part["ray"], part["inner"], part["outer"]
+        half = 0.5 * (part["stop"] - part["start"])
+        v = part["start"] + half * (1 + RADII.nodes[:, None])
+        r, slope = spread(inner, outer, v, cosine)
+        # In an interval so narrow, rounding leaves nothing of the closures: it only exists at a cusp.
+        measure = np.where(outer - inner > 100 * NEAREST * outer, r * slope * half, 0.0)
+        gap = np.minimum(NEAREST * outer, 0.5 * (outer - inner))
+        z = designs.about + np.clip(r, inner + gap, outer - gap) * np.exp(1j * theta[ray])
+        local = Local.at(designs.field, z, designs.of(design[ray]))
+        for j, integrand in enumerate(integrands):
+            found[j, at], doubt[j, at] = RADII.apply(integrand.values(local) * measure)
+        if not designs.field.same_assembly:
+            crossing[at] = _sign_change(v, 1 / np.broadcast_to(local.determinant, r.shape))
+    return found, doubt, crossing
+
+
+def _sign_change(x: Floats, values: Floats) -> Floats:
+    """A root between two nodes (first axis), by a straight line; nan where there is none."""
+    # Where rounding leaves nothing of a determinant, at a cusp, its sign tells no place.
+    known = np.isfinite(values).all(axis=0)
+    change = (values[1:] > 0) != (values[:-1] > 0)
+    first, lane = change.argmax(axis=0), np.arange(values.shape[1])
+    a, b = values[first, lane], values[first + 1, lane]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = x[first, lane] + (x[first + 1, lane] - x[first, lane]) * a / (a - b)
+    return np.where(known & change.any(axis=0), root, np.nan)
+
+
+def _crossing(designs: Designs, design: Ints, theta: Floats, segments: Parts, v: Floats) -> Floats:
+    """Where a forward singularity divides segments, by a step of Newton's method from `v`."""
+    step = STEP * (segments["stop"] - segments["start"])
+    around = v + step * np.array([-1.0, 0.0, 1.0])[:, None]
+    r = spread(segments["inner"], segments["outer"], around, cosine)[0]
+    local = Local.at(designs.field, designs.about + r * np.exp(1j * theta), designs.of(design))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, middle, high = np.broadcast_to(1 / local.determinant, r.shape)
+        shift = 2 * middle / (low - high)
+    return np.asarray(v + step * np.where(np.abs(shift) < 1, shift, 0.0))
 
 
 def simple_means(
@@ -239,7 +353,7 @@ def simple_means(
         r = intervals.inner[at] + fractions[:, None] * (intervals.outer - intervals.inner)[at]
         z = designs.about + r * np.exp(1j * angle[intervals.ray[at]])
         weight = r / r.sum(axis=0) if by_area else np.full(r.shape, 1 / len(fractions))
-        local = designs.field.local(z, designs.of(owner[at]))
+        local = Local.at(designs.field, z, designs.of(owner[at]))
         for index, integrand in enumerate(integrands):
             total[index, at] = (integrand.values(local) * weight).sum(axis=0)
     area = np.bincount(owner, sector, designs.count)

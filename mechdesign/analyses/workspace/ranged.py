@@ -17,9 +17,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from mechdesign.analyses.workspace.dips import sign_changes
-from mechdesign.analyses.workspace.field import Field, Places
-from mechdesign.analyses.workspace.rays import Designs, Intervals, intervals_between, trace
+from mechdesign.analyses.region.field import Field, Places
+from mechdesign.analyses.region.rays import NOTHING, Designs, Intervals, intervals_between, trace
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
@@ -54,6 +53,8 @@ class Ranged(Field):
     which: int = 0
     low: float = 0.0
     high: float = 0.0
+    # A kink so little inside a panel costs no more than its square; nearer to where labels change, rounding chooses.
+    accuracy: ClassVar[float] = 1e-6
 
     @property
     def values(self) -> Floats:
@@ -195,9 +196,6 @@ class Some(Ranged):
     A label is of a margin, inside the range or at its low or high end, or of two that leave no value between them.
     """
 
-    # A kink so little inside a panel costs no more than its square; nearer to where labels change, rounding chooses.
-    accuracy: ClassVar[float] = 1e-6
-
     @cached_property
     def labels(self) -> tuple[tuple[str, str], ...]:
         """Kind and name of what ends the region: of a pair, a limit only where both are."""
@@ -311,22 +309,22 @@ class SomeDesigns(Designs):
             return found
 
         x = self._places(theta, reach, samples)
-        values = height(np.broadcast_to(rays, x.shape), x)[None]
-        none = np.zeros(0, dtype=np.intp)
-        brackets = sign_changes(x, values, (none, none, np.zeros(0), np.zeros(0)))
-        ray = brackets.lane
+        values = height(np.broadcast_to(rays, x.shape), x)
+        positive = values > 0
+        cell, ray = np.nonzero(positive[1:] != positive[:-1])
+        (a, b), (fa, fb), none = x[[cell, cell + 1], ray], values[[cell, cell + 1], ray], np.full(len(ray), np.nan)
         radius = bracketed_roots(
-            lambda which, radius: height(ray[which], radius), *brackets.low, *brackets.high, *brackets.third,
-            ROUNDING * reach[ray],
-        )  # fmt: skip
-        turn = np.where(brackets.high[1] > 0, 1, -1)
+            lambda which, radius: height(ray[which], radius), a, fa, b, fb, none, none, ROUNDING * reach[ray]
+        )
+        turn = np.where(fb > 0, 1, -1)
         _, value, pair = over.deciding(self.about + radius * direction[ray])
         (one, other), count = pair[:, 0], len(over.single)
         # Beside where a leg is stretched or folded it is for rounding to say whether that decides, too.
         one = np.where(over.sliced.singular[one], np.where(over.sliced.singular[other], one, other), one)
         end = (value[0] <= over.low) + 2 * (value[0] >= over.high)
         label = np.where(one == other, one + count * end, (3 + one) * count + other)
-        return intervals_between(label, ray, turn, radius, (~(values[0, 0] > 0)).astype(np.intp), reach, slack)
+        found = intervals_between(label, ray, turn, radius, (~positive[0]).astype(np.intp), reach, slack)
+        return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
 
     def _places(self, theta: Floats, reach: Floats, samples: int) -> Floats:
         """Radii of each ray, ascending, shape (places, rays), of which two neighbours hold at most one end."""

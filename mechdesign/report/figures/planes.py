@@ -15,10 +15,10 @@ from matplotlib.ticker import MaxNLocator
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.errors.panels import coordinate_label, framed, moving_names, title
+from mechdesign.report.figures.panels import coordinate_label, framed, moving_names, title
 from mechdesign.study import Study
-from mechdesign.study.pose_models import PoseSection
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.poses import PoseSection
 
 Extend = Literal["neither", "min", "max", "both"]
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.poses import radians
+from mechdesign.analyses.poses import radians, study_poses
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed
@@ -88,7 +88,7 @@ class Sweep:
     @property
     def returns(self) -> bool:
         """Whether the first and the last pose are one."""
-        if self.study.poses("kinematics").closed:
+        if study_poses(self.study, "kinematics").closed:
             return True
         _, wide, tall = extent(self.extent)
         return all(abs(path[-1] - path[0]) <= _CLOSED * max(wide, tall) for path in self.places.values())
@@ -115,7 +115,7 @@ def solve_sweep(study: Study, most: int = MOST_POSES) -> Sweep:
     MechdesignError
         Where the coordinates given do not determine the mechanism.
     """
-    group = study.poses("kinematics").groups[0]
+    group = study_poses(study, "kinematics").groups[0]
     rows = np.unique(np.linspace(0, len(group.rows) - 1, most).round().astype(np.intp))
     plan = study.mechanism.plan(group.names)
     values = {name: group.values[name][rows] for name in group.names}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mechdesign.errors import StudyError
-from mechdesign.study.numbers import suggestion
+from mechdesign.errors import StudyError, suggestion
 
 _FOLDER = Path(__file__).parent
 

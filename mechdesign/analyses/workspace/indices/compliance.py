@@ -15,7 +15,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Floats
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.stiffness.analysis import Asked
+    from mechdesign.analyses.stiffness.analysis import Body
     from mechdesign.study import Study
 
 
@@ -38,7 +38,7 @@ def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) 
     return assembled_only(partial(_evaluate, ask(study), value, free))
 
 
-def _evaluate(asked: Asked, value: Callable[[Floats], Floats], free: float, configuration: Configuration) -> Floats:
+def _evaluate(asked: Body, value: Callable[[Floats], Floats], free: float, configuration: Configuration) -> Floats:
     from mechdesign.analyses.stiffness.analysis import hold
 
     soft = hold(asked, configuration)[0].compliance

@@ -10,7 +10,7 @@ from mechdesign.analyses.workspace.indices.local import Local
 from mechdesign.mechanism.algebra import Value, quiet
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.workspace.field import Field
+    from mechdesign.analyses.region.field import Field
     from mechdesign.study import Study
 
 Evaluate = Callable[[Local], Value]
@@ -33,8 +33,6 @@ class Index:
         grows as 1/distance; None where it stays finite.
     bounds : (float, float)
         What it can never be below or above.
-    kink : function, optional
-        k, where the index is a smooth function plus k sqrt(w), with w the Jacobian's `Local.roundness`.
     section : str
         Section of the study that it needs beside the workspace; empty where the Jacobian is enough.
     """
@@ -45,7 +43,6 @@ class Index:
     unit: Callable[[Study, Field], str]
     crossing: float | None = None
     bounds: tuple[float, float] = (0.0, float("inf"))
-    kink: Evaluate | None = None
     section: str = ""
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from mechdesign.analyses.workspace.indices.index import Index, of_jacobian, singular_value_unit
 from mechdesign.analyses.workspace.indices.local import Local
 from mechdesign.mechanism.algebra import Value
@@ -14,12 +12,4 @@ def evaluate(local: Local) -> Value:
     return local.singular_values[0]
 
 
-def kink(local: Local) -> Value:
-    """sigma_min = a - a sqrt(w) with a = (sigma_max + sigma_min)/2."""
-    least, largest = local.singular_values
-    return -0.5 * np.add(least, largest)
-
-
-INDEX = Index(
-    "sigma_min", "smallest singular value of the Jacobian", of_jacobian(evaluate), singular_value_unit, kink=kink
-)
+INDEX = Index("sigma_min", "smallest singular value of the Jacobian", of_jacobian(evaluate), singular_value_unit)

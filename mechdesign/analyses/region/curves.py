@@ -1,0 +1,111 @@
+"""The region of one design as patches: boundary curves and a grid between them, for tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.pieces import Pieces
+from mechdesign.analyses.region.rays import SAME, Designs, Intervals, trace
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+
+SLACK = 1e-9
+# Rays of the narrowest panel; and how far inside its ends it is traced where the ends themselves are degenerate.
+FEWEST = 25
+BESIDE = 1e-9
+# Nodes of a map along each ray, from boundary to boundary.
+GRID = 33
+# An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
+INSET = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """The part of the region between one inner and one outer curve, over one panel.
+
+    Parameters
+    ----------
+    theta, inner, outer : ndarray, shape (rays,)
+        Angles and the radii of both curves.
+    enters, leaves : int
+        Margins that are zero on them; -1 where the patch begins at the centre of the scan.
+    piece : int
+        Number of the region's piece that it belongs to, from 1.
+    """
+
+    theta: Floats
+    inner: Floats
+    outer: Floats
+    enters: int
+    leaves: int
+    piece: int = 1
+
+    def grid(self, about: complex) -> Complexes:
+        """Nodes, shape (rays, GRID), denser towards both curves."""
+        radius = self.inner[:, None] + self.fractions() * (self.outer - self.inner)[:, None]
+        return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
+
+    def middle(self, about: complex) -> complex:
+        """A place inside, in the middle of the widest interval."""
+        k = int(np.argmax(self.outer - self.inner))
+        return complex(about + 0.5 * (self.inner[k] + self.outer[k]) * np.exp(1j * self.theta[k]))
+
+    def holds(self, z: Complexes, about: complex) -> Flags:
+        """Which places lie in the patch, as far as its rays tell."""
+        radius, theta = np.abs(z - about), self.theta[0] + (np.angle(z - about) - self.theta[0]) % (2 * np.pi)
+        inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
+        return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
+
+    def fractions(self) -> Floats:
+        """Places of a ray's nodes between both curves."""
+        return np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
+
+
+def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterator[Patch]:
+    """Patches of a single design, with about `rays` rays over all panels (both ends of each included)."""
+    total = float(np.sum(panels.high - panels.low))
+    for low, high in zip(panels.low, panels.high, strict=True):
+        number = max(FEWEST, round(rays * (high - low) / total) + 1)
+        # Denser towards the ends, where cusps are thin and corners sharp.
+        theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
+        zero = np.zeros(number, dtype=np.intp)
+        traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
+        if (traced.counts[[0, -1]] != traced.counts[number // 2]).any():
+            # At its very ends a panel meets its neighbour, or an interval vanishes.
+            theta = np.clip(theta, low + BESIDE * (high - low), high - BESIDE * (high - low))
+            traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
+        ray, inner, outer, enters, leaves = _whole(traced, SAME * float(panels.reach[0]))
+        counts = np.bincount(ray, minlength=number)
+        usual = int(np.argmax(np.bincount(counts)))
+        kept = np.flatnonzero(counts == usual)
+        first = np.searchsorted(ray, kept)
+        for slot in range(usual):
+            at: Ints = first + slot
+            yield Patch(theta[kept], inner[at], outer[at], _most(enters[at]), _most(leaves[at]))
+
+
+def patches_of_pieces(pieces: Pieces, rays: int, samples: int) -> list[Patch]:
+    """Patches of a single design, piece by piece; about `rays` rays over all panels."""
+    total = float(np.sum(pieces.panels.high - pieces.panels.low))
+    found = []
+    for number, (designs, panels) in enumerate(pieces.all(), start=1):
+        own = round(rays * float(np.sum(panels.high - panels.low)) / total)
+        found += [replace(patch, piece=number) for patch in patches(designs, panels, own, samples)]
+    return found
+
+
+def _whole(traced: Intervals, near: float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
+    """Intervals with those made one that a single point divides, such as where a leg has no length."""
+    ray = traced.ray
+    meets = (ray[1:] == ray[:-1]) & (traced.inner[1:] - traced.outer[:-1] <= near)
+    begins, ends = np.append(True, ~meets)[: len(ray)], np.append(~meets, True)[: len(ray)]
+    return ray[begins], traced.inner[begins], traced.outer[ends], traced.enters[begins], traced.leaves[ends]
+
+
+def _most(margins: Ints) -> int:
+    """The margin that most rays name: single rays may meet another (a corner)."""
+    names, counts = np.unique(margins, return_counts=True)
+    return int(names[np.argmax(counts)])

@@ -1,0 +1,65 @@
+"""Poses at the nodes of the workspace's grid, so that other questions can be asked all over it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechdesign.analyses.region.curves import GRID, patches
+from mechdesign.analyses.region.panels import SINGLE, find_panels
+from mechdesign.analyses.region.pieces import Pieces
+from mechdesign.analyses.region.rays import Designs
+from mechdesign.analyses.region.regions import RAYS, Region, regions
+from mechdesign.errors import AssemblyError
+from mechdesign.mechanism.algebra import Value
+from mechdesign.study import Study
+from mechdesign.study.poses import PoseGroup, Poses
+
+# About so many poses of all regions together (a question may cost much at each), and so many rays of a patch at least.
+MOST, _FEWEST = 2000, 3
+
+
+def workspace_nodes(study: Study) -> Poses:
+    """Nodes of a grid that follows the boundary, as that of ``local.csv`` but with fewer rays.
+
+    Returns
+    -------
+    Poses
+        The point's x and y, then the held coordinates; a grid of rays by nodes.
+
+    Raises
+    ------
+    StudyError
+        If the workspace section lacks what cannot be assumed.
+    AssemblyError
+        If nothing is reachable.
+    """
+    asked = regions(study)
+    parts = [(region, _grid(region, MOST // GRID // len(asked))) for region in asked]
+    z = np.concatenate([grid.ravel() for _, grid in parts])
+    if not z.size:
+        raise AssemblyError("poses: workspace has no node: nothing is reachable")
+    point = study.workspace.point if study.workspace is not None else ""
+    values = {f"{point}.x": z.real, f"{point}.y": z.imag}
+    for name in asked[0].held:
+        values[name] = np.concatenate([np.full(grid.size, region.held[name]) for region, grid in parts])
+    group = PoseGroup(tuple(values), values, np.arange(len(z)))
+    return Poses((group,), len(z), False, (len(z) // GRID, GRID))
+
+
+def _grid(region: Region, most: int) -> Value:
+    """Nodes of one region, shape (rays, GRID), on about `most` rays."""
+    designs = Designs(region.field, {}, 1, region.about)
+    panels = find_panels(designs, region.scan, SINGLE)
+    if region.field.same_assembly:
+        designs, panels = Pieces.of(designs, panels, region.scan, SINGLE.samples).only(0)
+    if not panels.closes[0]:
+        return np.zeros((0, GRID), dtype=complex)
+    found = list(patches(designs, panels, min(region.rays or RAYS, most), SINGLE.samples))
+    # Every panel has a fewest number of rays: of too many some are left out, never the ends of a patch: others begin.
+    total = sum(float(np.ptp(patch.theta)) for patch in found)
+    grids = []
+    for patch in found:
+        number = max(_FEWEST, round(most * float(np.ptp(patch.theta)) / total))
+        kept = np.unique(np.linspace(0, len(patch.theta) - 1, min(number, len(patch.theta))).round().astype(int))
+        grids.append(patch.grid(region.about)[kept])
+    return np.asarray(np.concatenate(grids))

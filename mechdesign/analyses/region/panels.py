@@ -1,0 +1,165 @@
+"""Panels of a scan: ranges of the ray's angle over which the same margins bound the same intervals.
+
+Within a panel the ends of the intervals are smooth functions of the angle. Where the bounding margins change (corners),
+or intervals appear (cusps, tangents), a panel ends, so that quadrature rules keep their order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.analyses.region.breaks import TOGETHER, all_breaks
+from mechdesign.analyses.region.raster import Raster
+from mechdesign.analyses.region.rays import Designs, Intervals, trace
+from mechdesign.errors import AssemblyError
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+
+# Times that the reach is doubled at most.
+DOUBLINGS = 16
+# Rounds in which rays are put where the raster shows what others pass by.
+LOOKS = 4
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How finely the region is looked for.
+
+    Parameters
+    ----------
+    rays : int
+        Rays over the scan.
+    samples : int
+        Samples of each interval, for margins that are not quadratic along rays.
+    cells : int
+        Cells of the raster over the width and height of what the point can reach at most: pieces and holes that hold
+        a circle around a cell are never lost.
+    """
+
+    rays: int
+    samples: int
+    cells: int
+
+
+# One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
+SINGLE = Effort(128, 48, 192)
+BATCH = Effort(16, 12, 24)
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """Panels of all designs, ordered by design and angle.
+
+    Parameters
+    ----------
+    design, low, high : ndarray, shape (panels,)
+        Design and range of angle of each panel.
+    reach : ndarray, shape (designs,)
+        Radius beyond the whole region of each design.
+    closes : ndarray of bool, shape (designs,)
+        Whether any ray met the region.
+    intervals : ndarray of int, shape (panels,)
+        Intervals of a ray inside each panel; 0 where none has been traced there.
+    seen : ndarray, shape (designs,)
+        Area that the raster is sure of: that of its cells inside, less what it is not known to.
+    """
+
+    design: Ints
+    low: Floats
+    high: Floats
+    reach: Floats
+    closes: Flags
+    intervals: Ints
+    seen: Floats
+
+
+def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cuts: tuple[float, ...] = ()) -> Panels:
+    """Divide the scan of every design into panels; `cuts` are further angles where panels end.
+
+    Raises
+    ------
+    AssemblyError
+        If the region has no end.
+    """
+    count, samples = designs.count, effort.samples
+    raster = Raster.of(designs, effort.cells, scan)
+    least = raster.farthest(designs.about)
+    design = np.repeat(np.arange(count), effort.rays + 1)
+    angle = np.tile(np.linspace(*scan, effort.rays + 1), count)
+    reach = np.where(least > 0, least, _first_guess(designs))
+    reach, intervals = _extent(designs, design, angle, reach, least, samples)
+    owner = np.arange(count)
+    for _ in range(LOOKS):
+        owner, hidden = raster.hidden(np.unique(owner), designs.about, scan, design, angle, intervals)
+        rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * hidden]))
+        if len(rays) == len(design):
+            break
+        design, angle = rays.real.astype(np.intp), rays.imag
+        reach, intervals = _extent(designs, design, angle, reach, least, samples)
+    found, breaks = all_breaks(designs, reach, samples, intervals, design, angle)
+    fixed = np.tile([*scan, *cuts], count)
+    owner = np.concatenate([np.repeat(np.arange(count), 2 + len(cuts)), found])
+    place, firm = np.concatenate([fixed, breaks]), np.arange(len(fixed) + len(breaks)) < len(fixed)
+    order = np.lexsort((place, owner))
+    owner, place, firm = owner[order], place[order], firm[order]
+    # Breaks that rounding sets beside each other, or beside the end of the scan, are one.
+    near = (owner[1:] == owner[:-1]) & (np.diff(place) < TOGETHER)
+    drop = np.zeros(len(place), dtype=bool)
+    drop[1:] |= near & ~firm[1:]
+    drop[:-1] |= near & firm[1:] & ~firm[:-1]
+    owner, place = owner[~drop], place[~drop]
+    keep = owner[1:] == owner[:-1]
+    owner, low, high = owner[:-1][keep], place[:-1][keep], place[1:][keep]
+    # A panel is empty where every ray that was traced inside it met nothing.
+    counts = intervals.counts
+    met = np.concatenate([[0], np.cumsum(counts > 0)])
+    first, last = _between(design, angle, owner, low, high)
+    full = (last <= first) | (met[np.maximum(last, first)] > met[first])
+    first, last = _between(design, angle, owner, low + TOGETHER, high - TOGETHER)
+    # Not at half of the panel: by symmetry a single point may divide the ray there.
+    usual = np.where(last > first, counts[np.minimum(first + (last - first) // 4, len(angle) - 1)], 0)
+    closes = np.bincount(design, counts, count) > 0
+    area, doubt = raster.area
+    return Panels(owner[full], low[full], high[full], reach, closes, usual[full], area - doubt)
+
+
+def _between(design: Ints, angle: Floats, owner: Ints, low: Floats, high: Floats) -> tuple[Ints, Ints]:
+    """The first ray of each range of angle, and the first after it; NumPy orders complex numbers by both parts."""
+    rays = design + 1j * angle
+    return (
+        np.searchsorted(rays, owner + 1j * low, side="right"),
+        np.searchsorted(rays, owner + 1j * high, side="left"),
+    )
+
+
+def _first_guess(designs: Designs) -> Floats:
+    """The sum of all rigid vectors: more than a mechanism without slides can reach."""
+    mechanism = designs.field.mechanism
+    vectors = mechanism.geometry.vectors(designs.places)
+    drawn = sum(float(np.abs(z)) for z in mechanism.sketch_configuration.nodes)
+    total = sum(np.abs(w) for w in vectors.w) + abs(designs.about)
+    return np.broadcast_to(np.asarray(total + drawn, dtype=float), (designs.count,)).copy()
+
+
+def _extent(
+    designs: Designs, design: Ints, theta: Floats, reach: Floats, least: Floats, samples: int
+) -> tuple[Floats, Intervals]:
+    """Trace rays, doubling the reach until no ray ends inside; returns the reach needed and the intervals.
+
+    The reach of a design is `least` at least.
+    """
+    for _ in range(DOUBLINGS):
+        intervals = trace(designs, design, theta, reach[design], samples)
+        beyond = np.bincount(design, intervals.beyond, designs.count) > 0
+        if not beyond.any():
+            break
+        reach = np.where(beyond, 2 * reach, reach)
+    else:
+        raise AssemblyError(
+            "the workspace has no end: a ray from "
+            f"({designs.about.real:g}, {designs.about.imag:g}) stays inside; give the drives limits"
+        )
+    farthest = np.zeros(designs.count)
+    np.maximum.at(farthest, design[intervals.ray], intervals.outer)
+    return np.where(farthest > 0, 1.2 * np.maximum(farthest, least), reach), intervals

@@ -1,0 +1,299 @@
+"""Pieces of regions: what hangs together, found from the intervals of neighbouring panels.
+
+Within a panel every interval of a ray goes on from ray to ray. Where two panels meet, intervals hang together that
+overlap on the ray between them. A piece is what hangs together so; where the scan is less than a turn it ends at
+its sides. The first piece of a design is the one that holds the point's place in the sketch, or else the largest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.rays import SAME, Designs, Intervals, trace
+from mechdesign.analyses.region.rules import cubic, spread
+from mechdesign.mechanism.variant import drawn, elsewhere
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+
+# Rays beside the ends of panels (radians, but never more than this part of the panel), until one meets what the panel's
+# other rays meet. Nearer than the first, breaks have been put together.
+BESIDE = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+PART = 0.125
+# Pieces that only touch in a point overlap twice as much twice as far from it: of others there is less than so much.
+TOUCHES = 1.75
+# Not at half of a panel: by symmetry a single point may divide the ray there.
+MIDDLE = 0.4871
+# Nodes of the area by which pieces are put in order.
+NODES = 8
+# Areas as near as this, as parts of the whole, are equal; smaller ones than the second are slits that rounding leaves.
+EQUAL = 1e-4
+NOTHING = 1e-10
+# The piece of an interval that no ray beside it tells.
+UNKNOWN = -2
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Pieces of the regions of all designs.
+
+    Parameters
+    ----------
+    scan : (float, float)
+    number : ndarray of int, shape (designs,)
+        How many pieces each region has; 0 where it is empty.
+    drawn : ndarray of bool, shape (designs,)
+        Whether the first of several pieces holds the point's place in the sketch.
+    counts : ndarray of int, shape (panels,)
+        Intervals of each panel's rays, for designs of several pieces; else 0.
+    piece : ndarray of int, shape (panels, most intervals)
+        Of each interval of each panel, outwards; -1 where there is none, or it has no area.
+    """
+
+    designs: Designs
+    panels: Panels
+    scan: tuple[float, float]
+    number: Ints
+    drawn: Flags
+    counts: Ints
+    piece: Ints
+
+    @staticmethod
+    def of(designs: Designs, panels: Panels, scan: tuple[float, float], samples: int) -> Pieces:
+        """Find the pieces of all regions.
+
+        Parameters
+        ----------
+        scan : (float, float)
+            First and last angle of the rays.
+        samples : int
+            Samples of each ray.
+        """
+        counts = np.zeros(len(panels.low), dtype=np.intp)
+        found = Pieces(
+            designs, panels, scan, panels.closes.astype(np.intp), np.ones(designs.count, dtype=bool), counts,
+            np.zeros((len(counts), 0), dtype=np.intp),
+        )  # fmt: skip
+        panel = np.flatnonzero(_doubtful(panels, scan, designs.count)[panels.design])
+        if not panel.size:
+            return found
+        counts[panel] = found._traced(panel, MIDDLE, samples).counts
+        label = found._joined(samples)
+        owner = np.full(label.max(initial=-1) + 1, -1)
+        owner[label[label >= 0]] = np.repeat(panels.design, counts)
+        number = np.bincount(owner, minlength=designs.count)
+        several = number > 1
+        found = replace(
+            found, piece=label, number=np.where(several, number, found.number),
+            counts=np.where(several[panels.design], counts, 0),
+        )  # fmt: skip
+        return found._ordered(owner, np.flatnonzero(several), samples) if several.any() else found
+
+    def only(self, piece: int) -> tuple[Designs, Panels]:
+        """The designs with their regions taken for one piece of each (from 0), and its panels."""
+        if not self.counts.any():
+            return self.designs, self.panels
+        use = (self.piece == piece).any(axis=1) | (self.counts == 0)
+        panels = replace(
+            self.panels, design=self.panels.design[use], low=self.panels.low[use], high=self.panels.high[use],
+            intervals=self.panels.intervals[use],
+        )  # fmt: skip
+        whole = self.designs
+        return _OnePiece(whole.field, whole.places, whole.count, whole.about, self, piece), panels
+
+    def all(self) -> Iterator[tuple[Designs, Panels]]:
+        """Each piece of a single design, as `only`."""
+        return (self.only(piece) for piece in range(int(self.number[0])))
+
+    def _traced(self, panel: Ints, place: float | Floats, samples: int) -> Intervals:
+        """Rays of panels, at a part of their width."""
+        panels = self.panels
+        theta = panels.low[panel] + place * (panels.high - panels.low)[panel]
+        return trace(self.designs, panels.design[panel], theta, panels.reach[panels.design[panel]], samples)
+
+    def _joined(self, samples: int) -> Ints:
+        """A label for each interval of each panel, the same where they hang together; -1 where there is none."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        panels, has = self.panels, np.arange(self.counts.max()) < self.counts[:, None]
+        number = np.where(has, np.cumsum(has).reshape(has.shape) - 1, -1)
+        one = np.flatnonzero((panels.design[1:] == panels.design[:-1]) & (panels.high[:-1] == panels.low[1:]))
+        other = one + 1
+        if _is_turn(self.scan):
+            start, stop = np.flatnonzero(panels.low == self.scan[0]), np.flatnonzero(panels.high == self.scan[1])
+            _, at_start, at_stop = np.intersect1d(panels.design[start], panels.design[stop], return_indices=True)
+            one, other = np.concatenate([one, stop[at_stop]]), np.concatenate([other, start[at_start]])
+        before = self._ends(1, samples)[:, :, one, :, None]
+        after = self._ends(-1, samples)[:, :, other, None, :]
+        near, far = np.minimum(before[1], after[1]) - np.maximum(before[0], after[0])
+        pair, a, b = np.nonzero((near > 0) & (far < TOUCHES * near))
+        edges, total = (number[one[pair], a], number[other[pair], b]), int(has.sum())
+        graph = coo_array((np.ones(len(pair)), edges), shape=(total, total))
+        label = np.full(has.shape, -1)
+        label[has] = connected_components(graph, directed=False)[1]
+        return label
+
+    def _ends(self, side: int, samples: int) -> Floats:
+        """Both radii of each interval, beside an end of its panel and twice as far; (2, 2, panels, most intervals)."""
+        width = self.panels.high - self.panels.low
+        radii = np.full((2, 2, len(width), self.counts.max()), np.nan)
+        panel = np.flatnonzero(self.counts)
+        for step in BESIDE:
+            part = np.minimum(step / width[panel], PART)
+            place = np.concatenate([part, 2 * part])
+            found = self._traced(np.tile(panel, 2), place if side < 0 else 1 - place, samples)
+            fits = (found.counts.reshape(2, -1) == self.counts[panel]).all(axis=0)
+            far, of = np.divmod(found.ray, len(panel))
+            use = fits[of]
+            at = far[use], panel[of[use]], found.slot[use]
+            radii[0][at], radii[1][at] = found.inner[use], found.outer[use]
+            panel = panel[~fits]
+            if not panel.size:
+                break
+        return radii
+
+    def _ordered(self, owner: Ints, several: Ints, samples: int) -> Pieces:
+        """Pieces numbered within each design: the sketch's first, then by area."""
+        parts, designs = len(owner), self.designs
+        panel = np.flatnonzero(self.counts)
+        nodes, weights = np.polynomial.legendre.leggauss(NODES)
+        low, high = self.panels.low[panel], self.panels.high[panel]
+        theta, density = spread(low, high, 0.5 + 0.5 * nodes[:, None], cubic)
+        weight = (0.5 * density * weights[:, None]).ravel()
+        design = np.tile(self.panels.design[panel], NODES)
+        found = trace(designs, design, theta.ravel(), self.panels.reach[design], samples)
+        label = self.of_intervals(design, theta.ravel(), found, samples)
+        sector = 0.5 * weight[found.ray] * (found.outer - found.inner) * (found.outer + found.inner)
+        area = np.bincount(label[label >= 0], sector[label >= 0], parts)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = area / np.bincount(owner, area, designs.count)[owner]
+        held = self._holding(several, samples)
+        share[held[held >= 0]] = np.inf
+        slit = share < NOTHING
+        drawn = self.drawn.copy()
+        drawn[several[held < 0]] = False
+        # Of equal ones the first along the scan.
+        order = np.lexsort((np.arange(parts), -np.round(share / EQUAL), slit, owner))
+        rank = np.empty(parts + 1, dtype=np.intp)
+        rank[order] = np.arange(parts) - np.searchsorted(owner[order], owner[order])
+        rank[:-1][slit] = rank[-1] = -1
+        number = self.number - np.bincount(owner[slit], minlength=designs.count)
+        return replace(self, piece=rank[self.piece], drawn=drawn, number=number)
+
+    def _holding(self, design: Ints, samples: int) -> Ints:
+        """The piece that holds the point's place in the sketch; -1 where none does."""
+        place = self._sketched(design) - self.designs.about
+        reach = self.panels.reach[design]
+        theta = self.scan[0] + (np.angle(place) - self.scan[0]) % (2 * np.pi)
+        # At the centre of the scan one ray is as good as another.
+        centre = np.abs(place) <= SAME * reach
+        theta = np.where(centre, self.scan[0] + MIDDLE * (self.scan[1] - self.scan[0]), theta)
+        radius = np.where(centre, 0.0, np.abs(place))
+        held = np.full(len(design), -1, dtype=np.intp)
+        known = np.flatnonzero(np.isfinite(place) & (theta <= self.scan[1]))
+        found = trace(self.designs, design[known], theta[known], reach[known], samples)
+        piece = self.of_intervals(design[known], theta[known], found, samples)
+        at = radius[known][found.ray]
+        inside = (found.inner <= at) & (at <= found.outer)
+        held[known[found.ray[inside]]] = piece[inside]
+        return held
+
+    def _sketched(self, design: Ints) -> Complexes:
+        """The point's place in the sketch of each design: its drives as drawn, as far as it can be assembled so."""
+        field, places = self.designs.field, self.designs.of(design)
+        mechanism, (x, y) = field.mechanism, field.outputs[:2]
+        if not places:
+            sketch = mechanism.sketch_configuration
+            return np.full(len(design), complex(float(sketch.value(x)), float(sketch.value(y))))
+        poses = drawn(mechanism, places)
+        found = np.asarray(poses.value(x) + 1j * poses.value(y), dtype=complex)
+        found = np.where(poses.valid, found, complex(np.nan, np.nan))
+        for k in [] if mechanism.forward.iterative else np.flatnonzero(~poses.valid).tolist():
+            pose = elsewhere(mechanism, {name: value[k] for name, value in places.items()})
+            found[k] = complex(float(pose.value(x)), float(pose.value(y)))
+        return found
+
+    def of_intervals(self, design: Ints, theta: Floats, found: Intervals, samples: int) -> Ints:
+        """The piece of each interval of rays of designs with several pieces; -1 where it has no area."""
+        panel = self._panel_at(design, theta)
+        piece = self._of_counted(panel, found)
+        # Rays through the end of a panel, or through a single point that divides them, are compared with one beside.
+        for step in BESIDE:
+            left = np.flatnonzero((found.counts != self.counts[panel]) & (panel >= 0))
+            left = np.intersect1d(left, found.ray[piece == UNKNOWN])
+            if not left.size:
+                break
+            low, high = self.panels.low[panel[left]], self.panels.high[panel[left]]
+            inset = np.minimum(step, PART * (high - low))
+            turned = np.clip(theta[left], low + inset, high - inset)
+            beside = trace(self.designs, design[left], turned, self.panels.reach[design[left]], samples)
+            names = self._of_counted(panel[left], beside)
+            ends = np.full((3, len(left), int(beside.counts.max(initial=1))), np.nan)
+            ends[:, beside.ray, beside.slot] = beside.inner, beside.outer, names
+            some = np.flatnonzero(np.isin(found.ray, left))
+            inner, outer, names = ends[:, np.searchsorted(left, found.ray[some])]
+            overlap = np.minimum(found.outer[some, None], outer) - np.maximum(found.inner[some, None], inner)
+            best = np.where(np.isnan(overlap), -np.inf, overlap).argmax(axis=1)
+            told = names[np.arange(len(some)), best]
+            piece[some] = np.where(np.isnan(told), UNKNOWN, told)
+        return piece
+
+    def _of_counted(self, panel: Ints, found: Intervals) -> Ints:
+        """The piece of each interval of rays within panels; unknown where a ray has more or fewer than its panel."""
+        plain = (found.counts == self.counts[panel]) & (panel >= 0)
+        slot = np.minimum(found.slot, self.piece.shape[1] - 1)
+        return np.where(plain[found.ray], self.piece[panel[found.ray], slot], UNKNOWN)
+
+    def _panel_at(self, design: Ints, theta: Floats) -> Ints:
+        """Panel of each ray; -1 where there is none. NumPy orders complex numbers by both parts."""
+        panels = self.panels
+        at = np.searchsorted(panels.design + 1j * panels.low, design + 1j * theta, side="right") - 1
+        inside = (at >= 0) & (panels.design[at] == design) & (theta <= panels.high[at])
+        return np.where(inside, at, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class _OnePiece(Designs):
+    """Designs whose rays meet one piece of their region only."""
+
+    pieces: Pieces
+    piece: int
+
+    def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
+        """As `Designs.traced`."""
+        pieces = self.pieces
+        found = pieces.designs.traced(design, theta, reach, samples, slack)
+        rays = np.flatnonzero(pieces.number[design] > 1)
+        if not rays.size:
+            return found
+        some = np.flatnonzero(np.isin(found.ray, rays))
+        part = replace(
+            found, ray=np.searchsorted(rays, found.ray[some]), inner=found.inner[some], outer=found.outer[some],
+            beyond=found.beyond[rays],
+        )  # fmt: skip
+        piece = pieces.of_intervals(design[rays], theta[rays], part, samples)
+        keep = np.ones(len(found.ray), dtype=bool)
+        keep[some] = (piece == self.piece) | ((piece == UNKNOWN) & (self.piece == 0))
+        return found.kept(keep)
+
+
+def _is_turn(scan: tuple[float, float]) -> bool:
+    return scan[1] - scan[0] >= 2 * np.pi * (1 - 1e-12)
+
+
+def _doubtful(panels: Panels, scan: tuple[float, float], count: int) -> Flags:
+    """Designs whose region may have several pieces: several intervals a ray, or rays between that meet nothing."""
+    doubtful = np.bincount(panels.design[panels.intervals != 1], minlength=count) > 0
+    apart = panels.low[1:] != panels.high[:-1]
+    begins = np.append(True, apart | (panels.design[1:] != panels.design[:-1]))[: len(panels.low)]
+    runs = np.bincount(panels.design[begins], minlength=count)
+    if _is_turn(scan):
+        at_start, at_stop = (
+            np.bincount(panels.design[end], minlength=count)
+            for end in (panels.low == scan[0], panels.high == scan[1])
+        )  # fmt: skip
+        runs = runs - (at_start & at_stop)
+    return np.asarray(doubtful | (runs > 1))

@@ -1,0 +1,374 @@
+"""Where rays about a point run inside the region: intervals between the roots of the margins.
+
+The region is where all margins of a `Field` are positive. Along a ray every margin is followed by itself, not only the
+smallest one: two margins that cross zero close together (a cusp of the region) bracket a thin interval exactly, however
+coarse the scan, and margins that are differences of squared distances are quadratic, so that few samples find all
+their roots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mechdesign.analyses.region.field import Field, Places
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.minima import dips
+from mechdesign.numerics.roots import bracketed_roots
+
+# Rays traced at once, measured: fewer cost more in calls than their smaller arrays save.
+BLOCK = 8192
+ROUNDING = 1e-14
+# Roots nearer than this (relative to the reach) are the same boundary; of several margins the first is named.
+SAME = 1e-9
+# Five samples that a parabola meets to this fraction of their size are of a quadratic function.
+QUADRATIC = 1e-13
+# Intervals no wider than this part of the reach are rounding's.
+NOTHING = 1e-10
+# First and last sample of an interval, as fractions of it.
+INSET = 1e-10
+FIVE = np.linspace(0.0, 1.0, 5)
+
+
+@dataclass(frozen=True, eq=False)
+class Designs:
+    """Several designs of one mechanism, scanned about one point.
+
+    Parameters
+    ----------
+    places : mapping of str to ndarray, shape (designs,)
+        Dimensions that differ from the nominal ones.
+    count : int
+        Number of designs.
+    about : complex
+        Where the rays start.
+    """
+
+    field: Field
+    places: Places
+    count: int
+    about: complex
+
+    def of(self, index: Ints) -> Places:
+        """Dimensions of the designs `index`, in the shape of `index`."""
+        return {name: np.asarray(value)[index] for name, value in self.places.items()}
+
+    def inside(self, z: Complexes, design: Ints) -> Flags:
+        """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
+        field, places = self.field, self.of(design)
+        both = field.plan.iterative or not field.same_assembly
+        good = np.asarray((field.margins(z, places, assembly=both) > 0).all(axis=0))
+        if not both:
+            # Determinants cost as much as all other margins: only where they decide.
+            place, lane = np.nonzero(good)
+            margins = field.margins(z[place, lane], {name: value[lane] for name, value in places.items()})
+            good[place, lane] = (margins > 0).all(axis=0)
+        return good
+
+    def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
+        """Intersect a block of rays with the region, as `trace` does."""
+        return _trace_block(self, design, theta, reach, samples, slack)
+
+
+@dataclass(frozen=True, eq=False)
+class Intervals:
+    """Inside intervals of rays, ordered by ray and radius.
+
+    Parameters
+    ----------
+    ray : ndarray of int, shape (n,)
+        Ray of each interval.
+    inner, outer : ndarray, shape (n,)
+        Radii where it begins and ends.
+    enters, leaves : ndarray of int, shape (n,)
+        Margin that is zero there; -1 where it begins at the centre or is not closed within the reach.
+    beyond : ndarray of bool, shape (rays,)
+        Rays still inside at their reach.
+    crossings : (ray, radius, margin, direction)
+        All roots of all margins; direction +1 where the margin becomes positive.
+    """
+
+    ray: Ints
+    inner: Floats
+    outer: Floats
+    enters: Ints
+    leaves: Ints
+    beyond: Flags
+    crossings: tuple[Ints, Floats, Ints, Ints]
+
+    @property
+    def counts(self) -> Ints:
+        """Intervals of each ray."""
+        return np.bincount(self.ray, minlength=len(self.beyond))
+
+    @property
+    def slot(self) -> Ints:
+        """Place of each interval on its ray, outwards from 0."""
+        return np.arange(len(self.ray)) - np.searchsorted(self.ray, self.ray)
+
+    def kept(self, keep: Flags) -> Intervals:
+        """Some of the intervals, on the same rays."""
+        if keep.all():
+            return self
+        return replace(self, ray=self.ray[keep], inner=self.inner[keep], outer=self.outer[keep],
+                       enters=self.enters[keep], leaves=self.leaves[keep])  # fmt: skip
+
+
+def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float = 0.0) -> Intervals:
+    """Intersect rays with the region.
+
+    Parameters
+    ----------
+    design, theta, reach : ndarray, shape (rays,)
+        Design, direction (radians) and length of each ray.
+    samples : int
+        Samples of each interval, for margins that are not quadratic along rays.
+    slack : float
+        Intervals that rounding closed, up to this fraction of the reach, are kept (for rays through a cusp).
+    """
+    parts = [
+        designs.traced(design[k : k + BLOCK], theta[k : k + BLOCK], reach[k : k + BLOCK], samples, slack)
+        for k in range(0, max(len(theta), 1), BLOCK)
+    ]
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.arange(len(parts)) * BLOCK
+
+    def join(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    crossings: Any = tuple(np.concatenate([part.crossings[k] for part in parts]) for k in range(4))
+    lengths = [len(part.crossings[0]) for part in parts]
+    return Intervals(
+        join("ray") + np.repeat(starts, [len(part.ray) for part in parts]), join("inner"), join("outer"),
+        join("enters"), join("leaves"), join("beyond"),
+        (crossings[0] + np.repeat(starts, lengths), *crossings[1:]),
+    )  # fmt: skip
+
+
+def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
+    """First what is quadratic along a ray, whose roots are known; then the other margins, within what is left.
+
+    Each ray is judged by itself: what else is traced with it changes nothing.
+    """
+    places, direction = designs.of(design), np.exp(1j * theta)
+    values = designs.field.margins(designs.about + FIVE[:, None] * reach * direction, places, assembly=False)
+    quadratic, (a, b, c) = _parabolas(values)
+    if not quadratic.all():
+        # What is not quadratic has no roots here.
+        a, b, c = np.where(quadratic, a, 1.0), np.where(quadratic, b, 0.0), np.where(quadratic, c, 0.0)
+    margin, ray, turn, x, start = _quadratic_roots(a, b, c)
+    found = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
+    if not (quadratic.all() and not designs.field.same_assembly):
+        found = _others(designs, places, direction, found, quadratic, samples, slack * reach, reach)
+    return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
+
+
+def _parabolas(values: Floats) -> tuple[Flags, tuple[Floats, Floats, Floats]]:
+    """Coefficients of a + b x + c x^2 through margins at x = 0, 1/2, 1, and which margins are such on each ray.
+
+    Differences of squared distances are quadratic along a ray; the samples at 1/4 and 3/4 tell.
+    """
+    at_0, at_1, at_2, at_3, at_4 = (values[:, k] for k in range(5))
+    a, b, c = at_0, 4 * at_2 - 3 * at_0 - at_4, 2 * (at_0 + at_4) - 4 * at_2
+    with np.errstate(invalid="ignore"):
+        allowed = QUADRATIC * np.abs(values).max(axis=1)
+        fits = np.abs(a + 0.25 * (b + 0.25 * c) - at_1) <= allowed
+        fits &= np.abs(a + 0.75 * (b + 0.75 * c) - at_3) <= allowed
+    return fits, (a, b, c)
+
+
+def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints, Floats, Ints]:
+    """Margin, ray, direction and place of all roots in (0, 1), and how many margins are negative just after 0."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        half = -0.5 * (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
+        roots = np.stack([half / c, a / half])
+        margin_of = (roots > SAME) & (roots < 1)
+    which, margin, ray = np.nonzero(margin_of)
+    # The slope at the first of the two roots has the sign of -b, at the other that of b: also where they are one.
+    rising = np.signbit(b[margin, ray]) == (which == 0)
+    x, start = roots[which, margin, ray], (a + SAME * (b + SAME * c) <= 0).sum(axis=0)
+    return margin, ray, np.where(rising, 1, -1), x, start
+
+
+def _others(
+    designs: Designs,
+    places: Places,
+    direction: Complexes,
+    found: Intervals,
+    quadratic: Flags,
+    samples: int,
+    thin: Floats,
+    reach: Floats,
+) -> Intervals:
+    """Cut intervals where one of the margins that are not quadratic along their ray is negative or unknown."""
+    extra = len(designs.field.labels) - len(quadratic)
+    known = np.concatenate([quadratic, np.zeros((extra, len(direction)), dtype=bool)])
+    sampled = np.flatnonzero(~np.asarray(known.all(axis=0))[found.ray])
+    owner, inner, width = found.ray[sampled], found.inner[sampled], (found.outer - found.inner)[sampled]
+    local = {name: value[owner] for name, value in places.items()}
+    fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, samples))), INSET, 1 - INSET)
+    radii = inner + fraction[:, None] * width
+    rows = np.flatnonzero(~known.all(axis=1))
+
+    def margins_at(lane: Ints, radius: Floats) -> Floats:
+        z = designs.about + radius * direction[owner[lane]]
+        values = designs.field.margins(z, {name: value[lane] for name, value in local.items()})[rows]
+        # Roots that are known have ended the intervals.
+        margin, of = np.nonzero(known[rows][:, owner[lane]])
+        values[margin, ..., of] = 1.0
+        return values
+
+    values, noise = margins_at(np.arange(len(owner)), radii), designs.field.rounding[rows]
+    radii, values = _with_dips(margins_at, radii, _without_rounding(values, noise), noise)
+    positive = values > 0
+    lanes = np.flatnonzero(~positive.all(axis=(0, 1)) & (width > thin[owner]))
+    if not lanes.size:
+        return found
+    radii, values, positive = radii[:, lanes], values[:, :, lanes], positive[:, :, lanes]
+    margin, cell, lane = np.nonzero(positive[:, 1:] != positive[:, :-1])
+    ends = np.stack([cell, cell + 1, np.where(cell > 0, cell - 1, np.minimum(cell + 2, len(radii) - 1))])
+    x, f = radii[ends, lane], values[margin, ends, lane]
+    # Where another margin is negative at both ends nothing ends there: the middle will do.
+    radius = 0.5 * (x[0] + x[1])
+    idle = ~(positive[:, 1:] | positive[:, :-1])
+    asked = np.flatnonzero(~idle[:, cell, lane].any(axis=0))
+
+    def evaluate(which: Ints, radius: Floats) -> Floats:
+        which = asked[which]
+        return margins_at(lanes[lane[which]], radius)[margin[which], np.arange(len(which))]
+
+    cut_of = sampled[lanes]
+    (a, b, c), (fa, fb, fc) = x[:, asked], f[:, asked]
+    tolerance = ROUNDING * found.outer[cut_of[lane[asked]]]
+    radius[asked] = bracketed_roots(evaluate, a, fa, b, fb, c, fc, tolerance)
+    start = (~positive[:, 0]).sum(axis=0)
+    part = intervals_between(rows[margin], lane, np.where(f[1] > 0, 1, -1), radius, start, found.outer[cut_of], 0.0)
+    return _replace(found, cut_of, part, NOTHING * reach)
+
+
+def _without_rounding(values: Floats, noise: Floats) -> Floats:
+    """Margins (margins, samples, lanes) with samples below their `noise` given the sign of both neighbours."""
+    beside, noise = np.sign(values[:, :-2]), noise[:, None, None]
+    with np.errstate(invalid="ignore"):
+        doubtful = (np.abs(values[:, 1:-1]) <= noise) & (beside == np.sign(values[:, 2:]))
+    values[:, 1:-1] = np.where(doubtful, beside * noise, values[:, 1:-1])
+    return values
+
+
+def _with_dips(
+    margins_at: Callable[[Ints, Floats], Floats], radii: Floats, values: Floats, noise: Floats
+) -> tuple[Floats, Floats]:
+    """Samples of margins with those added at which a margin has the other sign than at the samples on both sides.
+
+    A local minimum above zero (or maximum below) is looked at where the slopes beside it admit a zero.
+    """
+    before, here, after = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    left, right = radii[1:-1] - radii[:-2], radii[2:] - radii[1:-1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sign = np.sign(here)
+        height, fall, rise = np.abs(here), sign * (before - here), sign * (after - here)
+        lowest = (fall >= 0) & (rise >= 0) & (sign * before > 0) & (sign * after > 0)
+        slope = np.maximum(fall / left, rise / right)
+        lowest &= (height <= slope * np.maximum(left, right)) & np.isfinite(height)
+    margin, row, lane = np.nonzero(lowest)
+    if not len(margin):
+        return radii, values
+    rows, sign = row + np.arange(3)[:, None], sign[margin, row, lane]
+
+    def evaluate(which: Ints, radius: Floats) -> Floats:
+        found = margins_at(lane[which], radius)[margin[which], np.arange(len(which))]
+        return np.asarray(sign[which] * found)
+
+    place, value = dips(evaluate, radii[rows, lane], sign * values[margin, rows, lane], -noise[margin])
+    hidden = value < -noise[margin]
+    lane, place = lane[hidden], place[hidden]
+    order = np.argsort(lane, kind="stable")
+    lane, place = lane[order], place[order]
+    # As many more samples a lane, all at its end but those that were found.
+    slot = np.arange(len(lane)) - np.searchsorted(lane, lane)
+    most = int(slot.max(initial=-1)) + 1
+    more, more_values = np.repeat(radii[-1:], most, axis=0), np.repeat(values[:, -1:], most, axis=1)
+    more[slot, lane], more_values[:, slot, lane] = place, margins_at(lane, place)
+    radii, values = np.concatenate([radii, more]), np.concatenate([values, more_values], axis=1)
+    order = np.argsort(radii, axis=0, kind="stable")
+    return np.take_along_axis(radii, order, axis=0), np.take_along_axis(values, order[None], axis=1)
+
+
+def _replace(found: Intervals, lanes: Ints, part: Intervals, tie: Floats) -> Intervals:
+    """Intervals with those at `lanes` replaced by the parts of them that `part` has left.
+
+    A cut no farther from an end than `tie` (of each ray) is that end: rounding does not choose its name.
+    """
+    source = lanes[part.ray]
+    near = tie[found.ray[source]]
+    at_start = (part.enters < 0) | (part.inner - found.inner[source] <= near)
+    at_end = (part.leaves < 0) | (found.outer[source] - part.outer <= near)
+    keep = np.ones(len(found.ray), dtype=bool)
+    keep[lanes] = False
+    owner = np.concatenate([found.ray[keep], found.ray[source]])
+    inner = np.concatenate([found.inner[keep], np.where(at_start, found.inner[source], part.inner)])
+    outer = np.concatenate([found.outer[keep], np.where(at_end, found.outer[source], part.outer)])
+    enters = np.concatenate([found.enters[keep], np.where(at_start, found.enters[source], part.enters)])
+    leaves = np.concatenate([found.leaves[keep], np.where(at_end, found.leaves[source], part.leaves)])
+    order = np.lexsort((inner, owner))
+    beyond = np.zeros(len(found.beyond), dtype=bool)
+    beyond[owner[leaves < 0]] = True
+    ray, radius, margin, turn = (np.concatenate([a, b]) for a, b in zip(
+        found.crossings, (found.ray[lanes[part.crossings[0]]], *part.crossings[1:]), strict=True))  # fmt: skip
+    sort = np.lexsort((radius, ray))
+    return Intervals(
+        owner[order], inner[order], outer[order], enters[order], leaves[order], beyond,
+        (ray[sort], radius[sort], margin[sort], turn[sort]),
+    )  # fmt: skip
+
+
+def intervals_between(
+    margin: Ints, ray: Ints, turn: Ints, radius: Floats, start: Ints, reach: Floats, slack: float
+) -> Intervals:
+    """Put the roots of each ray in order and keep the stretches where no margin is negative."""
+    rays = len(reach)
+    key = radius + np.where(turn < 0, slack * reach[ray], 0.0)
+    order = np.lexsort((margin, -turn, key, ray))
+    margin, ray, turn, radius = margin[order], ray[order], turn[order], radius[order]
+    first = np.searchsorted(ray, np.arange(rays))
+    total = np.cumsum(-turn)
+    before = np.where(first > 0, total[first - 1], 0) if len(total) else np.zeros(rays, dtype=int)
+    negative = total - before[ray] + start[ray]
+    # An interval begins at a root after which nothing is negative, or at the centre.
+    begins = np.nonzero(negative == 0)[0]
+    central = np.nonzero(start == 0)[0]
+    ends = np.append(ray, -1)
+    after = begins + 1
+    closed = ends[after] == ray[begins]
+    inner = np.concatenate([np.zeros(len(central)), radius[begins]])
+    enters = np.concatenate([np.full(len(central), -1), margin[begins]])
+    owner = np.concatenate([central, ray[begins]])
+    has = ends[np.minimum(first[central], len(ray))] == central
+    last = np.concatenate([np.where(has, first[central], -1), np.where(closed, after, -1)]).astype(np.intp)
+    outer = np.where(last >= 0, np.append(radius, 0.0)[last], reach[owner])
+    leaves = np.where(last >= 0, np.append(margin, -1)[last], -1)
+    sort = np.lexsort((inner, owner))
+    owner, inner, outer, enters, leaves = (v[sort] for v in (owner, inner, outer, enters, leaves))
+    beyond = np.zeros(rays, dtype=bool)
+    beyond[owner[leaves < 0]] = True
+    tie = SAME * reach
+    enters = _first_named(owner, inner, enters, margin[turn > 0], ray[turn > 0], radius[turn > 0], tie)
+    leaves = _first_named(owner, outer, leaves, margin[turn < 0], ray[turn < 0], radius[turn < 0], tie)
+    return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, (ray, radius, margin, turn))
+
+
+def _first_named(owner: Ints, at: Floats, label: Ints, margin: Ints, ray: Ints, radius: Floats, tie: Floats) -> Ints:
+    """The first of the margins that end an interval at the same place, so that rounding does not choose the name."""
+    best = label.copy()
+    begin = np.searchsorted(ray, owner)
+    end = np.searchsorted(ray, owner, side="right")
+    for k in range(int(np.max(end - begin, initial=0))):
+        at_k = np.minimum(begin + k, max(len(ray) - 1, 0))
+        match = (begin + k < end) & (label >= 0)
+        match[match] = np.abs(radius[at_k[match]] - at[match]) <= tie[owner[match]]
+        best[match] = np.minimum(best[match], margin[at_k[match]])
+    return best

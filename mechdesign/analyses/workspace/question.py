@@ -1,0 +1,268 @@
+"""The question of the workspace section, made ready: the field, the scan, the rule; and its answer for any designs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.analyses.region.field import Places
+from mechdesign.analyses.region.panels import Effort, Panels, find_panels
+from mechdesign.analyses.region.pieces import Pieces
+from mechdesign.analyses.region.rays import Designs
+from mechdesign.analyses.region.regions import Region, problem, regions
+from mechdesign.analyses.workspace.bounding import bounding_box
+from mechdesign.analyses.workspace.indices import INDICES, OF_JACOBIAN, Prepared, prepare
+from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
+from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
+from mechdesign.memory import keep_freed_memory
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.study import Study
+
+SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
+RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
+# The area that the rules of comparison divide is integrated to this relative tolerance.
+AREA_TOLERANCE = 1e-6
+# Relative tolerance of the integrals where the study says none: of one region, and of each design of many.
+TOLERANCE, GRID_TOLERANCE = 1e-5, 1e-4
+# Relative accuracy of the smallest and largest values of an index.
+PEAK_TOLERANCE = 1e-5
+# What every workspace has; of the local indices follow their statistics, as ``sigma_min_mean``.
+COLUMNS = ("GII", "GRI", "SUI", "area", "box_area")
+MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
+STATISTICS = ("mean", "min", "max", "std")
+
+
+@dataclass(frozen=True, eq=False)
+class Question(Region):
+    """What the workspace section asks of a region.
+
+    Parameters
+    ----------
+    counted : (float, float)
+        Range of angle that the means are taken over (radians).
+    indices : tuple of Prepared
+        Local indices: those that the study asks for, and what `wanted` needs.
+    wanted : tuple of str
+        Columns of the answer.
+    """
+
+    counted: tuple[float, float]
+    rule: str
+    tolerance: float
+    nodes: int | None
+    indices: tuple[Prepared, ...]
+    wanted: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The wanted columns for each design, and their estimated errors (0 where the rule has none).
+
+    Parameters
+    ----------
+    panels : Panels
+        Those that are counted.
+    pieces : Pieces or None
+        All pieces of the regions; the first of each design is counted, or all are in any assembly. None for several
+        designs whose pieces all count.
+    """
+
+    values: dict[str, Floats]
+    errors: dict[str, Floats]
+    panels: Panels
+    pieces: Pieces | None
+
+
+def columns(names: Iterable[str]) -> tuple[str, ...]:
+    """Columns of a workspace with these local indices."""
+    return (*COLUMNS, *(f"{name}_{kind}" for name in names for kind in STATISTICS))
+
+
+def split(column: str) -> tuple[str, str]:
+    """Local index and statistic of a column, ``("", "")`` of the area and its like."""
+    if column in MEANS:
+        return MEANS[column], "mean"
+    name, _, kind = column.rpartition("_")
+    return (name, kind) if name in INDICES and kind in STATISTICS else ("", "")
+
+
+def batched(column: str) -> bool:
+    """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
+    return column in COLUMNS or split(column)[0] in OF_JACOBIAN
+
+
+def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:
+    """One question a value of ``at``.
+
+    Parameters
+    ----------
+    tolerance : float
+        Of the integrals where the study says none.
+    wanted : sequence of str, optional
+        Columns of the answer; left out, all of those indices that the study asks for.
+
+    Raises
+    ------
+    StudyError
+        If the section lacks what cannot be assumed.
+    """
+    found, section = regions(study), study.workspace
+    assert section is not None
+    (start, stop), margin = found[0].scan, section.margin * study.units.angle_factor
+    if stop - start <= 2 * margin:
+        raise problem(study, "margin", "the margin leaves nothing of the scan")
+    integrate_by = section.integrate
+    if "tolerance" in integrate_by.model_fields_set:
+        tolerance = integrate_by.tolerance
+    wanted = columns(OF_JACOBIAN if section.indices is None else section.indices) if wanted is None else tuple(wanted)
+    indices = prepare(study, list(dict.fromkeys(filter(None, (split(column)[0] for column in wanted)))))
+    counted = (start + margin, stop - margin)
+    return [
+        Question(**vars(region), counted=counted, rule=integrate_by.rule, tolerance=tolerance,
+                 nodes=integrate_by.nodes, indices=indices, wanted=wanted)
+        for region in found
+    ]  # fmt: skip
+
+
+def answer(question: Question, places: Places, count: int, effort: Effort) -> Answer:
+    """Indices of `count` designs, whose changed places are arrays of shape (count,).
+
+    Raises
+    ------
+    AssemblyError
+        If a region has no end.
+    """
+    keep_freed_memory()
+    designs = Designs(question.field, places, count, question.about)
+    cuts = tuple(sorted(set(question.counted) - set(question.scan)))
+    panels = find_panels(designs, question.scan, effort, cuts)
+    pieces = None
+    if count == 1 or question.field.same_assembly:
+        pieces = Pieces.of(designs, panels, question.scan, effort.samples)
+        if question.field.same_assembly:
+            designs, panels = pieces.only(0)
+    if not panels.closes.any():
+        nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
+        errors = {name: np.maximum(panels.seen, 0.0) * (name == "area") for name in question.wanted}
+        return Answer(nothing, errors, panels, pieces)
+    samples, gauss = effort.samples, question.rule == "gauss"
+    tolerance = question.tolerance if gauss else AREA_TOLERANCE
+    integrands, peaks = _integrands(question), _peaks(question, designs, panels, samples)
+    endless = _endless(question, integrands, peaks, count)
+    means, doubts = np.full(endless.shape, np.inf), np.zeros(endless.shape)
+    means[:, ~panels.closes] = np.nan
+    # What is infinite for every design need not be looked at.
+    some = np.flatnonzero(~endless[:, panels.closes].all(axis=1))
+    finite = [integrands[k] for k in some]
+    integral = integrate(
+        designs,
+        panels,
+        tolerance,
+        samples,
+        question.counted,
+        finite if gauss else (),
+        endless[some[: len(some) * gauss]],
+    )
+    if gauss:
+        means[some], doubts[some] = integral.mean, integral.mean_error
+    else:
+        means[some] = _simple(question, designs, panels, samples, finite)
+    # Where all pieces count, the raster tells if one is missing.
+    every = pieces is None or not question.field.same_assembly or pieces.number <= 1
+    missing = np.where(every, panels.seen - integral.area, 0.0)
+    values: dict[str, Floats] = {"area": integral.area}
+    errors = {"area": np.maximum(integral.area_error, missing)}
+    if {"SUI", "box_area"} & set(question.wanted):
+        box = bounding_box(designs, panels, integral.boundary, samples)
+        values["box_area"], errors["box_area"] = box, np.zeros(count)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values["SUI"], errors["SUI"] = integral.area / box, integral.area_error / box
+    for column in question.wanted:
+        name, kind = split(column)
+        if name:
+            values[column], errors[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
+    pick = question.wanted
+    return Answer({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels, pieces)
+
+
+def areas_of_pieces(question: Question, given: Answer, effort: Effort) -> list[float]:
+    """Area of each piece of a single design's region."""
+    assert given.pieces is not None
+    if given.pieces.number[0] == 1 and "area" in given.values:
+        return [float(given.values["area"][0])]
+    none = np.zeros((0, 1), dtype=bool)
+    return [
+        float(integrate(*part, AREA_TOLERANCE, effort.samples, question.scan, (), none).area[0])
+        for part in given.pieces.all()
+    ]
+
+
+def _integrands(question: Question) -> tuple[Integrand, ...]:
+    """What the wanted means and standard deviations need: the indices, and their squares."""
+    asked = {split(column) for column in question.wanted}
+    return tuple(
+        Integrand(index, power)
+        for power, kinds in ((1, ("mean", "std")), (2, ("std",)))
+        for index in question.indices
+        if any((index.name, kind) in asked for kind in kinds)
+    )
+
+
+def _peaks(question: Question, designs: Designs, panels: Panels, samples: int) -> Peaks | None:
+    """Extremes, where they are wanted or an integral may be infinite."""
+    asked = {split(column) for column in question.wanted}
+    wanted = np.array([[(index.name, kind) in asked for index in question.indices] for kind in ("min", "max")])
+    squares = any(kind == "std" for _, kind in asked)
+    if not wanted.any() and not squares and all(index.index.crossing != np.inf for index in question.indices):
+        return None
+    return find_peaks(designs, panels, question.indices, samples, PEAK_TOLERANCE, wanted)
+
+
+def _endless(question: Question, integrands: Sequence[Integrand], peaks: Peaks | None, count: int) -> Flags:
+    """Integrals that are infinite: the integrand grows at least as 1/distance towards a curve."""
+    if peaks is None:
+        return np.zeros((len(integrands), count), dtype=bool)
+    order = dict(zip((index.name for index in question.indices), peaks.order, strict=True))
+    grows = [integrand.power * order[integrand.index.name] >= 1 for integrand in integrands]
+    return np.array(grows, dtype=bool).reshape(-1, count)
+
+
+def _statistic(
+    name: str, kind: str, question: Question, integrands: Sequence[Integrand], means: Floats, doubts: Floats,
+    peaks: Peaks | None,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Values and errors of one statistic of one index."""
+    if kind in ("min", "max"):
+        assert peaks is not None
+        at = (("min", "max").index(kind), [index.name for index in question.indices].index(name))
+        return peaks.value[at], peaks.error[at]
+    row = {(integrand.index.name, integrand.power): k for k, integrand in enumerate(integrands)}
+    mean, doubt = means[row[name, 1]], doubts[row[name, 1]]
+    if kind == "mean":
+        return mean, doubt
+    square, square_doubt = means[row[name, 2]], doubts[row[name, 2]]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = np.where(np.isinf(square), np.inf, np.sqrt(np.maximum(square - mean * mean, 0.0)))
+        total = square_doubt + 2 * np.abs(mean) * doubt
+        # Of a deviation that is nothing but its error the square is in doubt, not the root's slope.
+        error = np.where(np.isinf(spread), 0.0, np.minimum(total / (2 * spread), np.sqrt(total)))
+    return spread, error
+
+
+def _simple(
+    question: Question, designs: Designs, panels: Panels, samples: int, integrands: Sequence[Integrand]
+) -> Floats:
+    nodes = question.nodes or RADIAL_NODES[question.rule]
+    low, high = question.counted
+    if question.rule == "sector_mean":
+        theta = np.linspace(low, high, question.rays or SECTOR_RAYS)
+        fractions = np.arange(1, nodes + 1) / (nodes + 1)
+    else:
+        rays = question.rays or MIDPOINT_RAYS
+        theta = low + (high - low) * (np.arange(rays) + 0.5) / rays
+        fractions = (np.arange(nodes) + 0.5) / nodes
+    return simple_means(
+        designs, integrands, panels.reach, samples, theta, fractions, by_area=question.rule == "midpoint"
+    )

@@ -1,0 +1,361 @@
+"""Solved poses all over a region of the plane, from which others are continued where there is no closed form.
+
+From the sketch every pose would be a long way off, and what cannot be reached would be tried again and again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.configuration import Configuration, Reason, hide
+from mechdesign.mechanism.continuation import MAX_CHANGE, guess_of, scale_of, table_of
+from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.state import State
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+
+# Distance of neighbouring poses, as a part of the mechanism's size.
+SPACING = 0.03
+# Beyond this many spacings from the nearest solved pose nothing is inside.
+REACH = 1.6
+# Most poses of a design.
+MOST_POSES = 20_000
+# Poses outside the study's limits are passed through over this many spacings: there may be another piece beyond.
+LIMIT_GAP = 15
+# Step of differences, as a part of the mechanism's size.
+DIFFERENCE = 1e-6
+# Steps in which dimensions are changed.
+STAGES = 8
+# Every so many-th pose of the nominal mechanism is brought to other dimensions, where the poses of those grow from.
+COARSE = 3
+# Poses of all designs that are kept for the next question.
+KEPT_POSES = 500_000
+# Corrections of Newton's method from what the slopes lead to expect, and single ones beside a fold.
+CORRECTIONS = 5
+SINGLE_CORRECTIONS = 30
+# A correction that leaves less of the determinant than this is towards a fold (at the fold itself: a half).
+NEAR_FOLD = 0.8
+SIDES = np.array([1, 1j, -1, -1j])
+
+
+@dataclass(frozen=True, eq=False)
+class _Poses:
+    """Solved poses of one design on a lattice.
+
+    Parameters
+    ----------
+    tree : cKDTree
+        Places of the point.
+    lattice : ndarray of complex, shape (poses,)
+        The same in spacings from the sketch's.
+    table : ndarray, shape (unknowns, poses)
+        Unknowns of the groups without a closed form.
+    slopes : ndarray, shape (2, unknowns, poses)
+        Their derivatives by the point's x and y.
+    """
+
+    tree: cKDTree
+    lattice: Complexes
+    table: Floats
+    slopes: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """Poses of a mechanism all over its region, for the nominal dimensions and for others as they are asked for.
+
+    Parameters
+    ----------
+    held : tuple of float
+        Values of the plan's coordinates after the point's x and y.
+    signs : ndarray, shape (groups, 1)
+        Sign of the determinant of each group without a closed form: others are other assemblies.
+    origin : complex
+        The point's place in the sketch.
+    """
+
+    plan: Plan
+    held: tuple[float, ...]
+    signs: Floats
+    origin: complex
+    known: dict[bytes, _Poses] = field(default_factory=dict)
+
+    @staticmethod
+    def of(plan: Plan, held: tuple[float, ...]) -> Atlas:
+        """Poses of the nominal mechanism, grown from the sketch's place until nothing more is reached.
+
+        There are none where the mechanism cannot be brought from its sketch to the held values.
+        """
+        sketch = plan.core.sketch_configuration
+        origin = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
+        given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, held)]
+        first = plan.solve(given, limits=False)
+        start = plan.start(first)
+        atlas = Atlas(plan, held, np.array(start.signs).reshape(-1, 1), origin)
+        seeds = np.flatnonzero(first.valid)
+        table = table_of(start.unknowns, (1,))[:, seeds]
+        (atlas.known[b""],) = atlas._grown({}, seeds, np.zeros(len(seeds), complex), table)
+        return atlas
+
+    @property
+    def empty(self) -> bool:
+        """Whether the held values cannot be had at the point's place in the sketch, where poses would grow from."""
+        return not self.known[b""].tree.n
+
+    @property
+    def spacing(self) -> float:
+        """Distance of neighbouring poses."""
+        return SPACING * self.plan.core.size
+
+    def solve(self, z: Complexes, places: Mapping[str, Value], *, beyond: bool = False) -> tuple[Configuration, Floats]:
+        """The mechanism with its point at `z`, and how far it is from where two of its assemblies meet (a fold).
+
+        What does not depend on a leg that cannot reach stays finite, as where all groups have a closed form. Where the
+        nearest solved pose is far and a leg does not reach either, the place on the way from there is told.
+
+        Parameters
+        ----------
+        places : mapping of str to array_like
+            Dimensions that differ from the nominal ones; they broadcast against `z`.
+        beyond : bool
+            Whether beyond a fold the pose at the fold is told, and beyond a leg's reach that with the leg stretched.
+
+        Returns
+        -------
+        configuration : Configuration
+            nan where nothing is reached.
+        fold_distance : ndarray
+            The product of the squared determinants, linear in the distance to a fold and negative beyond it; nan
+            where nothing is known.
+        """
+        shape = np.broadcast_shapes(z.shape, *(np.shape(value) for value in places.values()))
+        flat = np.broadcast_to(z, shape).ravel()
+        sizes = {name: np.broadcast_to(np.asarray(v, dtype=float), shape).ravel() for name, v in places.items()}
+        near, table, slopes = self._nearest(flat, sizes)
+        lost = ~np.isfinite(near) | ~np.isfinite(flat)
+        way = np.where(lost, 0.0, flat - near)
+        goal = np.where(lost, self.origin, flat)
+        reach = REACH * self.spacing
+        far = np.abs(way) > reach
+        within = np.where(far, near + way * (reach / np.maximum(np.abs(way), reach)), goal)
+        with np.errstate(all="ignore"):
+            ahead = slopes[0] * way.real + slopes[1] * way.imag
+            state, fold_distance = self._solved(goal, sizes, table, ahead, within, beyond)
+            fold_distance[lost | (far & ~self._open(state, flat.shape))] = np.nan
+        lost = np.isnan(fold_distance) if beyond else ~(fold_distance > 0)
+        return self._configuration(state, places, lost.reshape(shape)), fold_distance.reshape(shape)
+
+    def _solved(
+        self,
+        z: Complexes,
+        sizes: Mapping[str, Floats],
+        table: Floats,
+        ahead: Value,
+        within: Complexes,
+        beyond: bool = False,
+    ) -> tuple[State, Floats]:  # fmt: skip
+        """The mechanism near known poses, and its distances from a fold (see `solve`).
+
+        Parameters
+        ----------
+        table, ahead : ndarray, shape (unknowns, poses)
+            Of the known poses, and what they are expected to change.
+        within : ndarray of complex
+            Places that are told instead of `z` where a pose is not solved at once.
+        """
+        # Beside a fold the unknowns change too fast for their slopes to tell.
+        scale = scale_of(self.plan.structure, self.plan.core.size, table)
+        guess = table + np.where((np.abs(ahead) <= MAX_CHANGE * scale).all(axis=0), ahead, 0.0)
+        state = self._run(z, sizes, guess, CORRECTIONS, beyond)
+        fold_distance = np.prod(_determinants(state, z.shape) ** 2, axis=0)
+        rows = np.flatnonzero(~state.solved(z.shape, self.signs.tolist()))
+        if not len(rows):
+            return state, fold_distance
+        found = table_of(state.unknowns, z.shape)
+        own = {name: value[rows] for name, value in sizes.items()}
+        found[:, rows], fold_distance[rows] = self._beside_fold(within[rows], own, table[:, rows])
+        z[rows] = within[rows]
+        return self._run(z, sizes, found, 0, beyond), fold_distance
+
+    def _beside_fold(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats) -> tuple[Floats, Floats]:
+        """Unknowns and distances from a fold, by single corrections until a pose is solved or seen to be beyond.
+
+        Towards a fold the equations are those of a parabola: from one side of it corrections never pass to the other,
+        where the determinant has the other sign, unless there is no solution. The squared determinant of the solution
+        is g = D0 (2 D1 - D0), with D0 and D1 before and after a correction, also where it is negative: so far beyond.
+        Corrections alone would only halve D each time; a longer one ends at the root of g, or beside the fold.
+        """
+        fold_distance, left = np.full(z.shape, np.nan), np.arange(len(z))
+        found, guess = table.copy(), table
+        # The last place, the determinants there, and whether a correction led from there.
+        last, before, led = guess, np.full((len(self.signs), len(z)), np.nan), np.zeros(len(z), dtype=bool)
+        for _ in range(SINGLE_CORRECTIONS):
+            own = {name: value[left] for name, value in sizes.items()}
+            state = self._run(z[left], own, guess, 1)
+            now, new = _determinants(state, left.shape), table_of(state.unknowns, left.shape)
+            squares = before * (2 * now - before)
+            crossed = np.sign(now) != self.signs
+            beyond = crossed.any(axis=0)
+            solved = ~beyond & state.solved(left.shape)
+            found[:, left[solved]], fold_distance[left[solved]] = new[:, solved], np.prod(now**2, axis=0)[solved]
+            # Of what lies beyond, the pose at the fold is told.
+            share = np.where(crossed & led, before / (before - now), 1.0).min(axis=0)
+            found[:, left[beyond]] = (last + share * (guess - last))[:, beyond]
+            squared = np.where(crossed & led, squares, now**2)
+            fold_distance[left[beyond]] = -np.abs(np.prod(squared, axis=0))[beyond]
+            # The group that is nearest to its fold says how much longer the correction should have been.
+            nearest = np.argmin(np.where(led, now / before, 1.0), axis=0)[None]
+            d0, d1, g = (np.take_along_axis(v, nearest, axis=0)[0] for v in (before, now, squares))
+            goal = np.copysign(np.where(g > 0, 1.0, 0.5) * np.sqrt(np.abs(g)), d0)
+            longer = led & (d1 / d0 < NEAR_FOLD)
+            target = np.where(longer, last + (d0 - goal) / (d0 - d1) * (guess - last), new)
+            moving = ~solved & ~beyond & np.isfinite(target).all(axis=0)
+            left, last, guess, before = left[moving], guess[:, moving], target[:, moving], now[:, moving]
+            led = ~longer[moving]
+            if not len(left):
+                break
+        return found, fold_distance
+
+    def _run(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats, steps: int, beyond: bool = False) -> State:
+        """The whole mechanism after some of Newton's corrections."""
+        vectors = self.plan.core.geometry.vectors(sizes)
+        guess = guess_of(self.plan.structure, table)
+        return self.plan.run([z.real, z.imag, *self.held], vectors, guess, steps=steps, beyond=beyond)
+
+    def _nearest(self, z: Complexes, sizes: Mapping[str, Floats]) -> tuple[Complexes, Floats, Floats]:
+        """Places of the nearest solved poses (nan where there is none), their unknowns and slopes."""
+        if not sizes or self.empty:
+            return _pick(self.known[b""], z)
+        rows, which = np.unique(np.stack(list(sizes.values()), axis=-1), axis=0, return_inverse=True)
+        which = which.ravel()
+        keys = [",".join(sizes).encode() + row.tobytes() for row in rows]
+        new = [k for k, key in enumerate(keys) if key not in self.known]
+        if new:
+            fresh = self._designs({name: rows[new, k] for k, name in enumerate(sizes)}, len(new))
+            self.known.update({keys[k]: poses for k, poses in zip(new, fresh, strict=True)})
+        count = len(self.known[b""].table)
+        near = np.empty(z.shape, dtype=complex)
+        table, slopes = np.empty((count, len(z))), np.empty((2, count, len(z)))
+        order = np.argsort(which, kind="stable")
+        for key, lanes in zip(keys, np.split(order, np.cumsum(np.bincount(which))[:-1]), strict=True):
+            near[lanes], table[:, lanes], slopes[:, :, lanes] = _pick(self.known[key], z[lanes])
+        if sum(poses.tree.n for poses in self.known.values()) > KEPT_POSES:
+            for key in self.known.keys() - {b"", *keys}:
+                del self.known[key]
+        return near, table, slopes
+
+    def _designs(self, sizes: Mapping[str, Floats], count: int) -> list[_Poses]:
+        """Poses of several designs: some of the nominal ones are brought to their dimensions and grow from there."""
+        nominal = self.known[b""]
+        coarse = np.flatnonzero((nominal.lattice.real % COARSE == 0) & (nominal.lattice.imag % COARSE == 0))
+        design, seed = np.repeat(np.arange(count), len(coarse)), np.tile(coarse, count)
+        table, lattice = nominal.table[:, seed], nominal.lattice[seed]
+        for stage in range(1, STAGES + 1):
+            between = {}
+            for name, value in sizes.items():
+                begin = self.plan.core.nominal.get(name, 0.0)
+                between[name] = begin + (stage / STAGES) * (value[design] - begin)
+            z = self.origin + self.spacing * lattice
+            state, fold_distance = self._solved(z, between, table, 0.0, z)
+            reached = fold_distance > 0
+            design, lattice = design[reached], lattice[reached]
+            table = table_of(state.unknowns, reached.shape)[:, reached]
+        return self._grown(sizes, design, lattice, table)
+
+    def _grown(self, sizes: Mapping[str, Floats], design: Ints, lattice: Complexes, table: Floats) -> list[_Poses]:
+        """Poses of all designs, from solved ones to their neighbours on the lattice until nothing more closes."""
+        count = max((len(value) for value in sizes.values()), default=1)
+        seen = set(zip(design.tolist(), lattice.tolist(), strict=True))
+        layers = [(design[:0], lattice[:0], table[:, :0])]
+        # Spacings since a pose was within the limits.
+        outside = np.zeros(len(design), dtype=int)
+        while len(design):
+            z = self.origin + self.spacing * lattice
+            own = {name: value[design] for name, value in sizes.items()}
+            state, fold_distance = self._solved(z, own, table, 0.0, z)
+            table, reached = table_of(state.unknowns, z.shape), fold_distance > 0
+            # Poses just outside, where a leg does not reach, tell how far outside it is; but nothing grows from them.
+            outside = np.where(self._within(state, own, z.shape), 0, outside + 1)
+            closed = np.flatnonzero(reached & ~self._open(state, z.shape) & (outside < LIMIT_GAP))
+            layers.append((design[reached], lattice[reached], table[:, reached]))
+            fresh: dict[tuple[int, complex], int] = {}
+            steps = (lattice[closed, None] + SIDES).ravel().tolist()
+            parents = np.repeat(closed, len(SIDES)).tolist()
+            for k, owner, step in zip(parents, design[parents].tolist(), steps, strict=True):
+                if (owner, step) not in seen:
+                    fresh.setdefault((owner, step), k)
+            if len(seen) + len(fresh) > MOST_POSES * count:
+                break
+            seen.update(fresh)
+            parent = np.array(list(fresh.values()), dtype=np.intp)
+            design = design[parent]
+            lattice = np.array([step for _, step in fresh], dtype=complex)
+            table, outside = table[:, parent], outside[parent]
+        design, lattice, table = (np.concatenate(parts, axis=-1) for parts in zip(*layers, strict=True))
+        slopes = self._slopes(lattice, {name: value[design] for name, value in sizes.items()}, table)
+        found = []
+        for k in range(count):
+            lanes = np.flatnonzero(design == k)
+            z = self.origin + self.spacing * lattice[lanes]
+            tree = cKDTree(np.stack([z.real, z.imag], axis=-1))
+            found.append(_Poses(tree, lattice[lanes], table[:, lanes], slopes[:, :, lanes]))
+        return found
+
+    def _slopes(self, lattice: Complexes, sizes: Mapping[str, Floats], table: Floats) -> Floats:
+        """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
+        h = DIFFERENCE * self.plan.core.size
+        z = self.origin + self.spacing * lattice
+        with np.errstate(all="ignore"):
+            beside = [table_of(self._run(z + step, sizes, table, 1).unknowns, z.shape) for step in (h, 1j * h)]
+            slopes = (np.stack(beside) - table) / h
+        return np.where(np.isfinite(slopes).all(axis=1, keepdims=True), slopes, 0.0)
+
+    def _within(self, state: State, sizes: Mapping[str, Floats], shape: tuple[int, ...]) -> Flags:
+        """Which poses are within the study's limits."""
+        found = np.ones(shape, dtype=bool)
+        for _, margin in self.plan.core.margins(self._configuration(state, sizes, np.zeros(shape, dtype=bool))):
+            found &= np.asarray(margin) >= 0
+        return found
+
+    def _configuration(self, state: State, places: Mapping[str, Value], lost: Flags) -> Configuration:
+        """A flat batch of states in the shape of `lost`, nan where that is true."""
+        graph, shape = self.plan.core.graph, lost.shape
+
+        def shaped(values: Sequence[Value]) -> list[Value]:
+            full = [value if np.ndim(value) == 0 else np.asarray(value).reshape(shape) for value in values]
+            return [hide(value, lost) for value in full] if lost.any() else full
+
+        return Configuration(
+            graph, self.plan.core.geometry.vectors(places), shape, shaped(state.nodes),
+            shaped(state.rotations[: graph.classes]), shaped(state.slides), shaped(state.closures),
+            np.where(lost, Reason.NOT_CLOSED, Reason.OK).astype(np.int8), places,
+            self.plan.near_sketch([0.0, 0.0, *self.held], places),
+        )  # fmt: skip
+
+    def _open(self, state: State, shape: tuple[int, ...]) -> Flags:
+        """Where a leg does not reach, or has no length."""
+        lengths = [state.slides[slide] for slide in self.plan.core.graph.telescopic]
+        found = np.zeros(shape, dtype=bool)
+        for margin in (*state.closures, *lengths):
+            found |= ~(np.asarray(margin) > 0)
+        return found
+
+
+def _pick(poses: _Poses, z: Complexes) -> tuple[Complexes, Floats, Floats]:
+    """Place, unknowns and slopes of the pose nearest to each place; nan where there is none."""
+    if not poses.tree.n:
+        shape = (len(poses.table), len(z))
+        return np.full(z.shape, complex(np.nan, np.nan)), np.zeros(shape), np.zeros((2, *shape))
+    at = np.stack([z.real, z.imag], axis=-1)
+    index = np.asarray(poses.tree.query(np.where(np.isfinite(at), at, 0.0))[1])
+    near = np.asarray(poses.tree.data)[index]
+    return near[:, 0] + 1j * near[:, 1], poses.table[:, index], poses.slopes[:, :, index]
+
+
+def _determinants(state: State, shape: tuple[int, ...]) -> Floats:
+    """Determinants of a state's groups without a closed form, one a row."""
+    return np.stack([np.broadcast_to(determinant, shape) for determinant in state.determinants])

@@ -1,0 +1,33 @@
+"""Pictures of a motion: curves over the sweep, the mechanism in several poses, and its other assemblies."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from mechdesign.analyses.poses import study_poses
+from mechdesign.report.figures.kinematics.curves import curves_figure
+from mechdesign.report.figures.kinematics.modes import modes_figure
+from mechdesign.report.figures.kinematics.paths import paths_figure
+from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.sweep import is_motion, solve_sweep
+from mechdesign.results import Result
+from mechdesign.study import Study
+
+
+def figures(study: Study, result: Result) -> Gallery:
+    """``motion`` (curves of a sweep or path), ``paths`` (poses and point paths) and ``modes`` (every assembly).
+
+    Lists and grids of poses have neither curves nor paths.
+    """
+    found = Gallery()
+    if is_motion(study_poses(study, "kinematics")):
+        found.add("motion", curves_figure, study, result)
+        found.add("paths", _paths, study)
+    if "modes" in result.tables:
+        found.add("modes", modes_figure, study)
+    return found
+
+
+def _paths(study: Study) -> Figure | None:
+    sweep = solve_sweep(study)
+    return paths_figure(sweep) if len(sweep.valid) else None

@@ -1,0 +1,107 @@
+"""The motion as an animated GIF: the mechanism over the paths of its points.
+
+Matplotlib draws what stands still once and what moves in every frame; Pillow gives all frames one small palette, so
+that a frame stores only what changed. `matplotlib.animation.PillowWriter` would draw everything anew, give every frame
+a palette of its own, and write to a file only: ten times the time and the bytes.
+"""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
+
+from mechdesign.analyses.poses import study_poses
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.framing import framed
+from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
+from mechdesign.report.figures.sweep import Sweep, is_motion, solve_sweep
+from mechdesign.study import Study
+
+FRAMES = 72
+_COLORS, _WHITE = 128, 244
+_TITLE = 0.36  # inches above the drawing, for the pose in words
+_CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and of a frame
+_DPI = 100  # 800 pixels wide
+
+
+def animation(study: Study) -> bytes:
+    """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
+    if not is_motion(study_poses(study, "kinematics")):
+        return b""
+    sweep = solve_sweep(study)
+    return gif(sweep) if len(sweep.valid) else b""
+
+
+def gif(sweep: Sweep) -> bytes:
+    """The valid poses of a motion as an endless GIF; back again where it does not end where it began.
+
+    At most `FRAMES` frames. Poses that are not valid have none; the title says how many.
+    """
+    valid, closed = in_order(sweep), sweep.closed
+    # A closed motion begins again with its last pose; another shows its inner poses twice.
+    most = FRAMES + 1 if closed else FRAMES // 2 + 1
+    some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
+    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST, above=_TITLE)
+    figure.set_dpi(_DPI)
+    draw_paths(axes, sweep)
+    pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)
+    pictures = pictures if closed else pictures + pictures[-2:0:-1]
+    palette = _palette(pictures)
+    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    pause = min(max(_CYCLE // len(frames), _SHORTEST), _LONGEST) // 10 * 10
+    stream = io.BytesIO()
+    frames[0].save(stream, format="GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0)
+    return stream.getvalue()
+
+
+def in_order(sweep: Sweep) -> np.ndarray:
+    """Valid poses; a turn that does not close everywhere begins behind the gap, so that its motion is in one piece."""
+    valid = sweep.valid
+    gaps = np.flatnonzero(np.diff(valid) > 1)
+    if sweep.returns and len(gaps):
+        valid = np.roll(valid[1:], -gaps[0])
+    return valid
+
+
+def _frames(figure: Figure, axes: Axes, sweep: Sweep, indices: np.ndarray) -> list[Image.Image]:
+    canvas: Any = figure.canvas  # the Agg canvas; its own methods have no types
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+    failed = len(sweep.rows) - len(sweep.valid)
+    note = f"   ({failed} of {len(sweep.rows)} poses not valid)" if failed else ""
+    standing = set(axes.get_children())
+    pictures = []
+    for index in indices.tolist():
+        draw_mechanism(
+            axes, sweep.mechanism, sweep.configuration, index, labels=False, drives=False, travel=sweep.travel
+        )  # fmt: skip
+        axes.text(0.0, 1.02, sweep.words(index) + note, transform=axes.transAxes, fontsize=10.5, color=style.INK)
+        moving = [artist for artist in axes.get_children() if artist not in standing]
+        canvas.restore_region(still)
+        for artist in sorted(moving, key=lambda artist: artist.get_zorder()):
+            axes.draw_artist(artist)
+            artist.remove()
+        pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy()))
+    return pictures
+
+
+def _palette(pictures: list[Image.Image]) -> Image.Image:
+    """Colours that do for all frames, from some of them."""
+    some = pictures[:: max(1, len(pictures) // 4)]
+    width, height = some[0].size
+    sheet = Image.new("RGB", (width, height * len(some)))
+    for k, picture in enumerate(some):
+        sheet.paste(picture, (0, k * height))
+    found = sheet.quantize(colors=_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    colors = np.array(found.getpalette()).reshape(-1, 3)
+    # Means of the lightest colours are not quite the white of the page.
+    colors[colors.min(axis=1) >= _WHITE] = 255
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colors.ravel().tolist())
+    return palette

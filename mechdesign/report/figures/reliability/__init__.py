@@ -1,0 +1,71 @@
+"""Pictures of errors: over a sweep or a map, densities, histograms, convergence, contributions, and the reliability."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechdesign.analyses.poses import pose_in_words, study_poses
+from mechdesign.report.figures.panels import along
+from mechdesign.report.figures.planes import plane
+from mechdesign.report.figures.reliability.allocation import allocation_figure
+from mechdesign.report.figures.reliability.contributions import contributions_figure
+from mechdesign.report.figures.reliability.densities import density_figures
+from mechdesign.report.figures.reliability.estimates import MOST_LISTED, estimate_figure
+from mechdesign.report.figures.reliability.looks import LOOKS
+from mechdesign.report.figures.reliability.maps import map_figures
+from mechdesign.report.figures.reliability.simulations import convergence_figure, histogram_figure, trend_figure
+from mechdesign.report.figures.reliability.sweeps import sweep_figures
+from mechdesign.report.figures.rendering import Gallery
+from mechdesign.results import Result, Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+
+def figures(study: Study, result: Result) -> Gallery:
+    """Whatever the result holds enough of to draw."""
+    poses, tables = study_poses(study, "reliability"), result.tables
+    swept, over = along(study, poses), plane(study, poses, study.reliability)
+    found = Gallery()
+    if swept is not None:
+        found.add("of errors along the motion", sweep_figures, study, tables["moments"], swept)
+    if over is not None:
+        found.add("of errors over the poses", map_figures, study, result, over)
+    few = poses.listed or (over is None and poses.count <= MOST_LISTED)
+    if "reliability" in tables and (few or swept is not None):
+        found.add("reliability", estimate_figure, study, tables["reliability"], poses, swept)
+    found.add("of samples", _sampled, study, result, poses)
+    found.add("contributions", contributions_figure, study, tables["contributions"], poses)
+    if "allocation" in tables:
+        found.add("allocation", allocation_figure, study, tables["allocation"])
+    return found
+
+
+def _sampled(study: Study, result: Result, poses: Poses) -> Gallery:
+    """Pictures of the tables that only methods which draw samples give."""
+    tables, moments = result.tables, result.tables["moments"]
+    found = Gallery()
+    # The tables are of the first method that samples errors; the moments hold its name.
+    method = next((name for name in moments["method"].tolist() if LOOKS[name].simulated), None)
+    if method is None:
+        return found
+    if "density" in tables:
+        _, where = _pose(study, poses, tables["density"])
+        found.add("density", density_figures, study, tables["density"], moments, where, LOOKS[method].words)
+    if "histogram" in tables:
+        _, where = _pose(study, poses, tables["histogram"])
+        found.add("histogram", histogram_figure, study, tables["histogram"], where, method)
+    if "convergence" in tables:
+        pose, where = _pose(study, poses, tables["convergence"])
+        found.add("convergence", convergence_figure, tables["convergence"], moments, pose, where, method)
+    if "estimate" in tables:
+        pose, where = _pose(study, poses, tables["estimate"])
+        found.add("estimate", trend_figure, tables["estimate"], tables["reliability"], pose, where)
+    return found
+
+
+def _pose(study: Study, poses: Poses, table: Table) -> tuple[int, str]:
+    """Row and words of the pose that a table begins with."""
+    first = [table[name][0] for name in poses.names]
+    rows = [np.array_equal(row, first, equal_nan=True) for row in zip(*poses.values.values(), strict=True)]
+    pose = rows.index(True)
+    return pose, pose_in_words(study, poses, pose)

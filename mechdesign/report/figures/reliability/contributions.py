@@ -1,0 +1,121 @@
+"""What errors come from: ranked shares of the variance, beside Sobol indices where they were asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.report.figures import style
+from mechdesign.report.figures.panels import MOST_PANELS, framed, legend_below, title
+from mechdesign.report.figures.reliability.looks import select
+from mechdesign.results import Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+MOST_SOURCES = 16
+MOST_POSES = 4
+# Columns of bars, in words and colours.
+_SOBOL = {
+    "share": ("first-order share", style.BLUE),
+    "sobol_first": ("Sobol index, alone", style.ORANGE),
+    "sobol_total": ("Sobol index, with all interactions", style.GREEN),
+}
+# Inches: a source, below a panel, above it, and the least width of its bars.
+_LINE, _BELOW, _ABOVE, _NARROWEST = 0.24, 0.62, 0.32, 1.9
+
+
+def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
+    """A panel an output and order; a bar a pose where a few are listed, their average otherwise, or three indices."""
+    pairs = list(dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), strict=True)))[:MOST_PANELS]
+    names = list(dict.fromkeys(table["source"].tolist()))
+    margin = 0.3 + 0.072 * max(len(name) for name in names)
+    room = int(style.WIDTH / (margin + _NARROWEST))
+    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, room))
+    lines = -(-len(pairs) // columns)
+    sobol = _sobol_pose(table, poses, len(names))
+    each = sobol is None and poses.listed and poses.count <= MOST_POSES
+    bars = 3 if sobol is not None else poses.count if each else 1
+    panel = (0.15 + min(len(names), MOST_SOURCES)) * max(_LINE, 0.1 * bars + 0.06)
+    keys = 0 if bars == 1 else 1 if bars < 3 else 2
+    bottom = 0.55 + 0.2 * keys
+    height = 0.75 + lines * panel + (lines - 1) * (_BELOW + _ABOVE) + bottom
+    gap = (margin + 0.1) / ((style.WIDTH - margin - 0.15 - (columns - 1) * (margin + 0.1)) / columns)
+    figure = framed(height, left=margin, right=0.15, top=0.75, bottom=bottom, apart=((_BELOW + _ABOVE) / panel, gap))
+    grid = figure.subplots(lines, columns, squeeze=False).ravel()
+    for axis in grid[len(pairs) :]:
+        axis.set_visible(False)
+    for axis, (output, order) in zip(grid, pairs, strict=False):
+        rows = select(table, output=output, order=order)
+        if sobol is not None:
+            _indices(axis, table, rows, names, sobol)
+        else:
+            _shares(study, axis, table["share"][rows].reshape(poses.count, len(names)), names, poses, each)
+        axis.grid(visible=False, axis="y")
+        axis.tick_params(axis="y", length=0)
+        axis.set_title(output if order == "position" else f"{output} {order}", loc="left", fontsize=9.5)
+    for axis in grid[max(0, len(pairs) - columns) : len(pairs)]:
+        axis.set_xlabel("share of the variance [%]")
+    which = ""
+    if sobol is not None:
+        which = f"at {pose_in_words(study, poses, sobol)}; whiskers: 99.7 % intervals"
+        if not np.isfinite(table["sobol_first"][: len(names)]).all():
+            which += "; correlated sources have no Sobol index"
+    elif poses.count == 1:
+        which = f"at {pose_in_words(study, poses, 0)}"
+    elif not each:
+        which = f"average over {poses.count} poses"
+    title(figure, "Where the variance of the error comes from", which, left=margin)
+    handles, labels = grid[0].get_legend_handles_labels()
+    if len(labels) > 1:
+        legend_below(figure, handles, labels)
+    return figure
+
+
+def _sobol_pose(table: Table, poses: Poses, sources: int) -> int | None:
+    """The first pose with Sobol indices."""
+    if "sobol_first" not in table:
+        return None
+    known = np.isfinite(table["sobol_first"]).reshape(poses.count, -1).any(axis=1)
+    return int(np.argmax(known)) if known.any() else None
+
+
+def _shares(study: Study, axis: Axes, shares: Floats, names: list[str], poses: Poses, each: bool) -> None:
+    known = shares[np.isfinite(shares).all(axis=1)]
+    average = known.mean(axis=0) if len(known) else np.zeros(len(names))
+    ranked = np.argsort(-average, kind="stable")[:MOST_SOURCES]
+    shown = 100.0 * (shares[:, ranked] if each else average[None, ranked])
+    height = 0.8 / len(shown)
+    for k, values in enumerate(shown):
+        label = pose_in_words(study, poses, k) if each and len(shown) > 1 else None
+        bars = axis.barh(np.arange(len(ranked)) + (k + 0.5) * height - 0.4, values, height,
+                         color=style.PALETTE[k % len(style.PALETTE)], label=label)  # fmt: skip
+        if len(shown) == 1:
+            axis.bar_label(bars, fmt="%.1f", padding=2, fontsize=8)
+    _name(axis, [names[k] for k in ranked])
+
+
+def _indices(axis: Axes, table: Table, rows: Flags, names: list[str], pose: int) -> None:
+    """First-order share, first and total index of each source, by the total one."""
+    own = np.flatnonzero(rows)[pose * len(names) : (pose + 1) * len(names)]
+    # Correlated sources have no indices of their own: they are ranked by their share.
+    largest = np.fmax(table["sobol_total"][own], table["share"][own])
+    ranked = own[np.argsort(-np.nan_to_num(largest), kind="stable")[:MOST_SOURCES]]
+    height = 0.8 / len(_SOBOL)
+    for k, (column, (words, color)) in enumerate(_SOBOL.items()):
+        values, reach = 100.0 * table[column][ranked], None
+        if f"{column}_low" in table:
+            ends = 100.0 * np.stack([table[f"{column}_low"][ranked], table[f"{column}_high"][ranked]])
+            reach = np.abs(ends - values)
+        axis.barh(np.arange(len(ranked)) + (k + 0.5) * height - 0.4, values, height, xerr=reach, color=color,
+                  label=words, error_kw={"elinewidth": 1.0, "ecolor": style.INK})  # fmt: skip
+    _name(axis, [str(name) for name in table["source"][ranked]])
+
+
+def _name(axis: Axes, names: list[str]) -> None:
+    axis.set_yticks(np.arange(len(names)), names)
+    axis.set_ylim(len(names) - 0.42, -0.58)
+    axis.margins(x=0.18)
+    axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.get_xlim()[0] < -2.0 else 0.0)

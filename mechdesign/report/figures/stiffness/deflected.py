@@ -1,0 +1,197 @@
+"""The mechanism as loads deform it, much enlarged, and where it is free to go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mechdesign.analyses.poses import pose_in_words, solve_poses, study_poses
+from mechdesign.analyses.stiffness.analysis import Body, ask
+from mechdesign.analyses.stiffness.beams import course_of
+from mechdesign.analyses.stiffness.force_method import load, twists_of
+from mechdesign.analyses.stiffness.network import Edge
+from mechdesign.mechanism import Configuration
+from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.framing import equal_canvas
+from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.results import Result
+from mechdesign.study import Study
+
+MOST_LOADS = 4
+_MOVED = 0.12  # largest drawn displacement over the size of the mechanism
+# Points of a deflected beam: cubic between its ends, as bending makes it.
+_ALONG = np.linspace(0.0, 1.0, 25)
+_CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _ALONG**3,
+                   3 * _ALONG**2 - 2 * _ALONG**3, _ALONG**3 - _ALONG**2])  # fmt: skip
+
+
+def first_pose(study: Study) -> tuple[Configuration, int] | None:
+    """The first pose that can be assembled, and its row."""
+    for solved in solve_poses(study, study_poses(study, "stiffness")):
+        valid = np.flatnonzero(solved.configuration.valid)
+        if len(valid):
+            return solved.configuration.take(valid[:1]), int(solved.rows[valid[0]])
+    return None
+
+
+def deflections(study: Study) -> Figure | None:
+    """The whole mechanism where each load moves it."""
+    found, section = first_pose(study), study.stiffness
+    if found is None or section is None or not section.loads:
+        return None
+    configuration, row = found
+    scene, asked = pose(study.mechanism, configuration), ask(study)
+    if scene is None:
+        return None
+    shapes = _shapes(asked, configuration, scene)
+    loads = np.array(section.loads[:MOST_LOADS])[:, : asked.size]
+    sizes = [max(float(np.abs(move @ each).max()) for _, move in shapes) for each in loads]
+    if not np.isfinite(sizes).all():
+        return None
+    scales = [round_down(_MOVED * scene.span / max(size, 1e-300)) for size in sizes]
+    drawn = [[rest + scale * (move @ each) for rest, move in shapes] for each, scale in zip(loads, scales, strict=True)]
+    places = np.concatenate([[*scene.points.values()], *(line for lines in drawn for line in lines)])
+    figure, axes = equal_canvas(places, study.units.label("length"))
+    draw_mechanism(axes, study.mechanism, configuration, faint=True)
+    for color, lines, each, scale in zip(style.PALETTE, drawn, loads, scales, strict=False):
+        for line in lines:
+            axes.plot(line.real, line.imag, color=color, linewidth=1.8, zorder=5)
+        axes.plot([], [], color=color, linewidth=1.8, label=_in_words(study, tuple(each), scale))
+        _mark(axes, lines, asked, color)
+    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
+    axes.set_title(
+        f"deflections, enlarged, at {pose_in_words(study, study_poses(study, 'stiffness'), row)}", loc="left"
+    )
+    return figure
+
+
+def _mark(axes: Axes, lines: Sequence[Complexes], asked: Body, color: str) -> None:
+    """The asked point where the load moves it: it begins the first line."""
+    axes.plot([lines[0][0].real], [lines[0][0].imag], "o", color=color, zorder=6)
+
+
+def _shapes(asked: Body, configuration: Configuration, scene: Scene) -> list[tuple[Complexes, Complexes]]:
+    """Lines of all links at rest, shape (n,), and their displacements for each unit load, shape (n, size).
+
+    The first begins at the asked point.
+    """
+    network, at = asked.network, scene.points[asked.section.at]
+    twists = twists_of(network, asked.section, configuration, asked.length)
+    moved = {name: d[0] for name, d in load(twists, asked.size).displacements.items()}
+
+    def shift(vertex: str, place: complex) -> Complexes:
+        dx, dy, turn = moved[vertex]
+        return np.asarray(dx + 1j * dy + 1j * turn * (place - at))
+
+    shapes = [(np.array([at]), shift(network.asked, at)[None])]
+    bent = set()
+    for ways in network.ways_along_beams:
+        bent.add(network.edges[ways[0]].name)
+        shapes += _bent([network.edges[k] for k in ways], configuration, moved, shift)
+    for link, points in network.points.items():
+        borne = [(scene.points[name], vertex) for name, vertex in points if vertex in moved]
+        if link in bent or len(borne) < 2:
+            continue
+        where = dict(borne)
+        corners = hull(list(where))
+        outline = [*corners, corners[0]] if len(corners) > 2 else corners
+        shapes.append((np.array(outline), np.array([shift(where[place], place) for place in outline])))
+    return shapes
+
+
+def _bent(
+    ways: Sequence[Edge], configuration: Configuration, moved: Mapping[str, Floats],
+    shift: Callable[[str, complex], Complexes],
+) -> list[tuple[Complexes, Complexes]]:  # fmt: skip
+    """The beams of an elastic link between the places where something sits, and its brackets."""
+    beam = ways[0].beam
+    assert beam is not None
+    course = course_of(beam.beams, configuration)
+    sitting = [(ways[0].a, beam.beams.corners[0]), *((edge.b, edge.point) for edge in ways)]
+    feet = [float(course.foot(point, configuration.point(point))[0]) for _, point in sitting]
+    bases = [complex(course.place(np.array([foot]))[0]) for foot in feet]
+    order = sorted(range(len(feet)), key=feet.__getitem__)
+    shapes = []
+    for one, other in pairwise(order):
+        (first, last), (tail, head) = (sitting[one][0], sitting[other][0]), (bases[one], bases[other])
+        shapes.append(_beam(tail, head, shift(first, tail), shift(last, head), moved[first][2], moved[last][2]))
+    for (vertex, point), base in zip(sitting, bases, strict=True):
+        bracket = np.array([base, complex(configuration.point(point)[0])])
+        shapes.append((bracket, np.array([shift(vertex, place) for place in bracket])))
+    return shapes
+
+
+def _beam(
+    tail: complex, head: complex, start: Complexes, end: Complexes, turn_start: Floats,
+    turn_end: Floats,
+) -> tuple[Complexes, Complexes]:  # fmt: skip
+    """A beam at rest and its displacements: along itself linear, across itself cubic."""
+    span = head - tail
+    length = abs(span)
+    along = span / length if length > 0 else 1.0 + 0j
+    one, other = start * np.conj(along), end * np.conj(along)
+    straight = np.outer(1 - _ALONG, one.real) + np.outer(_ALONG, other.real)
+    across = (
+        np.outer(_CUBIC[0], one.imag) + np.outer(_CUBIC[1], length * turn_start)
+        + np.outer(_CUBIC[2], other.imag) + np.outer(_CUBIC[3], length * turn_end)
+    )  # fmt: skip
+    return np.asarray(tail + _ALONG * span, dtype=np.complex128), np.asarray((straight + 1j * across) * along)
+
+
+def free_motion(study: Study, result: Result) -> Figure | None:
+    """The asked body moved both ways along its free twist, at the first pose that has one."""
+    table, section = result.tables["stiffness"], study.stiffness
+    rows = np.flatnonzero(np.isfinite(table["free_x"]))
+    if not len(rows) or section is None:
+        return None
+    row = int(rows[0])
+    for solved in solve_poses(study, study_poses(study, "stiffness")):
+        if row in solved.rows:
+            configuration = solved.configuration.take(np.flatnonzero(solved.rows == row))
+    scene = pose(study.mechanism, configuration)
+    if scene is None:
+        return None
+    at = scene.points[section.at]
+    body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
+    turn = float(table["free_phi"][row]) if "free_phi" in table else 0.0
+    rest = np.array([*body[1:], *body[1:2]] if len(body) > 1 else body)
+    shift = complex(table["free_x"][row], table["free_y"][row])
+    move = shift + 1j * turn * (rest - at)
+    scale = _MOVED * scene.span / max(float(np.abs(move).max()), 1e-300)
+    if turn:
+        # Turned about its instantaneous centre, so that it keeps its shape.
+        centre = at + 1j * shift / turn
+        ways = [centre + (rest - centre) * np.exp(1j * way * scale * turn) for way in (1, -1)]
+    else:
+        ways = [rest + way * scale * move for way in (1, -1)]
+    places = np.concatenate([[*scene.points.values()], *ways])
+    figure, axes = equal_canvas(places, study.units.label("length"))
+    draw_mechanism(axes, study.mechanism, configuration)
+    for line, dash in zip(ways, ("-", "--"), strict=True):
+        axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
+                  marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
+    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
+    axes.set_title(f"free motion at {pose_in_words(study, study_poses(study, 'stiffness'), row)}", loc="left")
+    return figure
+
+
+def round_down(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
+
+
+def _in_words(study: Study, load: tuple[float, ...], scale: float) -> str:
+    units = [study.units.label(kind) for kind in ("force", "force", "moment")]
+    parts = [
+        f"{name} = {value:g} {unit}"
+        for name, value, unit in zip(("fx", "fy", "mz"), load, units, strict=False)
+        if value
+    ]
+    return f"{', '.join(parts) or 'no load'} (x {scale:g})"

@@ -1,0 +1,119 @@
+"""Pictures of a workspace: maps of indices, the boundary with the mechanism in several poses, ranges of the drives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from mechdesign.numerics.arrays import Complexes
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.workspace.inscribed import inscribed_figure
+from mechdesign.report.figures.workspace.maps import map_figures
+from mechdesign.report.figures.workspace.point_paths import path_figures
+from mechdesign.report.figures.workspace.ranges import range_figures
+from mechdesign.report.figures.workspace.regions import ROOM, Region, curves, fill, keys, loci, outline, regions, sheet
+from mechdesign.results import Result, Table
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
+
+# Poses of the mechanism along all curves of one side of the boundary.
+POSES = {"inner": 2, "outer": 4}
+SIDES = {"inner": style.BLUE, "outer": style.VERMILION}
+DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
+
+
+def figures(study: Study, result: Result) -> Mapping[str, Figure]:
+    """A map of each local index, the boundary with poses, the largest shapes inside, the drives along the boundary.
+
+    Where several values of held coordinates are asked for, maps show them side by side and the others the first. Of a
+    point with one degree of freedom its path is drawn; over a range of a held coordinate, what ends the region.
+    """
+    if "path" in result.tables:
+        return path_figures(study, result)
+    if "local" not in result.tables:
+        return range_figures(study, result)
+    found = regions(study, result)
+    if not found:
+        return {}
+    drawn = Gallery()
+    drawn.add("of indices", map_figures, study, found)
+    drawn.add("workspace", workspace_figure, study, found[0])
+    drawn.add("inscribed", inscribed_figure, study, result, found)
+    if len(found[0].boundary):
+        drawn.add("drives", _drives, study, found[0].boundary)
+    return drawn
+
+
+def workspace_figure(study: Study, region: Region, title: str = "") -> Figure:
+    """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
+    boundary, section = region.boundary, study.workspace
+    assert section is not None
+    mechanism = study.mechanism
+    plan = mechanism.plan((f"{section.point}.x", f"{section.point}.y", *region.held))
+    held = [
+        value * (study.units.angle_factor if mechanism.quantity(name) == "angle" else 1.0)
+        for name, value in region.held.items()
+    ]
+    places = _places(boundary) if len(boundary) else np.zeros(0, dtype=complex)
+    configuration = plan.solve([places.real, places.imag, *held], limits=False)
+    reached = [configuration.point(point) for point in mechanism.points]
+    reached += [np.atleast_1d(mechanism.sketch_configuration.point(point)) for point in mechanism.points]
+    extent = np.concatenate([region.places(), *(place[np.isfinite(place)] for place in reached)])
+    where = f" at {region.title}" if region.title else ""
+    title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
+    page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
+    (axes,) = page.axes
+    fill(axes, region)
+    page.legend(keys(outline(axes, region), loci(axes, region)))
+    for index in range(len(places)):
+        draw_mechanism(axes, mechanism, configuration, index, faint=True)
+    draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
+    return page.figure
+
+
+def _places(boundary: Table) -> Complexes:
+    """Places a little inside the boundary, evenly along each of its sides."""
+    found = []
+    middle = complex(np.mean(boundary["x"]), np.mean(boundary["y"]))
+    for side, number in POSES.items():
+        own = [rows for rows in curves(boundary) if str(boundary["side"][rows[0]]) == side]
+        if not own:
+            continue
+        pieces = [boundary["x"][rows] + 1j * boundary["y"][rows] for rows in own]
+        z = np.concatenate(pieces)
+        steps = np.concatenate([np.concatenate([[0.0], np.abs(np.diff(piece))]) for piece in pieces])
+        along = np.cumsum(steps)
+        for share in (np.arange(number) + 0.5) / number:
+            k = int(np.searchsorted(along, share * along[-1]))
+            found.append(z[k] + 1e-3 * (middle - z[k]) * (1 if side == "outer" else -1))
+    return np.array(found)
+
+
+def _drives(study: Study, boundary: Table) -> Figure:
+    """Drive values along the boundary over the angle of the scan [S1, Fig. 7]."""
+    names = study.mechanism.drives
+    figure = style.new_figure(style.WIDTH, 3.4 if len(names) < 4 else 5.0)
+    axes = figure.add_subplot()
+    named = set()
+    for number, name in enumerate(names):
+        for rows in curves(boundary):
+            side = str(boundary["side"][rows[0]])
+            label = f"{name}, {side} boundary"
+            axes.plot(boundary["theta"][rows], boundary[name][rows], color=SIDES[side],
+                      linestyle=DASHES[number % len(DASHES)], label="" if label in named else label)  # fmt: skip
+            named.add(label)
+    axes.set_xlim(float(boundary["theta"].min()), float(boundary["theta"].max()))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 3, 4.5, 6, 9, 10]))
+    axes.set_title("Drives along the boundary of the workspace", loc="left")
+    axes.set_xlabel(style.axis_label("angle of the scan", study.units.label("angle")))
+    units = {study.units.label(study.mechanism.quantity(name)) for name in names}
+    axes.set_ylabel(style.axis_label(", ".join(names), units.pop() if len(units) == 1 else ""))
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    return figure

@@ -1,0 +1,168 @@
+"""Maps of local indices over the workspace: filled contours with labels, side by side where coordinates are held."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm
+from matplotlib.contour import QuadContourSet
+from matplotlib.figure import Figure
+from matplotlib.path import Path
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
+
+from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.report.figures import style
+from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.workspace.regions import Grid, Region, keys, loci, outline, sheet
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
+
+Extend = Literal["neither", "max"]
+# Columns of the table that are no indices, beside the held coordinates.
+_NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node", "piece")
+# An index whose largest values are a thin tail is cut off above this share of the area, which the bar shows.
+_TAIL = 0.96
+MOST = 6
+# Points on paper between the name of a level and lines of other levels, and other names.
+CLEAR = (5.0, 18.0)
+
+
+def map_figures(study: Study, found: Sequence[Region]) -> Gallery:
+    """One map an index of the table of local indices; of many regions a few, spread evenly.
+
+    There is none of an index that is infinite everywhere.
+    """
+    shown = [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST)).astype(int))]
+    names = [name for name in index_columns(found[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
+    maps = Gallery()
+    for name in names:
+        maps.add(name, _map, study, shown, name)
+    return maps
+
+
+def index_columns(region: Region) -> list[str]:
+    """Names of the local indices that a region's table holds."""
+    return [name for name in region.local.names if name not in _NO_INDEX and name not in region.held]
+
+
+def _map(study: Study, found: Sequence[Region], column: str) -> Figure:
+    levels, extend = _levels(found, column)
+    norm = BoundaryNorm(levels, 256, extend=extend)
+    unit, meaning = next((c.unit, c.meaning) for c in found[0].local.columns if c.name == column)
+    places = np.concatenate([region.places() for region in found])
+    point = study.workspace.point if study.workspace else ""
+    name = column.replace("_", " ")
+    page = sheet(study, places, [region.title for region in found], f"{name} at point {point}: {meaning}", bar=True)
+    fates: set[str] = set()
+    kinds: set[str] = set()
+    for axes, region in zip(page.axes, found, strict=True):
+        contours(axes, list(region.grids(column)), levels, norm, extend, labels=len(found) == 1)
+        fates |= outline(axes, region)
+        kinds |= loci(axes, region)
+    page.legend(keys(fates, kinds))
+    assert page.bar is not None
+    bar = page.figure.colorbar(ScalarMappable(norm, style.COLORMAP), cax=page.bar, ticks=levels)
+    bar.set_label(style.axis_label(name, unit))
+    bar.outline.set_visible(False)
+    return page.figure
+
+
+def contours(
+    axes: Axes, grids: Sequence[Grid], levels: Floats, norm: BoundaryNorm, extend: Extend, *, labels: bool
+) -> None:  # fmt: skip
+    """Filled contours over the patches of a region, each level named once, where its line is longest."""
+    drawn = []
+    for x, y, z in grids:
+        # Beyond the last level is where an index grows without bounds, on singularities.
+        over = levels[-1] + (levels[-1] - levels[0])
+        shown = np.where(np.isfinite(z), np.minimum(z, over), over if extend == "max" else levels[0])
+        axes.contourf(x, y, shown, levels=levels, cmap=style.COLORMAP, norm=norm, extend=extend)
+        drawn.append(axes.contour(x, y, shown, levels=levels[1:], colors="white", linewidths=0.5, alpha=0.7))
+    if labels:
+        edges = [np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]]) for z in (x + 1j * y for x, y, _ in grids)]
+        label_levels(axes, drawn, levels, norm, _on_paper(axes, np.concatenate(edges)))
+
+
+def label_levels(
+    axes: Axes, drawn: Sequence[QuadContourSet], levels: Floats, norm: BoundaryNorm, blocked: Complexes
+) -> None:  # fmt: skip
+    """Name each level once on one of its lines, far from other lines and names; or not at all."""
+    lines = [[part for contour in drawn for part in _parts(axes, contour, k)] for k in range(len(levels) - 1)]
+    every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]
+    taken = np.zeros(0, dtype=complex)
+    for k, level in enumerate(levels[1:]):
+        places = [(part[j], part[j + 1] - part[j - 1]) for part in lines[k] if len(part) > 4
+                  for j in range(2, len(part) - 2, max(1, len(part) // 40)) if part[j + 1] != part[j - 1]]  # fmt: skip
+        if not places:
+            continue
+        at, along = np.array(places).T
+        others = np.concatenate([*every[:k], *every[k + 1 :], blocked])
+        room = np.minimum(_nearest(at, others) / CLEAR[0], _nearest(at, taken) / CLEAR[1])
+        # Where there is room, upright names read best.
+        best = int(np.argmax(np.minimum(room, 2.0) + np.abs(along.real) / np.abs(along)))
+        if room[best] < 1:
+            continue
+        taken = np.append(taken, at[best])
+        turn = float(np.degrees(np.angle(along[best])))
+        back = colormaps[style.COLORMAP](norm(level))
+        place = (at[best].real, at[best].imag)
+        axes.annotate(
+            f"{level:g}", place, xycoords="figure points", fontsize=7.5, ha="center", va="center",
+            rotation=(turn + 90) % 180 - 90, rotation_mode="anchor", color="white" if norm(level) < 140 else style.INK,
+            zorder=3.5, path_effects=[withStroke(linewidth=2.5, foreground=back)],
+        )  # fmt: skip
+
+
+def _parts(axes: Axes, contour: QuadContourSet, level: int) -> list[Complexes]:
+    path = contour.get_paths()[level]
+    if path.codes is None:
+        return []
+    corners = np.split(np.asarray(path.vertices), np.flatnonzero(path.codes == Path.MOVETO)[1:])
+    return [_on_paper(axes, part @ np.array([1, 1j])) for part in corners]
+
+
+def _on_paper(axes: Axes, places: Complexes) -> Complexes:
+    """Places in points on paper."""
+    return np.asarray(paper(axes, places) @ np.array([1, 1j]))
+
+
+def _nearest(places: Complexes, others: Complexes) -> Floats:
+    if not len(others):
+        return np.full(len(places), np.inf)
+    return np.asarray(np.abs(places[:, None] - others[None, :]).min(axis=1))
+
+
+def _levels(found: Sequence[Region], column: str) -> tuple[Floats, Extend]:
+    """Round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
+    grids = [grid for region in found for grid in region.grids(column)]
+    values = np.concatenate([z.ravel() for _, _, z in grids])
+    areas = np.concatenate([_areas(x, y).ravel() for x, y, _ in grids])
+    finite = np.isfinite(values)
+    values, areas = values[finite], areas[finite]
+    order = np.argsort(values)
+    share = np.cumsum(areas[order]) / areas.sum()
+    high = float(values[order[min(int(np.searchsorted(share, _TAIL)), len(order) - 1)]])
+    low, top = float(values.min()), float(values.max())
+    tail = top > 1.4 * high + 1e-12
+    if not tail:
+        high = top
+    low = 0.0 if 0 <= low < 0.5 * high else low
+    if high - low <= 1e-9 * max(abs(high), abs(low)):
+        low, high = high - 0.5 * max(abs(high), 1e-12), high + 0.5 * max(abs(high), 1e-12)
+    levels = MaxNLocator(nbins=11, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    return np.asarray(levels), "max" if tail or top > levels[-1] else "neither"
+
+
+def _areas(x: Floats, y: Floats) -> Floats:
+    """Area about each node of a grid."""
+    z = x + 1j * y
+    along, across = np.gradient(z, axis=0), np.gradient(z, axis=1)
+    return np.asarray(np.abs(np.imag(np.conj(along) * across)))

@@ -1,0 +1,239 @@
+"""Names, places, links and the sketch of a validated mechanism section, from which its description is built."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterable, Mapping
+
+from mechdesign.expressions import Expression
+from mechdesign.mechanism.model import Link, Place, Quantity, Term
+from mechdesign.study.build import section as models
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.build.names import GROUND, Names
+from mechdesign.study.text.numbers import StudyNumber
+from mechdesign.errors import suggestion
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.text.reporter import Reporter
+from mechdesign.study.text.units import Units
+
+ROOT: KeyPath = ("mechanism",)
+
+
+class Builder:
+    """What a description is built from; mistakes go to the reporter, and what they spoil is left out."""
+
+    def __init__(
+        self, section: models.MechanismSection, units: Units, parameters: Iterable[str], reporter: Reporter
+    ) -> None:
+        self.section = section
+        self.names = Names(section)
+        self.parameter_names = tuple(parameters)
+        self.units = units
+        self.reporter = reporter
+        self.places: dict[str, Place] = {}
+        self.formulas: dict[str, Expression] = {}
+        self.measured: set[str] = set()
+        self.links: dict[str, Link] = {}
+        self.sketch = {name: complex(x.nominal, y.nominal) for name, (x, y) in section.sketch.items()}
+
+    def parameters(self, nominal: Mapping[str, float], formulas: Mapping[str, Expression]) -> Parameters:
+        """Parameters with the places that depend on them."""
+        factors = {
+            name: self.units.angle_factor if place.quantity == "angle" else 1.0 for name, place in self.places.items()
+        }
+        return Parameters(dict(nominal), dict(formulas), dict(self.formulas), factors, frozenset(self.measured))
+
+    def report(self, path: Iterable[str | int], message: str, *, at_key: bool = False) -> None:
+        """Note a problem at a path below ``mechanism``."""
+        self.reporter.report((*ROOT, *path), message, at_key=at_key)
+
+    def place(self, name: str, value: StudyNumber | float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
+        """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
+        factor = self.units.angle_factor if quantity == "angle" else 1.0
+        nominal = value.nominal if isinstance(value, StudyNumber) else value
+        self.places[name] = Place(name, nominal * factor, quantity)
+        if isinstance(value, StudyNumber) and value.expression is not None:
+            self.formulas[name] = value.expression
+        if measured:
+            self.measured.add(name)
+        return name
+
+    def check_name(self, name: str, known: Iterable[str], what: str, path: Iterable[str | int]) -> bool:
+        """Whether a name is known; if not, note it with the nearest one."""
+        return self.reporter.known(name, known, what, (*ROOT, *path))
+
+    def check_named(self, what: str, names: Iterable[str], path: KeyPath) -> bool:
+        """Whether all names of a list are known links, points, drives or measures; each that is not is noted.
+
+        `what` may be the quantity that they give: an angle is that of links, a distance that of points.
+        """
+        what = {"angle": "link", "distance": "point"}.get(what, what)
+        known: Iterable[str] = self.names.owners if what == "point" else getattr(self.section, f"{what}s")
+        # All of them are looked up, so that every mistake is told.
+        found = [self.check_name(name, known, what, (*path, k)) for k, name in enumerate(names)]
+        return all(found)
+
+    def check_distinct(self) -> None:
+        """Names are distinct, and there is a ground."""
+        section = self.section
+        if GROUND not in section.links:
+            self.report(("links",), "there is no 'ground': one link must be the fixed one")
+        seen: dict[str, str] = {}
+        groups: list[tuple[str, str, Iterable[str]]] = [
+            ("parameter", "parameters", self.parameter_names),
+            ("link", "links", section.links),
+            ("point", "", self.names.owners),
+            ("joint", "joints", section.joints),
+            ("measure", "measures", section.measures),
+        ]
+        for what, key, names in groups:
+            for name in names:
+                if name in seen:
+                    path = (key, name) if key else self._where(name)
+                    self.report(
+                        path, f"{name!r} is the name of a {seen[name]} already; names are distinct", at_key=True
+                    )
+                else:
+                    seen[name] = what
+        for name, drive in section.drives.items():
+            target = name if drive is None else drive.angle or drive.length or drive.slide
+            if name in seen and name != target:
+                message = (
+                    f"{name!r} is the name of a {seen[name]} already; a drive may only bear that of what it drives"
+                )
+                self.report(("drives", name), message, at_key=True)
+
+    def _where(self, point: str) -> KeyPath:
+        link = self.names.owners[point][0]
+        section = self.section.links[link]
+        end = {section.from_: "from", section.to: "to"}.get(point)
+        return ("links", link, end) if end else ("links", link, "points", point)
+
+    def check_sketch(self) -> None:
+        """Points of the sketch are points of links."""
+        for name in self.section.sketch:
+            if name not in self.names.owners:
+                hint = suggestion(name, self.names.owners)
+                self.report(("sketch", name), f"no link has a point {name!r}{hint}", at_key=True)
+
+    def build_links(self) -> None:
+        """Links with their points, and places for all their numbers."""
+        order = [GROUND] * (GROUND in self.section.links) + self.names.moving
+        for name in order:
+            self.links[name] = self._link(name, self.section.links[name])
+            if name == GROUND:
+                # What is fixed need not be drawn, and where it is drawn the ground's own numbers count.
+                for point, (x, y) in self.links[name].points.items():
+                    self.sketch[point] = complex(self.nominal(x), self.nominal(y))
+
+    def nominal(self, term: Term) -> float:
+        """Nominal value of a term (angles in radians)."""
+        return self.places[term].nominal if isinstance(term, str) else term
+
+    def _link(self, name: str, section: models.Link) -> Link:
+        ends, points = None, {}
+        # The ground's frame is the world: without a length its two points stay where they are drawn.
+        drawn = name == GROUND and section.length is None and not section.telescopic
+        if section.from_ is not None and section.to is not None and not drawn:
+            ends = (section.from_, section.to)
+            points = self._ends(name, section, ends)
+        own = [*section.points] if ends else self.names.points_of(name)
+        given = {point: place for point, place in section.points.items() if place is not None}
+        left_out = [point for point in own if point not in given]
+        local = self._measured(name, left_out, given, ends) if left_out else {}
+        for point in own:
+            at = local.get(point, 0j)
+            x, y = given[point] if point in given else (at.real, at.imag)
+            terms = [self.place(f"{name}.{point}.{axis}", value, measured=point not in given)
+                     for axis, value in (("x", x), ("y", y))]  # fmt: skip
+            points[point] = (terms[0], terms[1])
+        return Link(name, points, ends, section.telescopic)
+
+    def _ends(self, name: str, section: models.Link, ends: tuple[str, str]) -> dict[str, tuple[Term, Term]]:
+        """The ends of a binary link in its frame: at its origin and on its x axis, where it is not telescopic."""
+        start, end = ends
+        points: dict[str, tuple[Term, Term]] = {start: (0.0, 0.0)}
+        if section.telescopic:
+            if name == GROUND:
+                self.report(("links", name), "the ground cannot be telescopic")
+            return points
+        length: StudyNumber | float = section.length or 1.0
+        if section.length is None and (drawn := self._drawn([start, end], ("links", name), "its length")):
+            length = abs(drawn[1] - drawn[0])
+            if length == 0.0:
+                self.report(
+                    ("links", name), f"{start!r} and {end!r} are at one place in the sketch: no length to measure"
+                )
+                length = 1.0
+        points[end] = (self.place(f"{name}.length", length, measured=section.length is None), 0.0)
+        return points
+
+    def _measured(
+        self, name: str, measured: list[str], given: Mapping[str, models.PointValues], ends: tuple[str, str] | None
+    ) -> dict[str, complex]:
+        """Local coordinates of the points left out, from the sketch.
+
+        The ground's frame is the world; that of a binary link has its origin at the first end and its x axis towards
+        the second, and one without given points so by its first two; one with given points is laid on the drawing by
+        them.
+        """
+        path: KeyPath = ("links", name)
+        free = not ends and name != GROUND
+        if free and len(given) == 1:
+            self.report(path, "one given point does not fix the link's frame on the sketch; give two, or none")
+            return {}
+        if free and not given and len(measured) < 2:
+            return dict.fromkeys(measured, 0j)
+        known = [*(ends or (given if free else ()))]
+        drawn = self._drawn([*known, *measured], path, "the place of its points")
+        if drawn is None:
+            return {}
+        places = drawn[len(known) :]
+        if not ends and not free:
+            return dict(zip(measured, places, strict=True))
+        if free and given:
+            local = [complex(x.nominal, y.nominal) for x, y in given.values()]
+            turn = rotation(local, drawn[: len(local)])
+            centre, drawn_centre = sum(local) / len(local), sum(drawn[: len(local)]) / len(local)
+            return {point: (at - drawn_centre) / turn + centre for point, at in zip(measured, places, strict=True)}
+        if drawn[0] == drawn[1]:
+            first, second = [*known, *measured][:2]
+            self.report(path, f"{first!r} and {second!r} are at one place in the sketch: no x axis")
+            return {}
+        turn = (drawn[1] - drawn[0]) / abs(drawn[1] - drawn[0])
+        found = {point: (at - drawn[0]) / turn for point, at in zip(measured, places, strict=True)}
+        if not ends:
+            # Rounding leaves the second point off its own axis.
+            found[measured[1]] = complex(found[measured[1]].real, 0.0)
+        return found
+
+    def _drawn(self, points: list[str], path: KeyPath, what: str) -> list[complex] | None:
+        missing = [point for point in points if point not in self.sketch]
+        if missing:
+            names = ", ".join(repr(point) for point in missing)
+            self.report(path, f"{what} is left out and so measured from the sketch, which lacks {names}", at_key=True)
+            return None
+        return [self.sketch[point] for point in points]
+
+    def link_direction(self, name: str) -> float | None:
+        """Angle of a link's x axis in the sketch (radians), None where the sketch does not tell."""
+        if name == GROUND:
+            return 0.0
+        link = self.links[name]
+        if link.telescopic and link.ends is not None:
+            a, b = (self.sketch.get(end) for end in link.ends)
+            return None if a is None or b is None or a == b else cmath.phase(b - a)
+        known = [point for point in link.points if point in self.sketch]
+        local = [complex(*(self.nominal(term) for term in link.points[point])) for point in known]
+        if len(known) < 2 or len(set(local)) < 2:
+            return None
+        turn = rotation(local, [self.sketch[point] for point in known])
+        return cmath.phase(turn)
+
+
+def rotation(local: list[complex], drawn: list[complex]) -> complex:
+    """Unit complex number that turns local vectors best onto the drawn ones (least squares)."""
+    centre, drawn_centre = sum(local) / len(local), sum(drawn) / len(drawn)
+    fit = sum(((b - drawn_centre) * (a - centre).conjugate() for a, b in zip(local, drawn, strict=True)), 0j)
+    return fit / abs(fit) if abs(fit) > 0 and math.isfinite(abs(fit)) else 1 + 0j

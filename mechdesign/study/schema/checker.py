@@ -1,0 +1,87 @@
+"""Names, kinds of quantities and units that the checks of the questions look up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from mechdesign.mechanism.model import Quantity
+from mechdesign.study.build.builder import Builder
+from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.text.document import KeyPath
+
+# Kinds of a coordinate, its rate and its acceleration.
+ORDERS: dict[Quantity | None, tuple[str, str, str]] = {
+    "length": ("length", "velocity", "acceleration"),
+    "angle": ("angle", "angular_velocity", "angular_acceleration"),
+}
+NO_MOMENT = "a pin carries no moment; name the 'link' of the stiffness section that is loaded"
+
+
+class Checker:
+    """Looks names and units up, and notes what is wrong with them."""
+
+    def __init__(self, builder: Builder, parameters: Parameters, parts: Mapping[str, Any]) -> None:
+        self.names, self.places, self.reporter = builder.names, builder.places, builder.reporter
+        self.parameters = parameters
+        self.parts = parts
+        self.known, self.kind = builder.reporter.known, builder.reporter.kind
+
+    def coordinate(
+        self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = ()
+    ) -> Quantity | None:
+        """Kind of a coordinate; None, and noted, where there is none of that name.
+
+        `others` are names that might have stood there as well.
+        """
+        quantity = self.names.coordinates.get(name)
+        if quantity is None:
+            if name in self.names.owners:
+                self.reporter.report(
+                    path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key
+                )
+            elif name in self.names.moving:
+                self.reporter.report(path, f"{name!r} is a link; its coordinate is {name}.angle", at_key=at_key)
+            else:
+                what = "coordinate or parameter" if others else "coordinate"
+                self.known(name, [*self.names.coordinates, *others], what, path, at_key=at_key)
+        return quantity
+
+    def coordinates(self, names: Iterable[str], path: KeyPath, order: int = 0) -> None:
+        """Check the coordinates that are keys of a mapping, and the units of their values, rates or accelerations."""
+        for name in names:
+            quantity = self.coordinate(name, (*path, name), at_key=True)
+            if quantity in ORDERS:
+                self.kind((*path, name), ORDERS[quantity][order])
+
+    def outputs(self, outputs: Iterable[str] | None, path: KeyPath) -> None:
+        """Check a list of coordinates and points that are asked for."""
+        seen: set[str] = set()
+        for index, name in enumerate(outputs or ()):
+            parts = [f"{name}.x", f"{name}.y"] if name in self.names.owners else [name]
+            if name not in self.names.owners:
+                self.coordinate(name, (*path, index))
+            if seen.intersection(parts):
+                self.reporter.report((*path, index), f"{name!r} is listed twice")
+            seen.update(parts)
+
+    def load(self, load: tuple[float, ...], path: KeyPath, *, on_pin: bool) -> tuple[float, ...]:
+        """A load of the stiffness section's point or link as fx, fy, mz."""
+        if len(load) not in ((2, 3) if on_pin else (3,)):
+            self.reporter.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
+            return 0.0, 0.0, 0.0
+        for place, kind in enumerate(("force", "force", "moment")[: len(load)]):
+            self.kind((*path, place), kind)
+        if on_pin and any(load[2:]):
+            self.reporter.report((*path, 2), NO_MOMENT)
+        return (*load, 0.0)[:3]
+
+    def range(self, low: float | None, high: float | None, path: KeyPath) -> None:
+        """Check that the end of a range is beyond its beginning."""
+        if low is not None and high is not None and high <= low:
+            self.reporter.report((*path, "to"), f"{high:g} is not beyond 'from', {low:g}")
+
+    def needs(self, section: str | None, what: str, path: KeyPath) -> None:
+        """Check that the study has a section that something cannot do without."""
+        if section is not None and self.reporter.raw((section,)) is None:
+            self.reporter.report(path, f"{what} needs the {section} section, and the study has none")

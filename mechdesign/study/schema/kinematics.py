@@ -1,0 +1,46 @@
+"""The kinematics section of the study file."""
+
+from __future__ import annotations
+
+from pydantic import model_validator
+
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.numbers import failure
+
+
+class Load(fields.Model):
+    """A force at a point, or a moment on a link."""
+
+    at: fields.PointName | None = None
+    force: tuple[fields.Force, fields.Force] | None = None
+    link: fields.LinkName | None = None
+    moment: fields.Moment | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Load:
+        if (self.at is None) != (self.force is None) or (self.moment is not None and self.link is None):
+            raise failure("a load is {at: point, force: [fx, fy]} or {link: name, moment: m}")
+        if self.force is None and self.moment is None:
+            raise failure("a load needs a force or a moment")
+        return self
+
+
+class KinematicsSection(MotionSection):
+    """How does it move?"""
+
+    loads: tuple[Load, ...] = ()
+    characteristic_length: fields.PositiveLength | None = None
+
+
+def check(checker: Checker, section: KinematicsSection) -> None:
+    """Check the outputs, and what loads act on."""
+    checker.outputs(section.outputs, ("kinematics", "outputs"))
+    for index, load in enumerate(section.loads):
+        path: KeyPath = ("kinematics", "loads", index)
+        if load.at is not None:
+            checker.known(load.at, checker.names.owners, "point", (*path, "at"))
+        if load.link is not None:
+            checker.known(load.link, checker.names.moving, "moving link", (*path, "link"))

@@ -1,0 +1,177 @@
+"""The optimize section of the study file, and conditions on results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
+
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
+
+from mechdesign.commands import COMMANDS
+from mechdesign.errors import suggestion
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.workspace import INDEX_NAMES, NEEDED
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.numbers import failure
+
+# Results of a workspace that a goal or condition may name without its command.
+INDICES = ("GII", "GRI", "SUI", "area", "box_area")
+_STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))
+# Commands whose section no default can replace.
+_UNASSUMED = ("reliability", "stiffness")
+
+
+class Variable(fields.Model):
+    """A design variable; its bounds are expressions over parameters and the variables above it.
+
+    The step is that of a grid, and of the sensitivities told with an optimum.
+    """
+
+    from_: fields.Bound = Field(alias="from")
+    to: fields.Bound
+    step: fields.PositiveNumber | None = None
+    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
+
+    @model_validator(mode="after")
+    def _spacing(self) -> Variable:
+        if self.step is not None and self.number is not None:
+            raise failure("either 'step' or 'number', not both")
+        return self
+
+
+class Judged(fields.Model):
+    """A result, and the rows of it that count."""
+
+    bare = "result"
+    short: ClassVar[tuple[fields.Form, ...]] = (fields.NAME_FORM,)
+    result: fields.CoordinateName
+    where: dict[str, str | float | int] = Field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The result, and in parentheses which rows count."""
+        where = ", ".join(f"{column} {wanted}" for column, wanted in self.where.items())
+        return f"{self.result} ({where})" if where else self.result
+
+
+class Condition(Judged):
+    """A result and its bounds."""
+
+    bare, short = "", ()
+    abs: bool = False
+    at_least: fields.Number | None = None
+    at_most: fields.Number | None = None
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Condition:
+        if self.at_least is None and self.at_most is None:
+            raise failure("a condition needs 'at_least', 'at_most' or both")
+        if self.at_least is not None and self.at_most is not None and self.at_most < self.at_least:
+            raise failure(f"nothing is at least {self.at_least:g} and at most {self.at_most:g}")
+        return self
+
+
+def _weight_row(raw: Any, info: ValidationInfo) -> Any:
+    """Bring ``{GII: 1, SUI: 1}`` to a list in the order maximize then minimize; say what is wrong with a row."""
+    if "maximize" not in info.data or "minimize" not in info.data:
+        # What is wrong with the goals is told; their weights cannot be judged.
+        return ()
+    goals = [goal.name for goal in info.data["maximize"] + info.data["minimize"]]
+    if isinstance(raw, Mapping):
+        for name in raw:
+            if name not in goals:
+                raise failure(f"{name!r} is neither maximised nor minimised{suggestion(str(name), goals)}")
+        return [raw.get(goal, 0) for goal in goals]
+    if isinstance(raw, list) and len(raw) != len(goals):
+        raise failure(f"{len(raw)} weights for {len(goals)} goals: {', '.join(goals)}")
+    return raw
+
+
+def _weights_that_choose(row: tuple[float, ...]) -> tuple[float, ...]:
+    if any(weight < 0 for weight in row):
+        raise failure("a weight is not negative: name the goal under 'minimize' instead of 'maximize', or the reverse")
+    if row and not any(row):
+        raise failure("all weights are zero: no design would be better than another")
+    return row
+
+
+WeightRow = Annotated[
+    tuple[fields.Pure, ...],
+    BeforeValidator(_weight_row),
+    AfterValidator(_weights_that_choose),
+    fields.OrShort(({"type": "object", "additionalProperties": fields.NUMBER_FORM},)),
+]
+
+
+Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.OrOne()]
+
+
+class OptimizeSection(fields.Model):
+    """Which dimensions are best?"""
+
+    method: Annotated[str, fields.Choice(("grid", "search", "pareto"))] = "grid"
+    variables: dict[fields.CoordinateName, Variable]
+    maximize: Goals = ()
+    minimize: Goals = ()
+    weights: tuple[WeightRow, ...] | None = None
+    subject_to: tuple[Condition, ...] = ()
+    evaluations: Annotated[int, fields.Whole(10, 10_000_000)] | None = None
+
+    @model_validator(mode="after")
+    def _goals(self) -> OptimizeSection:
+        goals = [goal.name for goal in self.maximize + self.minimize]
+        twice = [goal for goal in goals if goals.count(goal) > 1]
+        if twice:
+            raise failure(f"{twice[0]!r} is named twice among the goals")
+        return self
+
+
+def check(checker: Checker, section: OptimizeSection) -> None:
+    """Check the variables of an optimisation, its method, and the results that its goals name."""
+    root: KeyPath = ("optimize",)
+    report = checker.reporter.report
+    if not section.variables:
+        report((*root, "variables"), "an optimisation needs at least one variable")
+    if not section.maximize and not section.minimize:
+        report(root, "say what to 'maximize' or 'minimize'", at_key=True)
+    above = [name for name in checker.parameters.nominal if name not in section.variables]
+    for name, variable in section.variables.items():
+        path: KeyPath = (*root, "variables", name)
+        checker.known(name, checker.parameters.known(), "parameter or dimension", path, at_key=True)
+        if name in checker.parameters.formulas:
+            message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
+            report(path, message, at_key=True)
+        for key, bound in (("from", variable.from_), ("to", variable.to)):
+            for unknown in sorted(bound.names - set(above)):
+                below = " above it" if unknown in section.variables else ""
+                message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
+                report((*path, key), message)
+        if name in checker.places:
+            checker.kind(path, checker.places[name].quantity)
+        above.append(name)
+        if section.method == "grid" and variable.step is None and variable.number is None:
+            report(path, "a variable of a grid needs either 'step' or 'number'")
+    if section.method == "pareto" and len(section.maximize + section.minimize) == 1:
+        report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
+    if section.method == "grid" and section.evaluations is not None:
+        report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
+    for key, goals in (("maximize", section.maximize), ("minimize", section.minimize)):
+        for index, goal in enumerate(goals):
+            check_result(checker, goal.result, (*root, key, index))
+    for index, condition in enumerate(section.subject_to):
+        check_result(checker, condition.result, (*root, "subject_to", index, "result"))
+
+
+def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:
+    """Check the name of a result: a statistic of the workspace, or ``command.column``, as it must be if `required`."""
+    command, _, rest = name.partition(".")
+    if rest:
+        checker.known(command, COMMANDS, "command", path)
+    elif required or name not in (*INDICES, *_STATISTICS):
+        hint = suggestion(name, (*INDICES, *_STATISTICS))
+        hint = hint or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+        checker.reporter.report(path, f"there is no result {name!r}{hint}")
+    if not required:
+        column = name.rpartition(".")[2]
+        checker.needs(command if command in _UNASSUMED else NEEDED.get(column.rpartition("_")[0]), repr(name), path)

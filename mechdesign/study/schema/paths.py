@@ -1,0 +1,239 @@
+"""Paths of a coordinate or a point: as the study file gives them, and as arrays.
+
+A path is points or numbers one after another, a circle, an arc, or a line. That of a point has, at every place, the
+length of the way to it and the direction and bend of the path there.
+"""
+
+from __future__ import annotations
+
+import math
+import pathlib
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from mechdesign.errors import StudyError
+from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.study.text import fields
+from mechdesign.study.text.numbers import FILES, Context, failure, read_rows
+
+# Number of poses where a study does not say it: a circle in steps of 5 deg, and both ends of a line or an arc.
+ROUND, STRAIGHT = 72, 51
+# Pieces of a spline between two of its points whose lengths are added up.
+PIECES = 64
+_ROWS = {"type": ["array", "string", "number"]}
+
+Speed = Annotated[
+    float,
+    fields.Reader("velocity", 0.0, True),
+    Field(
+        description="speed of the path's point along it, constant: velocities and accelerations of drives and outputs "
+        "follow from the path's direction and curvature. On a polyline each segment is passed at this speed without "
+        "acceleration; a corner has the direction of the segment that begins there, the last point of an open one "
+        "that of the segment that ends there"
+    ),
+]
+Point = Annotated[tuple[fields.Length, fields.Length], fields.pair_of("[x, y]")]
+
+
+class Circle(fields.Model):
+    """A whole circle, counter-clockwise unless it says otherwise; it ends one step before it closes."""
+
+    center: Point
+    radius: fields.PositiveLength
+    from_: fields.Angle = Field(0.0, alias="from")
+    clockwise: bool = False
+
+
+class Arc(fields.Model):
+    """Part of a circle between two angles from the x axis, both ends included; clockwise where they fall."""
+
+    center: Point
+    radius: fields.PositiveLength
+    from_: fields.Angle = Field(alias="from")
+    to: fields.Angle
+
+    @model_validator(mode="after")
+    def _some(self) -> Arc:
+        if self.from_ == self.to:
+            raise failure("an arc needs two different angles 'from' and 'to'")
+        return self
+
+
+def _through(raw: Any, context: Context) -> tuple[tuple[float, ...], ...]:
+    """Numbers or [x, y] one after another; a number alone is held."""
+    rule = "a list of [x, y] (of a point) or a list of numbers, not a mixture, is expected"
+    if not isinstance(raw, list):
+        return read_rows([raw], context, 1, rule, "")
+    return read_rows(raw, context, 2, rule, "an empty path")
+
+
+class PathSection(fields.Model):
+    """What one coordinate or point passes; a list, a CSV file's name or a number alone are short forms."""
+
+    short = (_ROWS,)
+    through: Annotated[tuple[tuple[float, ...], ...], fields.Read(_through, _ROWS)] | None = None
+    file: str | None = None
+    circle: Circle | None = None
+    arc: Arc | None = None
+    line: (
+        Annotated[tuple[Point, Point], fields.pair_of("a line from [x, y] to [x, y], as a list of the two")] | None
+    ) = None
+    points: Annotated[int, fields.Whole(2, 10_000_000)] | None = Field(
+        None, description=f"number of poses, evenly spaced: {ROUND} on a circle, else {STRAIGHT}, where left out"
+    )
+    spline: bool = Field(
+        False, description="whether a smooth curve (a cubic spline) is laid through the points, closed where they are"
+    )
+
+    @property
+    def shape(self) -> str | None:
+        """Which figure of the plane it is; None for what is listed."""
+        return next(iter(self.given("circle", "arc", "line")), None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _long_form(cls, raw: Any) -> Any:
+        if isinstance(raw, str) and raw.lower().endswith(FILES):
+            return {"file": raw}
+        return raw if isinstance(raw, dict | PathSection) else {"through": raw}
+
+    @model_validator(mode="after")
+    def _one(self) -> PathSection:
+        shapes = ("through", "file", "circle", "arc", "line")
+        given = self.given(*shapes)
+        if len(given) != 1:
+            raise failure(f"a path is one of {', '.join(shapes)}, not {' and '.join(given) or 'none of them'}")
+        if self.spline and self.shape:
+            raise failure(f"{given[0]!r} is smooth already: 'spline' is for a list of points")
+        if self.points is not None and not self.shape and not self.spline:
+            raise failure(
+                "a list of points has its own number; 'points' goes with a spline, a circle, an arc or a line"
+            )
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """The path of a point; all arrays have the shape (poses,)."""
+
+    places: Complexes  # x + i y
+    way: Floats  # length of the path up to each place
+    directions: Complexes  # unit vectors along the path: first derivatives of the place by the path's length
+    bends: Complexes  # second derivatives: towards the centre of curvature, 1 / radius long
+    closed: bool = False  # whether the path goes on from its last place to its first
+
+
+def course(name: str, given: PathSection, folder: pathlib.Path, turn: float) -> Course | Floats:
+    """The path of a point, or the values of a coordinate; `turn` is a full turn in the study's unit.
+
+    Raises
+    ------
+    StudyError
+        Where a file cannot be read, or what is listed is no such path.
+    """
+    if given.circle is not None:
+        sign, count = (-1.0 if given.circle.clockwise else 1.0), given.points or ROUND
+        angles = 2 * np.pi * (given.circle.from_ / turn + sign * np.arange(count) / count)
+        return _round(given.circle, angles, sign, closed=True)
+    if given.arc is not None:
+        begin, end = given.arc.from_, given.arc.to
+        angles = 2 * np.pi / turn * np.linspace(begin, end, given.points or STRAIGHT)
+        return _round(given.arc, angles, math.copysign(1.0, end - begin), closed=False)
+    if given.line is not None:
+        start, stop = (complex(*place) for place in given.line)
+        if start == stop:
+            raise StudyError(f"path: the line of {name!r} needs two different places")
+        part, span = np.linspace(0.0, 1.0, given.points or STRAIGHT), stop - start
+        direction = np.full(len(part), span / abs(span))
+        places: Complexes = np.asarray(start + part * span, dtype=np.complex128)
+        return Course(places, part * abs(span), direction, np.zeros(len(part), dtype=complex))
+    point = "." not in name
+    table = read_table(folder / given.file) if given.file is not None else np.array(given.through, dtype=float)
+    if point and table.shape[1] == 2:
+        places = table[:, 0] + 1j * table[:, 1]
+        if not given.spline:
+            return polyline(places)
+        if len(places) < 3 or not np.diff(places).all():
+            raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
+        return spline(places, given.points)
+    if table.shape[1] == 1:
+        return np.asarray(table[:, 0])
+    raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
+
+
+def _round(given: Circle | Arc, angles: Floats, sign: float, *, closed: bool) -> Course:
+    outward = np.exp(1j * angles).astype(np.complex128)
+    way = given.radius * np.abs(angles - angles[0])
+    places = complex(*given.center) + given.radius * outward
+    return Course(places, way, complex(0.0, sign) * outward, outward / -given.radius, closed)
+
+
+def polyline(places: Complexes) -> Course:
+    """Straight segments; a corner has the direction of the segment that begins there, directions nan for one place."""
+    steps = np.diff(places)
+    lengths = np.abs(steps)
+    way = np.concatenate([[0.0], np.cumsum(lengths)])
+    directions = np.full(len(places), complex(np.nan, np.nan))
+    moving = np.flatnonzero(lengths > 0)
+    if len(moving):
+        units = steps[moving] / lengths[moving]
+        # The segment that begins at each place, or the next one with a length.
+        after = np.searchsorted(moving, np.arange(len(places)))
+        last = 0 if places[0] == places[-1] else len(moving) - 1
+        directions = units[np.where(after < len(moving), after, last)]
+    return Course(places, way, directions, np.zeros(len(places), dtype=complex))
+
+
+def spline(places: Complexes, points: int | None) -> Course:
+    """A cubic spline by the length of the chords through three places or more, periodic where the first is the last."""
+    from scipy.interpolate import CubicSpline
+
+    knots = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(places)))])
+    # The curve as complex numbers, for a spline is linear in its values.
+    curve: Any = CubicSpline(knots, places, bc_type="periodic" if places[0] == places[-1] else "not-a-knot")
+    fine = np.unique(np.concatenate([np.linspace(a, b, PIECES + 1) for a, b in pairwise(knots)]))
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    middle, half = (fine[1:] + fine[:-1]) / 2, np.diff(fine) / 2
+    speeds = np.abs(curve(middle[:, None] + half[:, None] * nodes, 1))
+    length = np.concatenate([[0.0], np.cumsum(half * (speeds @ weights))])
+    x = knots if points is None else np.interp(np.linspace(0.0, length[-1], points), length, fine)
+    first, second = curve(x, 1), curve(x, 2)
+    speed = np.abs(first)
+    unit = first / speed
+    across = second - (second * np.conj(unit)).real * unit
+    return Course(places if points is None else curve(x), np.interp(x, fine, length), unit, across / speed**2)
+
+
+def read_table(file: pathlib.Path, most: int = 2) -> Floats:
+    """Read a CSV file of one to `most` columns of numbers, with or without a line of names.
+
+    Raises
+    ------
+    StudyError
+        Where it cannot be read or holds anything else.
+    """
+    try:
+        lines = [line.strip() for line in file.read_text(encoding="utf-8-sig").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'not a text file'}") from None
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        if not line or line.startswith("#"):
+            continue
+        try:
+            row = [float(part) for part in line.replace(";", ",").split(",")]
+        except ValueError:
+            if rows or number > 1:
+                raise StudyError(f"{file}:{number}: {line!r} is not a row of numbers") from None
+            continue
+        if len(row) > most or (rows and len(row) != len(rows[0])) or not all(map(math.isfinite, row)):
+            columns = "one or two" if most == 2 else f"one to {most}"
+            raise StudyError(f"{file}:{number}: {line!r} is not a row of the same {columns} finite numbers")
+        rows.append(row)
+    if not rows:
+        raise StudyError(f"{file} holds no numbers")
+    return np.array(rows)

@@ -1,0 +1,187 @@
+"""Poses of a question as the study file gives them: a list, a sweep, or a path; and rates at them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.paths import PathSection, Speed
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.numbers import failure
+
+
+class Sweep(fields.Model):
+    """Values of one coordinate, both ends included; a bare number is held (``number`` 1)."""
+
+    short = (fields.NUMBER_FORM,)
+    from_: fields.Number = Field(alias="from")
+    to: fields.Number
+    step: fields.Number | None = None
+    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _long_form(cls, raw: Any) -> Any:
+        return {"from": raw, "to": raw, "number": 1} if isinstance(raw, int | float | str) else raw
+
+    @model_validator(mode="after")
+    def _spacing(self) -> Sweep:
+        if (self.step is None) == (self.number is None):
+            raise failure("a sweep needs either 'step' or 'number'")
+        if self.step is not None and (self.step == 0 or self.step * (self.to - self.from_) < 0):
+            raise failure(f"a step of {self.step:g} never leads from {self.from_:g} to {self.to:g}")
+        return self
+
+
+def _poses(raw: Any) -> Any:
+    if raw == "workspace":
+        return ()
+    if isinstance(raw, list) and not raw:
+        raise failure("an empty list of poses")
+    return raw
+
+
+Pose = dict[fields.CoordinateName, fields.Number]
+
+
+class PoseSection(fields.Model):
+    """Where a question is asked: listed poses, a sweep, a path, or the nodes of the workspace section.
+
+    The list is empty where the study says ``poses: workspace``.
+    """
+
+    poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort(({"const": "workspace"},))] | None = None
+    sweep: dict[fields.CoordinateName, Sweep] | None = None
+    path: dict[fields.CoordinateName, PathSection] | None = None
+
+    @property
+    def at_nodes(self) -> bool:
+        """Whether the poses are the nodes of the workspace section."""
+        return self.poses == ()
+
+    @property
+    def source(self) -> str | None:
+        """The key that gives the poses; None where none does."""
+        return next(iter(self.given("poses", "sweep", "path")), None)
+
+    @model_validator(mode="after")
+    def _one_source(self) -> PoseSection:
+        given = self.given("poses", "sweep", "path")
+        if len(given) > 1:
+            raise failure(f"{' and '.join(given)} are both given; poses come from one of them")
+        return self
+
+
+class MotionSection(PoseSection):
+    """Poses, how the mechanism moves through them, and the coordinates that are asked for."""
+
+    outputs: fields.CoordinateNames | None = None
+    rates: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
+    accelerations: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
+    speed: Speed | None = None
+
+
+def check(checker: Checker, command: str, section: PoseSection) -> None:
+    """Check the names and units of the coordinates that poses give, and of rates and accelerations at them."""
+    if section.at_nodes and checker.reporter.raw(("workspace",)) is None:
+        checker.reporter.report((command, "poses"), "needs the workspace section, whose nodes are meant")
+    for index, pose in enumerate(section.poses or ()):
+        checker.coordinates(pose, (command, "poses", index))
+    checker.coordinates(section.sweep or (), (command, "sweep"))
+    for name, given in (section.path or {}).items():
+        if name in checker.names.owners:
+            continue
+        place: KeyPath = (command, "path", name)
+        if checker.coordinate(name, place, at_key=True) is not None and (given.spline or given.shape is not None):
+            what = "spline" if given.spline else f"{given.shape}"
+            checker.reporter.report(place, f"{name!r} is no point: a {what} is the path of a point", at_key=True)
+    if isinstance(section, MotionSection):
+        checker.coordinates(section.rates, (command, "rates"), 1)
+        checker.coordinates(section.accelerations, (command, "accelerations"), 2)
+        if section.speed is not None:
+            _speed(checker, command, section)
+        else:
+            _rates(checker, command, section)
+
+
+def _rates(checker: Checker, command: str, section: MotionSection) -> None:
+    """Check that rates and accelerations are those of drives, or of all coordinates that the poses give.
+
+    Along a motion that other coordinates give, drives have no rates of their own: they follow from the motion.
+    """
+    drives = checker.names.drives
+    source = _source(checker, section)
+    given = _sets(checker, source)
+    one = given[0] if len(given) == 1 else set()
+    parts = (("rates", section.rates), ("accelerations", section.accelerations))
+    of_given = any(name in one and name not in drives for _, values in parts for name in values)
+    for key, values in parts:
+        for name in values:
+            if name not in checker.names.coordinates or name in (one if of_given else drives):
+                continue
+            message = f"{name!r} is not a drive: {key} are those of {', '.join(drives)}"
+            if of_given:
+                message = f"{name!r} is not among what the poses give: {key} are those of {', '.join(sorted(one))}"
+            elif one and not one <= set(drives):
+                message += f", or of all that the poses give, {', '.join(sorted(one))}"
+            elif len(given) > 1:
+                message += " where poses give different coordinates"
+            checker.reporter.report((command, key, name), message, at_key=True)
+        missing = sorted(one - set(values)) if of_given and values else []
+        if missing:
+            message = f"{', '.join(missing)} missing: {key} are those of all coordinates that the poses give"
+            checker.reporter.report((command, key), message, at_key=True)
+        if values and not of_given and len(drives) > 1 and one and not one <= set(drives) and _moves(source):
+            others = ", ".join(sorted(one))
+            message = (
+                f"rates of drives that do not change are not those of this motion, which {others} give: say 'speed', "
+                f"of a point along its path, or the {key} of {others}; those of the drives follow from them"
+            )
+            checker.reporter.report((command, key), message, at_key=True)
+
+
+def _speed(checker: Checker, command: str, section: MotionSection) -> None:
+    for key in ("rates", "accelerations"):
+        if getattr(section, key):
+            checker.reporter.report(
+                (command, key), f"'speed' and {key!r} are both given; a path is passed at one of them", at_key=True
+            )
+    path = _source(checker, section).path
+    if path is None:
+        message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"
+        checker.reporter.report((command, "speed"), message, at_key=True)
+        return
+    points = [name for name in path if name in checker.names.owners]
+    points += [n[:-2] for n in path if n.endswith(".x") and f"{n[:-2]}.y" in path and n[:-2] not in points]
+    if len(points) != 1:
+        which = " and ".join(points) or "no point"
+        message = f"a speed is that of one point along its path, and this path is that of {which}; give 'rates' instead"
+        checker.reporter.report((command, "speed"), message, at_key=True)
+
+
+def _source(checker: Checker, section: PoseSection) -> PoseSection:
+    """The section that gives the poses of another: itself, or kinematics."""
+    return section if section.source is not None else checker.parts.get("kinematics") or section
+
+
+def _moves(section: PoseSection) -> bool:
+    """Whether the poses follow one another: a path, or a sweep of one coordinate."""
+    moving = [s for s in (section.sweep or {}).values() if s.number != 1 and s.from_ != s.to]
+    return section.path is not None or len(moving) == 1
+
+
+def _sets(checker: Checker, section: PoseSection) -> list[set[str]]:
+    """The different sets of coordinates that the poses of a section give."""
+    given: list[Iterable[str]] = [names for names in (section.sweep, section.path) if names]
+    if section.at_nodes and (region := checker.parts.get("workspace")) is not None:
+        given = [(region.point, *region.at)]
+    if section.poses:
+        given = list(dict.fromkeys(frozenset(pose) for pose in section.poses))
+    return [
+        {part for name in names for part in ((f"{name}.x", f"{name}.y") if name in checker.names.owners else (name,))}
+        for names in given
+    ]

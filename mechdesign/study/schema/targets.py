@@ -1,0 +1,150 @@
+"""Targets of a mechanism section: what outputs should be, checked against the mechanism and its poses."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.errors import StudyError
+from mechdesign.expressions import Expression
+from mechdesign.numerics.arrays import Floats
+from mechdesign.study.build.section import Wanted
+from mechdesign.study.poses import Poses
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.paths import read_table
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.reporter import Reporter
+
+ROOT: KeyPath = ("mechanism", "targets")
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """What an output should be: a function of coordinates, or a table.
+
+    Parameters
+    ----------
+    owner : str
+        A coordinate or a measure, or a point whose path it is.
+    coordinates : tuple of str
+        What has an error: the owner, or the point's x and y.
+    expression : Expression or None
+        Over coordinates and parameters, in the study's units.
+    table : ndarray, shape (rows, columns), or None
+        In the study's units. As many columns as coordinates: one row a pose, or of a point a path without timing,
+        a polyline. One more: the first is the drive's value, between which the others are interpolated linearly; its
+        rows are in rising order then.
+    """
+
+    owner: str
+    coordinates: tuple[str, ...]
+    expression: Expression | None = None
+    table: Floats | None = None
+
+    @property
+    def timed(self) -> bool:
+        """Whether the table's first column is the value of the drive."""
+        return self.table is not None and self.table.shape[1] == len(self.coordinates) + 1
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Coordinates and parameters that the target itself depends on."""
+        return tuple(sorted(self.expression.names)) if self.expression is not None else ()
+
+
+def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) -> dict[str, Target]:
+    """Targets whose names and tables are right; the mistakes of the others are noted."""
+    found: dict[str, Target] = {}
+    seen: dict[str, str] = {}
+    for owner, value in wanted.items():
+        path: KeyPath = (*ROOT, owner)
+        point = owner in checker.names.owners
+        if not point and checker.coordinate(owner, path, at_key=True) is None:
+            continue
+        coordinates = (f"{owner}.x", f"{owner}.y") if point else (owner,)
+        for name in [name for name in coordinates if name in seen][:1]:
+            checker.reporter.report(path, f"{name} has a target already, by {seen[name]!r}", at_key=True)
+        seen.update(dict.fromkeys(coordinates, owner))
+        quantity = "length" if point else checker.names.coordinates[owner]
+        if value.expression is None:
+            table = _table(checker, owner, value, path, folder, len(coordinates), quantity)
+            if table is not None:
+                found[owner] = Target(owner, coordinates, table=table)
+        elif _right(checker, owner, value.expression, path, point):
+            if quantity != "none":
+                checker.kind(path, quantity)
+            found[owner] = Target(owner, coordinates, value.expression)
+    return found
+
+
+def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, point: bool) -> bool:
+    """Whether the target of a coordinate is an expression over others."""
+    if point:
+        message = f"the target of a point is a path; give {owner}.x and {owner}.y their expressions"
+        checker.reporter.report(path, message)
+        return False
+    right = True
+    for name in sorted(expression.names):
+        if name == owner:
+            checker.reporter.report(path, f"{owner!r} is what the target is for: it cannot depend on it")
+            right = False
+        elif name not in checker.parameters.nominal:
+            right &= checker.coordinate(name, path, others=checker.parameters.nominal) is not None
+    return right
+
+
+def _table(
+    checker: Checker, owner: str, value: Wanted, path: KeyPath, folder: pathlib.Path, count: int, quantity: str
+) -> Floats | None:
+    """The target's table, where its rows have `count` numbers or one more."""
+    try:
+        table = np.array(value.rows) if value.file is None else read_table(folder / value.file, most=3)
+    except StudyError as error:
+        checker.reporter.report(path, str(error))
+        return None
+    columns = table.shape[1]
+    if columns not in (count, count + 1):
+        what = "[x, y] or [drive, x, y]" if count == 2 else "[value] or [drive, value]"
+        checker.reporter.report(path, f"a row of the target of {owner!r} is {what}, not {columns} numbers")
+        return None
+    if value.file is None and quantity != "none":
+        for index, place in np.ndindex(len(table), count):
+            checker.kind((*path, index, place + columns - count), quantity)
+    if columns == count:
+        return table
+    table = table[np.argsort(table[:, 0], kind="stable")]
+    same = np.flatnonzero(np.diff(table[:, 0]) == 0)
+    if len(same):
+        checker.reporter.report(path, f"the drive's value {table[same[0], 0]:g} stands in two rows")
+        return None
+    return table
+
+
+def timing(drives: Sequence[str], poses: Poses) -> str | None:
+    """The coordinate that a table's first column means: the only drive, or the only coordinate that moves."""
+    if len(drives) == 1:
+        return drives[0]
+    moving = [name for name in poses.names if len(poses.groups) == 1 and np.ptp(poses.values[name]) > 0]
+    return moving[0] if len(moving) == 1 else None
+
+
+def check_poses(targets: Mapping[str, Target], drives: Sequence[str], poses: Poses, reporter: Reporter) -> None:
+    """Check that targets and the poses of kinematics fit each other."""
+    for owner, target in targets.items():
+        if target.table is None:
+            continue
+        rows = len(target.table)
+        if target.timed and timing(drives, poses) is None:
+            message = (
+                f"its first column is the value of the drive, but of {', '.join(drives)} no single one is swept; "
+                "give one row a pose"
+            )
+            reporter.report((*ROOT, owner), message)
+        elif not target.timed and len(target.coordinates) == 1 and rows != poses.count:
+            message = (
+                f"{rows} values for {poses.count} poses: give one a pose, or rows [drive, value] to interpolate between"
+            )
+            reporter.report((*ROOT, owner), message)

@@ -1,0 +1,114 @@
+"""The workspace section of the study file."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
+
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.numbers import failure
+
+INDEX_NAMES = (
+    "inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max", "k_min", "k_direction",
+    "deflection", "sigma_position", "reliability",
+)  # fmt: skip
+# The section of the study that an index needs beside the workspace.
+NEEDED = {
+    "k_min": "stiffness", "k_direction": "stiffness", "deflection": "stiffness", "sigma_position": "reliability",
+    "reliability": "reliability",
+}  # fmt: skip
+
+
+# A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
+WHOLE = 3e-6
+
+
+class Scan(fields.Model):
+    """Rays about a point; angles in the study's unit."""
+
+    about: tuple[fields.Length, fields.Length] | None = None
+    from_: fields.Angle | None = Field(None, alias="from")
+    to: fields.Angle | None = None
+    rays: Annotated[int, fields.Whole(2, 1_000_000)] | None = None
+
+    @field_validator("to")
+    @classmethod
+    def _within_a_turn(cls, to: float | None, info: ValidationInfo) -> float | None:
+        start, context = info.data.get("from_"), info.context
+        if to is not None and start is not None and context is not None:
+            turn = 2 * math.pi / context.units.angle_factor
+            if to - start > turn * (1 + WHOLE):
+                raise failure(
+                    f"{to:g} is more than a turn beyond 'from', {start:g}: rays would meet the region more than once; "
+                    f"at most {start + turn:g}"
+                )
+        return to
+
+
+class Integrate(fields.Model):
+    """The rule of integration over the workspace."""
+
+    rule: Annotated[str, fields.Choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
+    tolerance: fields.Positive = 1e-5
+    nodes: Annotated[int, fields.Whole(1, 100_000)] | None = None
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Integrate:
+        if self.rule == "gauss" and self.nodes is not None:
+            raise failure("rule 'gauss' chooses its nodes by 'tolerance'; 'nodes' belongs to midpoint and sector_mean")
+        return self
+
+
+class Over(fields.Model):
+    """A range of a held coordinate: the region in which some value of it is reached, or every one."""
+
+    from_: fields.Number = Field(alias="from")
+    to: fields.Number
+    all: bool = False
+
+
+def _form(raw: Any) -> str:
+    return "over" if isinstance(raw, dict | Over) else "values"
+
+
+At = Annotated[Annotated[Over, Tag("over")] | Annotated[fields.Numbers, Tag("values")], Discriminator(_form)]
+
+
+class WorkspaceSection(fields.Model):
+    """Where can it work?"""
+
+    point: fields.PointName
+    at: dict[fields.CoordinateName, At] = Field(default_factory=dict)
+    scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
+    integrate: Integrate = Integrate()
+    margin: fields.NonNegativeAngle = 0.0
+    assembly: Annotated[str, fields.Choice(("same", "any"))] = "same"
+    characteristic_length: fields.PositiveLength | None = None
+    indices: (
+        Annotated[tuple[Annotated[str, fields.Choice(INDEX_NAMES)], ...], BeforeValidator(fields.as_list)] | None
+    ) = None
+
+
+def check(checker: Checker, section: WorkspaceSection) -> None:
+    """Check the names, units and ranges of a workspace."""
+    root: KeyPath = ("workspace",)
+    checker.known(section.point, checker.names.owners, "point", (*root, "point"))
+    checker.coordinates(section.at, (*root, "at"))
+    ranges = [name for name, values in section.at.items() if isinstance(values, Over)]
+    if len(ranges) > 1:
+        checker.reporter.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
+    for name, values in section.at.items():
+        if isinstance(values, Over):
+            checker.range(values.from_, values.to, (*root, "at", name))
+        elif not values:
+            checker.reporter.report((*root, "at", name), "an empty list of values")
+    for index, name in enumerate(section.indices or ()):
+        checker.needs(NEEDED.get(name), f"the index {name!r}", (*root, "indices", index))
+    scan = section.scan
+    if (scan.from_ is None) != (scan.to is None):
+        checker.reporter.report((*root, "scan"), "'from' and 'to' belong together")
+    checker.range(scan.from_, scan.to, (*root, "scan"))

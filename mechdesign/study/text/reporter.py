@@ -1,0 +1,214 @@
+"""Mistakes of a study, each with the place in the text where it stands."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from types import NoneType, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from mechdesign.errors import Problem, StudyError, nearest, suggestion
+from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
+from mechdesign.study.text.numbers import LOST, shown
+from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, fits, measure
+
+# A link written as a list has its keys at these places.
+LIST_FORM = {"from": 0, "to": 1, "length": 2}
+# Keys that come with a later release, wherever they stand.
+LATER = ("matrix",)
+# What is expected where pydantic says of which type an error is.
+_EXPECTED = defaultdict(
+    lambda: "something else",
+    string_type="a text",
+    dict_type="a mapping of names",
+    model_type="a mapping",
+    model_attributes_type="a mapping",
+    tuple_type="a list",
+    list_type="a list",
+    bool_type="true or false",
+    bool_parsing="true or false",
+    too_long="a shorter list",
+    none_required="nothing",
+)
+
+
+def unknown_key(name: str, known: Iterable[str]) -> str:
+    """Say that a key is not known, and which one may be meant."""
+    return "is not available in this version" if name in LATER else f"unknown key{suggestion(name, known)}"
+
+
+class Reporter:
+    """Collects problems of one document and raises them together."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.problems: list[Problem] = list(document.problems)
+        self.warnings: list[Problem] = []
+
+    def known(
+        self, name: str, known: Iterable[str], what: str, path: Iterable[str | int], *, at_key: bool = False
+    ) -> bool:
+        """Whether a name is one of those known; if not, note it with the nearest one."""
+        candidates = list(known)
+        if name in candidates:
+            return True
+        hint = suggestion(name, candidates) or (f"; there are {', '.join(candidates[:12])}" if candidates else "")
+        self.report(tuple(path), f"there is no {what} {name!r}{hint}", at_key=at_key)
+        return False
+
+    def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
+        """Note a problem at a path of the data; paths through the long form of a short form are understood."""
+        found = self.written(path)
+        if any(found[: len(part)] == part for part in self.document.spoiled):
+            return
+        problem = self._placed(found, message, at_key)
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+    def kind(self, path: KeyPath, kind: str) -> None:
+        """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
+        for keys, raw in leaves(self.raw(path)):
+            if not isinstance(raw, str) or not QUANTITY.fullmatch(raw):
+                continue
+            try:
+                powers = measure(raw)[1]
+            except QuantityError:
+                continue
+            if not fits(powers, kind):
+                message = f"{raw!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected"
+                self.report((*path, *keys), message)
+
+    def warn(self, path: Sequence[str | int], message: str) -> None:
+        """Note what is likely a mistake, though the study can be answered, at a key of the data."""
+        self.warnings.append(self._placed(self.written(path), message, True))
+
+    def unused(self, path: KeyPath, what: str, others: Iterable[str]) -> None:
+        """Note a named thing that nothing uses: one that an override brought in is a name misspelt."""
+        name = path[-1]
+        if path in self.document.added:
+            hint = suggestion(str(name), others)
+            self.report(path, f"the study has no {what} {name!r}, and nothing uses one{hint}", at_key=True)
+        else:
+            self.warn(path, f"nothing uses {what} {name!r}")
+
+    def _placed(self, found: KeyPath, message: str, at_key: bool) -> Problem:
+        known = self._nearest(found)
+        mark = self.document.values[known]
+        if (at_key or known != found) and known in self.document.keys:
+            mark = self.document.keys[known]
+        return mark.problem(message, dotted(found))
+
+    def done(self) -> None:
+        """Raise all problems, in the order of the text.
+
+        Raises
+        ------
+        StudyError
+            If there are any.
+        """
+        if self.problems:
+            ordered = sorted(self.problems, key=lambda problem: (problem.line == 0, problem.line, problem.column))
+            raise StudyError(ordered)
+
+    def concerns(self, *sections: str) -> bool:
+        """Whether a problem lies in one of these top-level sections, or in the text as a whole."""
+        return any(problem.key.partition(".")[0] in ("", *sections) for problem in self.problems)
+
+    def raw(self, path: Sequence[str | int]) -> Any:
+        """The data as written at a path, None where there is none."""
+        data = self.document.data
+        for segment in self.written(path):
+            if not has(data, segment):
+                return None
+            data = data[segment]
+        return data
+
+    def written(self, path: Sequence[str | int]) -> KeyPath:
+        """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
+        data: Any = self.document.data
+        found: list[str | int] = []
+        remaining = list(path)
+        while remaining:
+            segment = remaining.pop(0)
+            if has(data, segment):
+                found.append(segment)
+                data = data[segment]
+            elif data is None or not found:
+                # Of a section that is empty, or missing, nothing is written, and no short form leaves anything out.
+                return (*found, segment, *remaining)
+            elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
+                found.append(LIST_FORM[str(segment)])
+                data = data[LIST_FORM[str(segment)]]
+            elif isinstance(data, list) and segment in data:
+                found.append(data.index(segment))
+                data = segment
+            elif remaining or not isinstance(data, dict):
+                continue
+            else:
+                found.append(segment)
+        return tuple(found)
+
+    def _nearest(self, path: KeyPath) -> KeyPath:
+        while path and path not in self.document.values:
+            path = path[:-1]
+        return path
+
+    def report_validation(self, error: ValidationError, root: type[BaseModel], prefix: KeyPath) -> None:
+        """Note every error of the validation of the part at `prefix`, in words."""
+        for item in error.errors(include_url=False):
+            location = (*prefix, *item["loc"])
+            at_key = location[-1] == "[key]"
+            if at_key:
+                location = location[:-1]
+            kind = item["type"]
+            if kind == "extra_forbidden":
+                known = schema_fields(root, location[:-1])
+                self.report(location, unknown_key(str(location[-1]), known), at_key=True)
+            elif kind == "missing":
+                field = schema_fields(root, location[:-1]).get(str(location[-1]))
+                meaning = f": {field.description}" if field is not None and field.description else ""
+                self.report(location, f"is missing{meaning}", at_key=True)
+            else:
+                message = item["msg"] if kind == "study" else f"expected {_EXPECTED[kind]}, not {shown(item['input'])}"
+                self.report(location, message, at_key=at_key)
+
+    def mended(self, error: ValidationError, root: type[BaseModel], key: str, raw: Any) -> Any:
+        """The data of a top-level part with the mistakes of a validation taken out, as far as that is possible.
+
+        Wrong numbers are lost, unknown keys take the name that they resemble or are left out.
+        """
+        part = plain(raw)
+        for item in error.errors(include_url=False):
+            location = (key, *item["loc"])
+            *inner, last = self.written(location)[1:] or (None,)
+            holder: Any = part
+            for segment in inner:
+                holder = holder[segment] if has(holder, segment) else None
+            if item["type"] == "extra_forbidden" and isinstance(holder, dict) and last in holder:
+                value = holder.pop(last)
+                near = nearest(str(last), schema_fields(root, location[:-1]))
+                if near is not None:
+                    holder.setdefault(near, value)
+            elif has(holder, last) and isinstance(holder[last], int | float | str):
+                holder[last] = LOST
+        return part
+
+
+def schema_fields(root: type[BaseModel], location: Sequence[str | int]) -> dict[str, FieldInfo]:
+    """Fields, by their keys in the text, of the model at a location of the schema; none where there is no model."""
+    current: Any = root
+    for segment in (*location, None):
+        while get_origin(current) in (Annotated, Union, UnionType):
+            current = next(arm for arm in get_args(current) if arm is not NoneType)
+        model = isinstance(current, type) and issubclass(current, BaseModel)
+        fields = {field.alias or name: field for name, field in current.model_fields.items()} if model else {}
+        if segment is None:
+            return fields
+        if get_origin(current) in (dict, tuple):
+            current = get_args(current)[-1 if get_origin(current) is dict else 0]
+        else:
+            current = fields[str(segment)].annotation if segment in fields else None
+    return {}

@@ -1,0 +1,278 @@
+"""The study's units, and quantities such as ``"40 mm"`` converted to them.
+
+A *kind* of quantity is a product of powers of length, angle, time and force. Pint is imported only where a string with
+a unit occurs; its registry here knows the units of mechanics alone and keeps the angle as a dimension of its own, so
+that ``rad/s`` is never taken for a frequency.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+Powers = tuple[int, int, int, int]
+"""Exponents of length, angle, time and force."""
+
+KINDS: dict[str, Powers] = {
+    "none": (0, 0, 0, 0),
+    "length": (1, 0, 0, 0),
+    "angle": (0, 1, 0, 0),
+    "time": (0, 0, 1, 0),
+    "force": (0, 0, 0, 1),
+    "velocity": (1, 0, -1, 0),
+    "acceleration": (1, 0, -2, 0),
+    "angular_velocity": (0, 1, -1, 0),
+    "angular_acceleration": (0, 1, -2, 0),
+    "moment": (1, 0, 0, 1),
+    "area": (2, 0, 0, 0),
+    "inertia": (4, 0, 0, 0),
+    "stress": (-2, 0, 0, 1),
+    "stiffness": (-1, 0, 0, 1),
+    "rotational_stiffness": (1, -1, 0, 1),
+    "coupling_stiffness": (0, -1, 0, 1),
+    "compliance": (1, 0, 0, -1),
+    "rotational_compliance": (-1, 1, 0, -1),
+    "coupling_compliance": (0, 1, 0, -1),
+}
+"""Kinds of quantity by name; stiffness and compliance are per radian whatever the study's angle unit."""
+
+_PER_RADIAN = frozenset(name for name in KINDS if name.endswith(("stiffness", "compliance")))
+
+_FACTOR = r"\(?[A-Za-zµμ°]+(?:\s*(?:\^|\*\*)\s*-?\d)?\)?"
+QUANTITY = re.compile(
+    r"\s*(?P<number>[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+    rf"(?P<unit>(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)\s*"
+)
+"""A number and a unit; digits occur in a unit only as powers, so that nothing large can be computed by it.
+
+No text matches in two ways: what does not match is found out in time that grows with its length.
+"""
+
+MAX_LENGTH = 60
+"""Longest text of a unit, in characters."""
+MAX_POWER = 9
+"""Highest power of length, angle, time or force in a unit."""
+
+_DEFINITIONS = """
+kilo- = 1000 = k-
+mega- = 1e6 = M-
+giga- = 1e9 = G-
+deci- = 0.1 = d-
+centi- = 0.01 = c-
+milli- = 1e-3 = m-
+micro- = 1e-6 = µ- = μ- = u-
+nano- = 1e-9 = n-
+meter = [length] = m = metre
+second = [time] = s = sec
+gram = [mass] = g
+radian = [angle] = rad
+degree = 0.017453292519943295 * radian = deg = ° = degrees
+arcminute = degree / 60 = arcmin
+arcsecond = arcminute / 60 = arcsec
+grade = 0.015707963267948967 * radian = gon
+revolution = 6.283185307179586 * radian = rev = turn = turns = revolutions
+minute = 60 * second = min
+hour = 60 * minute = h
+rpm = revolution / minute
+inch = 0.0254 * meter = in = inches
+foot = 12 * inch = ft = feet
+yard = 3 * foot = yd
+thou = 0.001 * inch = mil
+newton = kilogram * meter / second ** 2 = N
+pound = 0.45359237 * kilogram = lb
+pound_force = 4.4482216152605 * newton = lbf
+kilopond = 9.80665 * newton = kgf = kp
+dyne = 1e-5 * newton = dyn
+pascal = newton / meter ** 2 = Pa
+bar = 1e5 * pascal
+psi = pound_force / inch ** 2
+ksi = 1000 * psi
+joule = newton * meter = J
+"""
+
+
+class QuantityError(ValueError):
+    """A quantity that cannot be read or converted; the message says why."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units that bare numbers of a study mean.
+
+    Parameters
+    ----------
+    length, angle, time, force : str
+        As the study writes them; length may be ``dimensionless``.
+    """
+
+    length: str = "mm"
+    angle: str = "deg"
+    time: str = "s"
+    force: str = "N"
+
+    @cached_property
+    def angle_factor(self) -> float:
+        """Radians in one unit of angle."""
+        return _scale(self.angle)
+
+    def label(self, kind: str) -> str:
+        """Unit of a kind of quantity as tables show it (``mm/s``, ``N*mm/rad``); empty for pure numbers."""
+        length, angle, time, force = KINDS[kind]
+        angle_name = "rad" if kind in _PER_RADIAN else self.angle
+        length_name = "" if self.length == "dimensionless" else self.length
+        factors = [(self.force, force), (length_name, length), (angle_name, angle), (self.time, time)]
+        above = "*".join(_power(name, power) for name, power in factors if name and power > 0)
+        below = [_power(name, -power) for name, power in factors if name and power < 0]
+        if not below:
+            return above
+        return f"{above or '1'}/{below[0] if len(below) == 1 else '(' + '*'.join(below) + ')'}"
+
+    def convert(self, text: str, kind: str | None = None) -> float:
+        """Convert a quantity to the study's units.
+
+        Parameters
+        ----------
+        text : str
+            A number and a unit.
+        kind : str, optional
+            What is expected, a name of `KINDS`; left out: whatever the unit says.
+
+        Raises
+        ------
+        QuantityError
+            Where the unit is unknown or of another kind.
+        """
+        number, powers, factor = measure(text)
+        if kind is not None and not fits(powers, kind):
+            raise QuantityError(f"{text.strip()!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected")
+        if powers[0] and self.length == "dimensionless":
+            raise QuantityError(f"{text.strip()!r} has a length in it, and this study's lengths are dimensionless")
+        scale = _scale(self.length) ** powers[0] * _scale(self.time) ** powers[2] * _scale(self.force) ** powers[3]
+        # Stiffness is per radian by the format, so an angle below the line is never in the study's unit.
+        scale *= self.angle_factor ** max(powers[1], 0)
+        return number * factor / scale
+
+
+# Units that are read without the registry, which takes a while to build: their kind and SI value.
+_COMMON = {
+    "mm": ("length", 1e-3),
+    "cm": ("length", 1e-2),
+    "m": ("length", 1.0),
+    "in": ("length", 0.0254),
+    "deg": ("angle", math.pi / 180.0),
+    "rad": ("angle", 1.0),
+    "s": ("time", 1.0),
+    "min": ("time", 60.0),
+    "N": ("force", 1.0),
+    "kN": ("force", 1e3),
+    "lbf": ("force", 4.4482216152605),
+}
+
+
+def check_unit(kind: str, name: str) -> None:
+    """Check a unit of length, angle, time or force; a length may be ``dimensionless``.
+
+    Raises
+    ------
+    QuantityError
+        Where it is none, with examples.
+    """
+    with contextlib.suppress(QuantityError):
+        if (kind, name) == ("length", "dimensionless") or measure(f"1 {name}")[1] == KINDS[kind]:
+            return
+    known = ", ".join(unit for unit, (what, _) in _COMMON.items() if what == kind)
+    raise QuantityError(f"{name!r} is not a unit of {kind}; for example {known}")
+
+
+def _scale(name: str) -> float:
+    """SI value of one unit."""
+    return 1.0 if name == "dimensionless" else measure(f"1 {name}")[2]
+
+
+def measure(text: str) -> tuple[float, Powers, float]:
+    """Read a quantity: its number, the powers of its unit, and the unit's value in SI units and radians.
+
+    Raises
+    ------
+    QuantityError
+        Where the unit is unknown or no product of powers of length, angle, time and force.
+    """
+    match = QUANTITY.fullmatch(text)
+    if match is None:
+        raise QuantityError(f"{text!r} is not a number with a unit")
+    unit = match["unit"]
+    if len(unit) > MAX_LENGTH:
+        raise QuantityError(f"{unit[:MAX_LENGTH]!r}... is no unit: none is longer than {MAX_LENGTH} characters")
+    powers, factor = _common(unit) or _unit(unit)
+    if max(map(abs, powers)) > MAX_POWER:
+        raise QuantityError(f"{unit!r} is no unit: it is {describe(powers)}, and no power is beyond {MAX_POWER}")
+    return float(match["number"]), powers, factor
+
+
+def _common(unit: str) -> tuple[Powers, float] | None:
+    """A common unit or a quotient of two, such as ``rad/s``."""
+    names = [name.strip() for name in unit.split("/")]
+    if len(names) > 2 or any(name not in _COMMON for name in names):
+        return None
+    kind, factor = _COMMON[names[0]]
+    powers = KINDS[kind]
+    if len(names) == 2:
+        kind, divisor = _COMMON[names[1]]
+        powers, factor = _powers(a - b for a, b in zip(powers, KINDS[kind], strict=True)), factor / divisor
+    return powers, factor
+
+
+def _powers(exponents: Iterable[float]) -> Powers:
+    length, angle, time, force = map(int, exponents)
+    return length, angle, time, force
+
+
+@cache
+def _unit(unit: str) -> tuple[Powers, float]:
+    registry = _registry()
+    try:
+        parsed = registry.parse_units(unit.replace("^", "**").replace("·", "*"))
+        base = registry.Quantity(1.0, parsed).to_base_units()
+    except Exception:  # pint lets through whatever its tokenizer and its own classes raise
+        raise QuantityError(f"unknown unit {unit!r}") from None
+    dimensions = {str(name): power for name, power in base.dimensionality.items()}
+    mass, length = dimensions.get("[mass]", 0), dimensions.get("[length]", 0)
+    angle, time = dimensions.get("[angle]", 0), dimensions.get("[time]", 0)
+    exponents = (length - mass, angle, time + 2 * mass, mass)
+    if any(exponent != int(exponent) for exponent in exponents):
+        raise QuantityError(f"the unit {unit!r} has a broken power")
+    # The registry's base of mass is the gram.
+    return _powers(exponents), float(base.magnitude) * 1e-3**mass
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry(None, on_redefinition="ignore")
+    registry.load_definitions(_DEFINITIONS.strip().splitlines())
+    return registry
+
+
+def fits(powers: Powers, kind: str) -> bool:
+    """Whether a unit is one of a kind of quantity; a rotational stiffness may leave its radian out."""
+    return powers == KINDS[kind] or (kind == "rotational_stiffness" and powers == KINDS["moment"])
+
+
+def describe(powers: Powers) -> str:
+    """Name a kind of quantity for a message."""
+    for name, known in KINDS.items():
+        if known == powers:
+            article = "an" if name[0] in "aeiou" else "a"
+            return "a pure number" if name == "none" else f"{article} {name.replace('_', ' ')}"
+    names = ("length", "angle", "time", "force")
+    return "a quantity of " + " ".join(_power(name, power) for name, power in zip(names, powers, strict=True) if power)
+
+
+def _power(name: str, power: int) -> str:
+    return name if power == 1 else f"{name}^{power}"

@@ -1,0 +1,71 @@
+"""Imports run one way: from what is general to what is asked, without circles; those inside functions count too."""
+
+import ast
+from functools import cache
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import mechdesign
+
+ROOT = Path(mechdesign.__file__).parent
+# Folders and files from the bottom to the top; each may import what stands in its own line and above.
+ORDER = (
+    ("mechdesign.numerics",),
+    ("mechdesign",),  # the files beside the folders: results, errors, expressions, threads, ...
+    ("mechdesign.mechanism",),
+    ("mechdesign.study.text",),
+    ("mechdesign.study.build",),
+    ("mechdesign.study.schema", "mechdesign.study.poses"),
+    ("mechdesign.study",),
+    ("mechdesign.analyses", "mechdesign.analyses.region"),
+    ("mechdesign.analyses.kinematics",),
+    ("mechdesign.analyses.stiffness",),
+    ("mechdesign.analyses.reliability",),
+    ("mechdesign.analyses.workspace",),
+    ("mechdesign.analyses.optimize",),
+    ("mechdesign.report",),
+    ("mechdesign.cli",),
+    ("mechdesign.__init__", "mechdesign.__main__"),
+)
+RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
+
+
+@cache
+def imports() -> dict[str, set[str]]:
+    """Every file with the files that it imports, by dotted names; a package is its `__init__`."""
+    files = {".".join(("mechdesign", *p.relative_to(ROOT).with_suffix("").parts)): p for p in ROOT.rglob("*.py")}
+    found: dict[str, set[str]] = {name: set() for name in files}
+    for name, path in files.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            wanted = []
+            if isinstance(node, ast.ImportFrom):
+                assert node.level == 0, f"{path}: imports are written in full"
+                wanted = [(f"{node.module}.{alias.name}", str(node.module)) for alias in node.names]
+            elif isinstance(node, ast.Import):
+                wanted = [(alias.name, alias.name) for alias in node.names]
+            for candidates in wanted:
+                names = [end for each in candidates for end in (each, f"{each}.__init__") if end in files]
+                found[name].update(names[:1])
+    return found
+
+
+def rank(name: str) -> int:
+    """Where a file stands in `ORDER`, by the nearest folder that has a line."""
+    while name not in RANKS:
+        name = name.rpartition(".")[0]
+    return RANKS[name]
+
+
+def test_no_file_imports_itself_by_way_of_others():
+    # A cycle raises an error that names its files. The door of the package imports what is asked of it by name.
+    TopologicalSorter({name: used - {"mechdesign.__init__"} for name, used in imports().items()}).prepare()
+
+
+def test_folders_import_what_is_below_them():
+    upwards = [
+        f"{name} imports {other}"
+        for name, used in imports().items()
+        for other in used - {"mechdesign.__init__"}
+        if rank(other) > rank(name)
+    ]
+    assert not upwards
