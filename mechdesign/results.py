@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,11 @@ class Table:
     def __len__(self) -> int:
         return len(self.columns[0].values) if self.columns else 0
 
+    def take(self, rows: NDArray[Any]) -> Table:
+        """The table of some rows, by a mask or by their numbers."""
+        columns = tuple(replace(column, values=np.asarray(column.values)[rows]) for column in self.columns)
+        return replace(self, columns=columns)
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the columns, in order."""
@@ -104,6 +109,8 @@ class Result:
         Texts to be written beside the tables, by the names of their files.
     interrupted : str
         How far it came, where it is the finished part of an interrupted computation.
+    drawn : mapping of str to object
+        What pictures show beside the tables: solved poses, springs; by names that the command's pictures know.
     """
 
     command: str
@@ -113,6 +120,7 @@ class Result:
     failed: str = ""
     files: Mapping[str, str] = field(default_factory=dict)
     interrupted: str = ""
+    drawn: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def main(self) -> Table:

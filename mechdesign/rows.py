@@ -13,11 +13,11 @@ from mechdesign.errors import nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 
-# Values of a column that a message names.
+# Number of a column's values that a message names.
 MOST_VALUES = 12
-# In the meaning of a column whose unit is that of its row, in the table's column of that name.
+# In the meaning of a column whose rows have units of their own: they stand in the table's column `unit`.
 IN_UNIT = "in `unit`"
-# Rows in words that a message names.
+# Number of rows that a message names.
 MOST_ROWS = 8
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Outcome, Owners, answer, folder, load_study, study_label, tell
+from mechdesign.cli.execution import Outcome, answer, claim, folder, load_study, tell
 from mechdesign.cli.failure import INTERRUPTED
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
@@ -70,11 +70,11 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome
             studies.append(load_study(path, options))
         except Exception as error:
             yield _failure(path.stem if path else "study", "check", Path(), error)
-    owners = Owners()
+    owners: dict[str, Path | None] = {}
     for study in studies:
-        label = study_label(study)
+        label = study.label
         try:
-            owners.claim(study)
+            claim(owners, study)
         except StudyError as error:
             yield _failure(label, "check", Path(), error)
             continue
@@ -84,7 +84,7 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome
 
 
 def _ask(study: Study, command: str, directory: Path, options: Options) -> Outcome:
-    label = study_label(study)
+    label = study.label
     try:
         given = answer(study, command, directory, options)
     except Exception as error:

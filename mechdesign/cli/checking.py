@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Owners, folder, load_study, study_label
+from mechdesign.cli.execution import claim, folder, load_study
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import explain
@@ -21,11 +21,11 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
     from mechdesign.study.schema.reliability_checks import in_words
 
     worst = 0
-    owners = Owners()
+    owners: dict[str, Path | None] = {}
     for path in paths:
         try:
             study = load_study(path, options)
-            label = study_label(study)
+            label = study.label
             if not options.quiet:
                 clearances = in_words(study.reliability, study.mechanism.graph)
                 terminal.emit("\n".join([f"{label}: {study.name}", describe(study.mechanism), *clearances, ""]))
@@ -35,7 +35,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
             if not options.no_plots:
                 from mechdesign.report.writer import write_sketch
 
-                owners.claim(study)
+                claim(owners, study)
                 directory = folder(study, "check", options, several=len(paths) > 1)
                 terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
         except Exception as error:

@@ -66,37 +66,24 @@ def load_study(path: Path | None, options: Options) -> Study:
     return load(path, options.overrides or (), options.seed)
 
 
-def study_label(study: Study) -> str:
-    """The name of a study's folder: that of its file."""
-    return study.path.stem if study.path is not None else study.name
-
-
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
     """Where the results of a command go, given alone; of several studies each has a folder in that of the option."""
-    label = study_label(study)
     if options.out is None:
-        return Path("results") / label / name
-    return options.out / label if several else options.out
+        return Path("results") / study.label / name
+    return options.out / study.label if several else options.out
 
 
-class Owners:
-    """Which study each folder of results belongs to."""
+def claim(owners: dict[str, Path | None], study: Study) -> None:
+    """Take the folder of a study's name; `owners` says which file each folder belongs to.
 
-    def __init__(self) -> None:
-        self._sources: dict[str, str] = {}
-
-    def claim(self, study: Study) -> None:
-        """Take the folder of a study's name.
-
-        Raises
-        ------
-        StudyError
-            If another file of that name has it.
-        """
-        source = str(study.path)
-        owner = self._sources.setdefault(study_label(study), source)
-        if owner != source:
-            raise StudyError(f"{source}: its results would overwrite those of {owner}; rename one of the files")
+    Raises
+    ------
+    StudyError
+        If another file of that name has it.
+    """
+    owner = owners.setdefault(study.label, study.path)
+    if owner != study.path:
+        raise StudyError(f"{study.path}: its results would overwrite those of {owner}; rename one of the files")
 
 
 def answer(study: Study, command: str, directory: Path, options: Options) -> Outcome:
@@ -129,7 +116,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
             )
     except Interrupted as interrupt:
         writer.write(directory, study, interrupt.result, (), asked)
-        terminal.say(f"{study_label(study)}: {command}: {interrupt}")
+        terminal.say(f"{study.label}: {command}: {interrupt}")
         raise
     try:
         verdicts, undrawn = _judged_and_written(directory, study, result, asked)
@@ -142,7 +129,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
     code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
     return Outcome(
-        study_label(study), command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
+        study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         result=result,
     )  # fmt: skip
 
@@ -164,7 +151,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     rows = next(iter(content["tables"].values()))["rows"]
     code = _exit_code(content["failed"], verdicts)
     return Outcome(
-        study_label(study), command, directory, code, rows, content["warnings"], content["failed"], verdicts, kept=True
+        study.label, command, directory, code, rows, content["warnings"], content["failed"], verdicts, kept=True
     )
 
 
@@ -211,7 +198,7 @@ def _journal(study: Study, directory: Path, options: Options) -> Journal:
     journal = Journal(directory / NAME, manifest.computed_from(study, "optimize"), resume=options.resume)
     if options.resume and not journal.usable:
         there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
-        terminal.say(f"{study_label(study)}: optimize: {there}; begins anew", quiet=options.quiet)
+        terminal.say(f"{study.label}: optimize: {there}; begins anew", quiet=options.quiet)
     return journal
 
 

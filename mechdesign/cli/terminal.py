@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
     from mechdesign.results import Table
 
-_ROWS = 24
-_DIGITS = 6
-_NAMES = 6
-_PATIENCE = 1.0  # seconds before a bar appears
+_ROWS = 24  # rows shown on a terminal
+_DIGITS = 6  # significant digits of its numbers
+_NAMES = 6  # names of columns for which there was no room
+_BAR_DELAY = 1.0  # seconds before a bar appears
 
 
 def say(text: str, *, quiet: bool = False) -> None:
@@ -117,7 +117,7 @@ class Bar:
         self._done += n
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self._done)
-        elif self._wanted and time.monotonic() - self._begun > _PATIENCE:
+        elif self._wanted and time.monotonic() - self._begun > _BAR_DELAY:
             self._open()
 
     def _open(self) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -56,8 +55,6 @@ def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
     return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)
 
 
-# The command asks, then its picture.
-@lru_cache(maxsize=1)
 def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, ...]:
     """Every assembly mode of the plan of given coordinates, the sketch's first.
 

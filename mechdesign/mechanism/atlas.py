@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import MAX_CHANGE, guess_of, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
@@ -39,6 +39,8 @@ CORRECTIONS = 5
 SINGLE_CORRECTIONS = 30
 # A correction that leaves less of the determinant than this is towards a fold (at the fold itself: a half).
 NEAR_FOLD = 0.8
+# Dimensions of each pose that differ from the nominal ones.
+Sizes = Mapping[str, Floats]
 SIDES = np.array([1, 1j, -1, -1j])
 
 
@@ -142,22 +144,16 @@ class Atlas:
         reach = REACH * self.spacing
         far = np.abs(way) > reach
         within = np.where(far, near + way * (reach / np.maximum(np.abs(way), reach)), goal)
-        with np.errstate(all="ignore"):
-            ahead = slopes[0] * way.real + slopes[1] * way.imag
-            state, fold_distance = self._solved(goal, sizes, table, ahead, within, beyond)
-            fold_distance[lost | (far & ~self._open(state, flat.shape))] = np.nan
+        ahead = slopes[0] * way.real + slopes[1] * way.imag
+        state, fold_distance = self._solved(goal, sizes, table, ahead, within, beyond)
+        fold_distance[lost | (far & ~self._open(state, flat.shape))] = np.nan
         lost = np.isnan(fold_distance) if beyond else ~(fold_distance > 0)
         return self._configuration(state, places, lost.reshape(shape)), fold_distance.reshape(shape)
 
+    @quiet
     def _solved(
-        self,
-        z: Complexes,
-        sizes: Mapping[str, Floats],
-        table: Floats,
-        ahead: Value,
-        within: Complexes,
-        beyond: bool = False,
-    ) -> tuple[State, Floats]:  # fmt: skip
+        self, z: Complexes, sizes: Sizes, table: Floats, ahead: Value, within: Complexes, beyond: bool = False
+    ) -> tuple[State, Floats]:
         """The mechanism near known poses, and its distances from a fold (see `solve`).
 
         Parameters
@@ -181,7 +177,7 @@ class Atlas:
         z[rows] = within[rows]
         return self._run(z, sizes, found, 0, beyond), fold_distance
 
-    def _beside_fold(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats) -> tuple[Floats, Floats]:
+    def _beside_fold(self, z: Complexes, sizes: Sizes, table: Floats) -> tuple[Floats, Floats]:
         """Unknowns and distances from a fold, by single corrections until a pose is solved or seen to be beyond.
 
         Towards a fold the equations are those of a parabola: from one side of it corrections never pass to the other,
@@ -220,13 +216,13 @@ class Atlas:
                 break
         return found, fold_distance
 
-    def _run(self, z: Complexes, sizes: Mapping[str, Floats], table: Floats, steps: int, beyond: bool = False) -> State:
+    def _run(self, z: Complexes, sizes: Sizes, table: Floats, steps: int, beyond: bool = False) -> State:
         """The whole mechanism after some of Newton's corrections."""
         vectors = self.plan.core.geometry.vectors(sizes)
         guess = guess_of(self.plan.structure, table)
         return self.plan.run([z.real, z.imag, *self.held], vectors, guess, steps=steps, beyond=beyond)
 
-    def _nearest(self, z: Complexes, sizes: Mapping[str, Floats]) -> tuple[Complexes, Floats, Floats]:
+    def _nearest(self, z: Complexes, sizes: Sizes) -> tuple[Complexes, Floats, Floats]:
         """Places of the nearest solved poses (nan where there is none), their unknowns and slopes."""
         if not sizes or self.empty:
             return _pick(self.known[b""], z)
@@ -248,7 +244,7 @@ class Atlas:
                 del self.known[key]
         return near, table, slopes
 
-    def _designs(self, sizes: Mapping[str, Floats], count: int) -> list[_Poses]:
+    def _designs(self, sizes: Sizes, count: int) -> list[_Poses]:
         """Poses of several designs: some of the nominal ones are brought to their dimensions and grow from there."""
         nominal = self.known[b""]
         coarse = np.flatnonzero((nominal.lattice.real % COARSE == 0) & (nominal.lattice.imag % COARSE == 0))
@@ -266,7 +262,7 @@ class Atlas:
             table = table_of(state.unknowns, reached.shape)[:, reached]
         return self._grown(sizes, design, lattice, table)
 
-    def _grown(self, sizes: Mapping[str, Floats], design: Ints, lattice: Complexes, table: Floats) -> list[_Poses]:
+    def _grown(self, sizes: Sizes, design: Ints, lattice: Complexes, table: Floats) -> list[_Poses]:
         """Poses of all designs, from solved ones to their neighbours on the lattice until nothing more closes."""
         count = max((len(value) for value in sizes.values()), default=1)
         seen = set(zip(design.tolist(), lattice.tolist(), strict=True))
@@ -305,16 +301,15 @@ class Atlas:
             found.append(_Poses(tree, lattice[lanes], table[:, lanes], slopes[:, :, lanes]))
         return found
 
-    def _slopes(self, lattice: Complexes, sizes: Mapping[str, Floats], table: Floats) -> Floats:
+    def _slopes(self, lattice: Complexes, sizes: Sizes, table: Floats) -> Floats:
         """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
         h = DIFFERENCE * self.plan.core.size
         z = self.origin + self.spacing * lattice
-        with np.errstate(all="ignore"):
-            beside = [table_of(self._run(z + step, sizes, table, 1).unknowns, z.shape) for step in (h, 1j * h)]
-            slopes = (np.stack(beside) - table) / h
+        beside = [table_of(self._run(z + step, sizes, table, 1).unknowns, z.shape) for step in (h, 1j * h)]
+        slopes = (np.stack(beside) - table) / h
         return np.where(np.isfinite(slopes).all(axis=1, keepdims=True), slopes, 0.0)
 
-    def _within(self, state: State, sizes: Mapping[str, Floats], shape: tuple[int, ...]) -> Flags:
+    def _within(self, state: State, sizes: Sizes, shape: tuple[int, ...]) -> Flags:
         """Which poses are within the study's limits."""
         found = np.ones(shape, dtype=bool)
         for _, margin in self.plan.core.margins(self._configuration(state, sizes, np.zeros(shape, dtype=bool))):

@@ -65,20 +65,7 @@ class ChangePoints:
     def cover(self, values: Value) -> None:
         """Search the range of some values, if it has not been searched."""
         finite = np.asarray(values, dtype=float)[np.isfinite(values)]
-        if finite.size:
-            self._cover(float(finite.min()), float(finite.max()))
-
-    def _parity(self, values: Floats, groups: int) -> list[Value]:
-        """Modes of the first groups; the others as drawn."""
-        found: list[Value] = list(self._modes)
-        for index in range(groups):
-            places = self._places[index]
-            if len(places):
-                passed = np.searchsorted(places, values) - np.searchsorted(places, self.sketch)
-                found[index] = found[index] * np.where(passed % 2, -1, 1)
-        return found
-
-    def _cover(self, low: float, high: float) -> None:
+        low, high = (float(end(finite, initial=self.sketch)) for end in (np.min, np.max))
         begin, end = self._range
         if begin <= low and high <= end:
             return
@@ -96,6 +83,16 @@ class ChangePoints:
             if mode:
                 self._places[index] = self._search(index, samples)
         self._range = (low, high)
+
+    def _parity(self, values: Floats, groups: int) -> list[Value]:
+        """Modes of the first groups; the others as drawn."""
+        found: list[Value] = list(self._modes)
+        for index in range(groups):
+            places = self._places[index]
+            if len(places):
+                passed = np.searchsorted(places, values) - np.searchsorted(places, self.sketch)
+                found[index] = found[index] * np.where(passed % 2, -1, 1)
+        return found
 
     def _closures(self, index: int, values: Floats) -> Floats:
         modes = self._parity(values, index)[: index + 1]

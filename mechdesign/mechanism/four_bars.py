@@ -89,15 +89,19 @@ class FourBar:
         Four-bar: p + q - (s + l), with s and l the shortest and the longest link. Slider-crank: rod - (crank + offset).
         Inverted: difference of crank and frame, less the offset.
         """
+        (_, left), (_, right) = self._compared()
+        size = sum(length for length in (*self.lengths, self.offset) if not math.isnan(length))
+        return right - left if abs(right - left) > EQUAL * size else 0.0
+
+    def _compared(self) -> tuple[tuple[str, float], tuple[str, float]]:
+        """The lengths that decide, by name: a link turns fully where the first is below the second."""
         if self.kind == "four-bar":
             shortest, *others, longest = sorted(self.lengths)
-            excess = sum(others) - (shortest + longest)
-        else:
-            one, two = self._pair()
-            turns = two - one if self.kind == "slider-crank" else abs(one - two)
-            excess = turns - self.offset
-        size = sum(length for length in (*self.lengths, self.offset) if not math.isnan(length))
-        return excess if abs(excess) > EQUAL * size else 0.0
+            return ("s + l", shortest + longest), ("p + q", sum(others))
+        one, two = self._pair()
+        if self.kind == "slider-crank":
+            return ("crank + offset", one + self.offset), ("rod", two)
+        return ("offset", self.offset), ("difference of crank and frame", abs(one - two))
 
     def _pair(self) -> tuple[float, float]:
         """Crank and rod of a slider-crank; crank and frame of an inverted one."""
@@ -123,15 +127,7 @@ class FourBar:
 
     def condition(self) -> str:
         """The comparison of lengths behind the type, in words."""
-        if self.kind == "four-bar":
-            shortest, *others, longest = sorted(self.lengths)
-            left, right = ("s + l", shortest + longest), ("p + q", sum(others))
-        elif self.kind == "slider-crank":
-            crank, rod = self._pair()
-            left, right = ("crank + offset", crank + self.offset), ("rod", rod)
-        else:
-            crank, frame = self._pair()
-            left, right = ("offset", self.offset), ("difference of crank and frame", abs(crank - frame))
+        left, right = self._compared()
         sign = "=" if self.type == "change point" else "<" if self.excess > 0 else ">"
         # Rounding is no length.
         return f"{left[0]} {left[1]:.6g} {sign} {right[0]} {left[1] if sign == '=' else right[1]:.6g}"

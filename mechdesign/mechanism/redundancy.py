@@ -44,7 +44,7 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
     """
     graph = equations.graph
     jacobian = equations.jacobian(x)
-    free = null_space(jacobian).shape[1]
+    free, more = equations.without(jacobian, set(), set())
     stressed, _ = doubled(equations, jacobian)
     driven = {name for drive in description.drives.values() for name in (drive.target, drive.reference)}
     found: list[str] = []
@@ -62,24 +62,16 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
                 continue
         elif name in driven or not _can_go(description, name):
             continue
-        equal = equations.freedom_without(jacobian, edges | own, classes | frames) == free
-        gain = 2 * len(own) - len(frames) - _fewer_unknowns(equations, edges, own)
-        if equal and gain > 0:
+        freedom, left = equations.without(jacobian, edges | own, classes | frames)
+        gain = more - left
+        if freedom == free and gain > 0:
             found.append(name)
             edges |= own
             classes |= frames
-            excess -= gain
+            excess, more = excess - gain, left
             if excess <= 0:
                 return found
     return []
-
-
-def _fewer_unknowns(equations: Equations, before: set[int], own: set[int]) -> int:
-    """Unknowns that go with the edges `own`, those `before` being gone: slides, and nodes that only they place."""
-    edges = equations.graph.edges
-    left = {node for k, e in enumerate(edges) if k not in before | own for node in (e.tail, e.head)}
-    lonely = {node for k in own for node in (edges[k].tail, edges[k].head)} - left - {0}
-    return 2 * len(lonely) + sum(edges[k].slide is not None for k in own)
 
 
 def _line_links(description: Description, joint: str) -> tuple[str, ...]:

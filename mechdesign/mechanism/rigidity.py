@@ -231,8 +231,11 @@ class Equations:
                 kept[:, k] = motions.T @ (y - x) / np.linalg.norm(step)
         return int((np.linalg.svd(kept, compute_uv=False) > KEPT).sum())
 
-    def freedom_without(self, jacobian: Floats, edges: Collection[int], classes: Collection[int]) -> int:
-        """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place."""
+    def without(self, jacobian: Floats, edges: Collection[int], classes: Collection[int]) -> tuple[int, int]:
+        """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place.
+
+        And how many more equations than unknowns are left.
+        """
         left = [k for k in range(len(self.graph.edges)) if k not in edges]
         tail, head, _, slide = self._ends
         placed = {int(node) for k in left for node in (tail[k], head[k])}
@@ -242,7 +245,7 @@ class Equations:
         gone |= {self.inner + part + node - 1 for node in lonely for part in (0, nodes)}
         kept = [column for column in range(jacobian.shape[1]) if column not in gone]
         rows = [2 * k + part for k in left for part in (0, 1)]
-        return int(null_space(jacobian[np.ix_(rows, kept)]).shape[1])
+        return int(null_space(jacobian[np.ix_(rows, kept)]).shape[1]), len(rows) - len(kept)
 
 
 def null_space(matrix: Floats) -> Floats:

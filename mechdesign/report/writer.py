@@ -134,11 +134,11 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[di
         drawings: dict[str, Drawing] = {
             f"{name}.png": partial(style.to_png, figure) for name, figure in gallery.items()
         }
-        drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study))
+        drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study, result))
         if animate:
             from mechdesign.report.figures.kinematics.animation import animation
 
-            drawings[ANIMATION] = lambda: animation(study)
+            drawings[ANIMATION] = lambda: animation(result)
         drawn, failed = render(drawings)
     warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":

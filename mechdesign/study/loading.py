@@ -98,6 +98,11 @@ class Study:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
 
+    @property
+    def label(self) -> str:
+        """The name of its folder of results: that of its file."""
+        return self.path.stem if self.path is not None else self.name
+
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text as long as the file is what was read."""
         content = self.path.read_bytes() if self.path is not None and self.path.is_file() else b""

@@ -16,7 +16,7 @@ from mechdesign.study.text.document import KeyPath, leaves, read
 if TYPE_CHECKING:
     from mechdesign.study.loading import Study
 
-# Larger texts are not searched for the places of their numbers.
+# Bytes of a text beyond which it is written anew, without its comments.
 _MOST_BYTES = 1_000_000
 _INPUT = "input_"
 

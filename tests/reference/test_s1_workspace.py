@@ -214,7 +214,7 @@ def test_local_indices_on_the_axis_of_symmetry() -> None:
 
 def test_boundary_of_the_2rrr_is_singular_where_a_leg_is_stretched_or_folded() -> None:
     table = mechdesign.workspace(study("two_rrr")).tables["boundary"]
-    assert set(table["kind"]) == {"dead centre"}
+    assert set(table["kind"]) == {"singularity"}
     reach = np.stack([np.hypot(table["x"] - side, table["y"]) for side in (1, -1)])
     outer = table["side"] == "outer"
     assert reach[:, outer].max(axis=0) == pytest.approx(np.full(outer.sum(), 3.15), abs=1e-12)

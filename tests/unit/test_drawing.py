@@ -12,6 +12,7 @@ from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import Label, paper, place_labels
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.scene import hull, pose
+from mechdesign.results import Result
 
 SLIDER = """
 mechanism:
@@ -35,7 +36,7 @@ def study(tmp_path):
 
 def drawn(study):
     with style.context():
-        figure = mechanism_figure(study)
+        figure = mechanism_figure(study, Result("workspace", {}))
         return figure, style.to_png(figure)
 
 

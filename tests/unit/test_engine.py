@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers import limit_states
-from helpers.limit_states import Case
+from helpers.limit_states import Case, quasi_monte_carlo
 from scipy.special import ndtr
 
 from mechdesign.analyses.reliability.engine.design_points import find
@@ -13,7 +13,6 @@ from mechdesign.analyses.reliability.engine.form import form
 from mechdesign.analyses.reliability.engine.importance import importance_sampling
 from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
-from mechdesign.analyses.reliability.engine.quasi import quasi_monte_carlo
 
 CASES = {
     **{f"half_space_{d}_{beta:g}": limit_states.linear(d, beta) for d in (1, 2, 30, 100) for beta in (2.0, 4.0, 7.0)},
@@ -132,18 +131,18 @@ def test_nothing_fails() -> None:
     assert form(problem, points).failure == 0.0
     found = importance_sampling(problem, points, generator(1), 1000)
     assert (found.failure, found.low, found.high, found.failures) == (0.0, 0.0, 1.0, 0)
-    quasi = quasi_monte_carlo(problem, 1, 4096)
+    spread = quasi_monte_carlo(problem, 1, 4096)
     # No failure among n samples: the upper end is 1 - tail^(1/n).
-    assert quasi.high == pytest.approx(1 - 0.0015 ** (1 / 4096), rel=1e-9)
-    assert quasi.failure == quasi.low == 0.0
+    assert spread.high == pytest.approx(1 - 0.0015 ** (1 / 4096), rel=1e-9)
+    assert spread.failure == spread.low == 0.0
 
 
 @pytest.mark.parametrize("dead", [-1.0, np.nan])
 def test_everything_fails(dead: float) -> None:
     problem = Problem(3, lambda u: np.full((1, u.shape[1]), dead))
-    quasi = quasi_monte_carlo(problem, 1, 4096)
-    assert quasi.failure == quasi.high == 1.0
-    assert quasi.invalid == (4096 if np.isnan(dead) else 0)
+    spread = quasi_monte_carlo(problem, 1, 4096)
+    assert spread.failure == spread.high == 1.0
+    assert spread.invalid == (4096 if np.isnan(dead) else 0)
     found = sampled(problem, most=10_000)
     assert found.failure <= 1.0
     assert found.high == pytest.approx(1.0, abs=0.05)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers import limit_states
-from helpers.limit_states import Case
+from helpers.limit_states import Case, quasi_monte_carlo
 
 from mechdesign.analyses.reliability.engine.design_points import find
 from mechdesign.analyses.reliability.engine.importance import importance_sampling
@@ -13,7 +13,7 @@ from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE, binomia
 from mechdesign.analyses.reliability.engine.ladder import climb
 from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
-from mechdesign.analyses.reliability.engine.quasi import quasi_monte_carlo
+from mechdesign.analyses.reliability.methods.auto import rungs
 
 SEEDS = 80
 CASES = {
@@ -90,8 +90,8 @@ def test_auto(name: str, used: str) -> None:
     for seed in range(SEEDS):
         problem, other = case.problem, case.problem
         found, method, _ = climb(
-            problem, Precision(0.1 / WIDTH, None), lambda n, s=seed, p=other: plain(p, s + 10**6, n), generator(seed),
-            100_000, 100_000,
+            problem, Precision(0.1 / WIDTH, None), lambda n, s=seed, p=other: plain(p, s + 10**6, n), rungs(),
+            generator(seed), 100_000, 100_000,
         )  # fmt: skip
         assert method == used
         assert found.high - found.low <= 0.2 * found.failure

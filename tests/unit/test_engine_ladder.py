@@ -11,6 +11,7 @@ from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.ladder import FEW, PILOT, climb, disagree
 from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, failed
+from mechdesign.analyses.reliability.methods.auto import rungs
 
 Said = tuple[Estimate, str, dict[str, Estimate]]
 
@@ -26,7 +27,7 @@ def climbed(case: Case, precision: Precision, most: int = 200_000, sees: Case | 
         invalid = int(np.isnan(margins).any(axis=0).sum())
         return Estimate(broken / count, *binomial(broken, count), count, count, broken, invalid)
 
-    return climb(case.problem, precision, plain, np.random.default_rng(3), most, most)
+    return climb(case.problem, precision, plain, rungs(), np.random.default_rng(3), most, most)
 
 
 def relative(share: float) -> Precision:

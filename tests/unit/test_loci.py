@@ -141,7 +141,7 @@ def test_every_boundary_point_of_an_arm_says_why() -> None:
     z = edge["x"] + 1j * edge["y"]
     for name, radius in (("upper-lower stretched", 2.5), ("upper-lower folded", 0.5)):
         rows = (edge["at"] == name) & inner
-        assert set(edge["kind"][rows]) == {"dead centre"}
+        assert set(edge["kind"][rows]) == {"singularity"}
         assert np.abs(z[rows]) == pytest.approx(np.full(rows.sum(), radius), abs=1e-9)
     rows = (edge["at"] == "q1 range") & inner
     elbows = 1.5 * np.exp(1j * np.radians([-40, 100]))

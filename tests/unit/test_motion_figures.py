@@ -10,7 +10,7 @@ from mechdesign.report.figures.kinematics import figures
 from mechdesign.report.figures.kinematics.animation import in_order
 from mechdesign.report.figures.kinematics.curves import curves_figure
 from mechdesign.report.figures.mechanism import sketch_figure
-from mechdesign.report.figures.sweep import ranks, solve_sweep
+from mechdesign.report.figures.sweep import Sweep, ranks
 
 FOUR_BAR = """
 mechanism:
@@ -43,6 +43,10 @@ def drawn(study, **options):
         return found
 
 
+def sweep_of(study):
+    return Sweep.of(mechdesign.kinematics(study).drawn["motion"])
+
+
 def boxes(axes):
     return [text.get_window_extent() for text in axes.texts if text.get_text()]
 
@@ -67,7 +71,7 @@ def test_the_coupler_point_tells_most():
     assert ranks(study_of(FOUR_BAR).mechanism, ("B.x",))["B"] == 2
     figure = drawn(study_of(FOUR_BAR))["paths"]
     study = study_of(FOUR_BAR)
-    path = np.asarray(solve_sweep(study).places["C"])
+    path = np.asarray(sweep_of(study).places["C"])
     bold = max(
         (line for line in figure.axes[0].lines if len(line.get_xdata()) == 73), key=lambda line: line.get_linewidth()
     )
@@ -130,7 +134,7 @@ def test_a_rate_without_bound_does_not_flatten_the_rest():
 
 
 def test_an_animation_of_a_turn_with_a_gap_has_no_jump():
-    sweep = solve_sweep(study_of(ROCKER))
+    sweep = sweep_of(study_of(ROCKER))
     assert not sweep.closed
     path = np.asarray(sweep.places["B"])
     order = in_order(sweep)
@@ -139,7 +143,7 @@ def test_an_animation_of_a_turn_with_a_gap_has_no_jump():
 
 
 def test_a_long_sweep_is_drawn_at_a_bounded_number_of_poses():
-    sweep = solve_sweep(study_of(FOUR_BAR, "kinematics.sweep={theta: {from: 0, to: 360, step: 0.01}}"))
+    sweep = sweep_of(study_of(FOUR_BAR, "kinematics.sweep={theta: {from: 0, to: 360, step: 0.01}}"))
     assert len(sweep.rows) == 2001
     assert (sweep.rows[0], sweep.rows[-1]) == (0, 36000)
     assert sweep.closed

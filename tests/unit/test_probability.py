@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, owens_t
 
-from mechdesign.analyses.reliability.engine.intervals import binomial, simulation_error
+from mechdesign.analyses.reliability.engine.intervals import binomial
+from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
 from mechdesign.analyses.reliability.probability import (
     disc_failure,
     failure_probability,
-    rectangle_failure,
 )
+from mechdesign.numerics.statistics import rectangle_failure
 
 
 def quadrant(h: float, k: float, rho: float) -> float:
@@ -111,8 +112,8 @@ def test_clopper_pearson_covers_at_its_rate() -> None:
 
 def test_simulation_error_is_that_of_the_paper() -> None:
     # S2, Sec. 5: at most 0.0075 at R = 0.5 and 0.0045 at R = 0.9 with 40,000 samples.
-    assert round(simulation_error(0.5, 40_000), 4) == 0.0075
-    assert round(simulation_error(0.1, 40_000), 4) == 0.0045
+    assert round(Estimate(0.5, 0.49, 0.51, 40_000, 40_000, 20_000).error, 4) == 0.0075
+    assert round(Estimate(0.1, 0.09, 0.11, 40_000, 40_000, 4_000).error, 4) == 0.0045
 
 
 @pytest.mark.parametrize("rho", [1 + 1e-15, -1 - 1e-15])

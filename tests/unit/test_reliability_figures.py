@@ -17,7 +17,7 @@ from mechdesign.report.figures.reliability.allocation import allocation_figure
 from mechdesign.report.figures.reliability.contributions import contributions_figure
 from mechdesign.report.figures.reliability.looks import LOOKS
 from mechdesign.results import Column, Table
-from mechdesign.study.schema.reliability import METHODS
+from mechdesign.study.schema.methods import METHODS
 
 SLIDER = """
 units: {length: mm}

@@ -17,7 +17,7 @@ from mechdesign.analyses.reliability.marginals import (
     marginal,
 )
 from mechdesign.analyses.reliability.pins import PIN_LAWS
-from mechdesign.analyses.reliability.sampling import generator
+from mechdesign.analyses.reliability.simulation import generator
 from mechdesign.errors import StudyError
 from mechdesign.study.schema.reliability import DISTRIBUTIONS, Dimension
 
@@ -26,8 +26,8 @@ LAWS: dict[str, Marginal] = {
     "normal": Normal(0.1, 0.2),
     "truncated": TruncatedNormal(-0.1, 0.2),
     "uniform": Uniform(-0.1, 0.3),
-    "triangular": Triangular(-0.1, 0.0, 0.3),
-    "lognormal": Lognormal(1.0, 1.1, 0.2),
+    "triangular": Triangular(-0.1, 0.3),
+    "lognormal": Lognormal(0.1, 0.2, 1.0),
 }
 # Panels fine enough for the kink of a triangular law's density, in standard normal variables.
 EDGES = np.linspace(-12, 12, 4001)
@@ -75,8 +75,8 @@ def test_a_tolerance_is_three_sigma_its_ends_or_its_peak() -> None:
     assert found["normal"] == Normal(1.0, pytest.approx(2.0 / 3.0))
     assert found["truncated_normal"] == TruncatedNormal(1.0, pytest.approx(2.0 / 3.0))
     assert found["uniform"] == Uniform(-1.0, 3.0)
-    assert found["triangular"] == Triangular(-1.0, 0.0, 3.0)
-    assert found["lognormal"] == Lognormal(2.0, 3.0, pytest.approx(2.0 / 3.0))
+    assert found["triangular"] == Triangular(-1.0, 3.0)
+    assert found["lognormal"] == Lognormal(1.0, pytest.approx(2.0 / 3.0), 2.0)
     for name in DISTRIBUTIONS:
         law = marginal(Dimension(sigma=0.2, distribution=name), 2.0)
         # What is cut loses a little of the deviation that is asked for before the cut.
@@ -152,7 +152,7 @@ def test_correlations_that_no_laws_have() -> None:
     with pytest.raises(StudyError, match="contradict"):
         Correlation.of(three, {(0, 1): 0.9, (1, 2): 0.9, (0, 2): -0.9})
     with pytest.raises(StudyError, match="cannot have"):
-        Correlation.of([Lognormal(1, 1, 2.0), Lognormal(1, 1, 2.0)], {(0, 1): -0.9})
+        Correlation.of([Lognormal(0, 2.0, 1), Lognormal(0, 2.0, 1)], {(0, 1): -0.9})
 
 
 def test_streams_are_told_apart_by_seed_pose_and_chunk() -> None:

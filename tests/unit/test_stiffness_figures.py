@@ -13,6 +13,7 @@ from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.stiffness import figures
 from mechdesign.report.figures.stiffness.deflected import round_down
 from mechdesign.report.figures.stiffness.springs import Coil, quantity
+from mechdesign.results import Result
 
 
 def pictures(text: str, *overrides: str) -> set[str]:
@@ -49,7 +50,7 @@ def test_beams_and_brackets_are_drawn_in_the_mechanism() -> None:
     """Of the links that have brackets; the other's beam is plainly the link."""
     text = ARM.replace("upper: [O, E, 0.5]", "upper: {from: O, to: E, length: 0.5, points: {M: [0.2, 0.1]}}")
     with style.context():
-        figure = mechanism_figure(study_of(text))
+        figure = mechanism_figure(study_of(text), Result("stiffness", {}))
     for axes in figure.axes:
         (bracket,) = (line for line in axes.lines if line.get_label() == "rigid bracket")
         beams = [line for line in axes.lines if np.ndim(line.get_xdata()) and line.get_linestyle() == "--"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, charac
 from mechdesign.analyses.kinematics.motion_limits import motion_limits
 from mechdesign.analyses.kinematics.moving import move
 from mechdesign.analyses.poses import judge_failures, pose_in_words
+from mechdesign.analyses.shown import Keeper, Shown
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
@@ -30,6 +32,8 @@ from mechdesign.threads import one_thread
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
+# Assembly modes that a picture has room for.
+MOST_DRAWN = 12
 # What a step of a motion may lead beside its rates, as a part of it.
 ASTRAY = 1e-3
 
@@ -77,7 +81,8 @@ def kinematics(
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
     progress.start(poses.count, "poses")
-    motion = move(question, progress, jobs)
+    keeper = Keeper(study, poses)
+    motion = move(question, progress, jobs, also=keeper.keep)
     warnings, failed = judge_failures(study, poses, motion.reason)
     warnings += (
         _conditioning(motion)
@@ -85,36 +90,44 @@ def kinematics(
         + _astray(motion)
         + targets.gaps(study, motion.errors, poses, motion.valid)
     )
-    tables = {"motion": motion_table(motion)}
-    swept = swept_of(poses)
+    tables, swept, ends = {"motion": motion_table(motion)}, swept_of(poses), list[Boundary]()
     if swept is not None:
-        limits = motion_limits(motion, swept)
-        warnings += limits.warnings
-        tables["limits"] = limits.table
-    between, _ = tables_between(motion, limits.ends if swept is not None else ())
-    tables = {"motion": tables["motion"], "extremes": between.pop("extremes"), **tables, **between}
+        limits, told, ends = motion_limits(motion, swept)
+        warnings += told
+    between, _ = tables_between(motion, ends)
+    tables["extremes"] = between["extremes"]
+    if swept is not None:
+        tables["limits"] = limits
+    tables |= between
     if motion.errors:
         tables["targets"] = targets_table(motion)
     if question.square:
         tables["jacobian"] = jacobian_table(motion)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(motion.reason))}
+    drawn: dict[str, Any] = {"poses": poses, "motion": keeper.shown}
     if all_modes:
-        tables["modes"], told, counts["modes"] = _modes(question, motion)
+        tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
         warnings += told
-    return Result("kinematics", tables, warnings, counts, failed)
+    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn)
 
 
-def _modes(question: MotionQuestion, drawn: Motion) -> tuple[Table, list[str], int]:
-    """The motion of every assembly, the sketch's first; what is to be said of each; and how many they are."""
+def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
+    """The motion of every assembly, the sketch's first; what is to be said of each, how many they are, some to draw."""
     study, poses = question.study, question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
     labels: list[str] = []
     parts: list[Sequence[Column]] = []
     warnings = []
+    pictured: dict[str, Shown] = {}
     for assembly in sorted(found, key=lambda assembly: not assembly.drawn):
-        motion = (
-            drawn if assembly.drawn else move(motion_question(dataclasses.replace(study, mechanism=assembly.mechanism)))
-        )
+        motion, seen = drawn, shown
+        if not assembly.drawn:
+            other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism))
+            keeper = Keeper(other.study, other.poses)
+            motion = move(other, also=keeper.keep)
+            seen = keeper.shown
+        if seen.configuration.valid.any() and len(pictured) < MOST_DRAWN:
+            pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = seen
         labels += [assembly.label] * poses.count
         parts.append(motion.columns())
         bad = int(np.count_nonzero(motion.reason))
@@ -124,7 +137,7 @@ def _modes(question: MotionQuestion, drawn: Motion) -> tuple[Table, list[str], i
     columns = [Column("mode", np.array(labels), "", "assembly: the joints that choose it and their sides")]
     for same in zip(*parts, strict=True):
         columns.append(dataclasses.replace(same[0], values=np.concatenate([column.values for column in same])))
-    return Table("modes", tuple(columns), "the motion of every assembly mode"), warnings, len(parts)
+    return Table("modes", tuple(columns), "the motion of every assembly mode"), warnings, len(parts), pictured
 
 
 def swept_of(poses: Poses) -> str | None:
@@ -162,7 +175,7 @@ def tables_between(
     torn = np.zeros(poses.designs, dtype=bool)
     if swept is not None:
         coordinates = needed(motion, names) if "extremes" in wanted else []
-        line = PoseLine(motion, swept, coordinates, functions(loops), ends)
+        line = PoseLine(motion, swept, coordinates, functions(loops, "toggles" in wanted), ends)
     tables = {}
     if "extremes" in wanted:
         tables["extremes"] = extremes(motion, swept, line, names)

@@ -249,7 +249,9 @@ class PoseLine:
                 same &= ~((self.position[one] < end.position) & (self.position[other] > end.position))
         one, other = one[same], other[same]
         moving = self.place[one] != self.place[other]
-        beside = np.flatnonzero(np.isin(one, self.limits) | np.isin(other, self.limits))
+        limit = np.zeros(len(self.row), dtype=bool)
+        limit[self.limits] = True
+        beside = np.flatnonzero(limit[one] | limit[other])
         if len(beside):
             middle = (self.place[one[beside]] + self.place[other[beside]]) / 2
             moving[beside] &= self.sample(one[beside], middle)[2]

@@ -41,15 +41,15 @@ class _Toggle:
     cosine: float
 
 
-def functions(loops: Sequence[FourBar]) -> dict[str, Function]:
-    """What a line must follow: by loop the transmission angle, the square of its sine, and what tells of toggles.
+def functions(loops: Sequence[FourBar], toggles: bool) -> dict[str, Function]:
+    """What a line must follow: by loop the transmission angle, the square of its sine, and what tells of `toggles`.
 
     The square has the same extremes as the angle and is smooth where that is 0 or a right angle.
     """
     found: dict[str, Function] = {}
     for k, loop in enumerate(loops):
         found |= {f"{name} {k}": function for name, function in _transmission(loop).items()}
-        for end in (0, 3):
+        for end in (0, 3) if toggles else ():
             found |= {f"{name} {k} {end}": function for name, function in _in_line(loop, end).items()}
     return found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,16 +21,7 @@ from mechdesign.study import Study
 SMALL = 1e-7
 
 
-@dataclass(frozen=True, eq=False)
-class Limits:
-    """The table of limits and what is to be said beside it, and the ends of the motion."""
-
-    table: Table
-    warnings: list[str]
-    ends: list[Boundary]
-
-
-def motion_limits(motion: Motion, swept: str) -> Limits:
+def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Boundary]]:
     """Every value of the swept coordinate at which the motion ends, with the pose there, and change points as warnings.
 
     `kind` is ``dead centre`` (a group of links is stretched or folded), ``singularity`` (links that are solved
@@ -41,6 +32,11 @@ def motion_limits(motion: Motion, swept: str) -> Limits:
     ----------
     swept : str
         The one coordinate that moves.
+
+    Returns
+    -------
+    (Table, list of str, list of Boundary)
+        The table of limits, what is to be said beside it, and the ends of the motion.
     """
     study, outputs = motion.question.study, motion.question.outputs
     (group,) = motion.question.poses.groups
@@ -70,7 +66,7 @@ def motion_limits(motion: Motion, swept: str) -> Limits:
     warnings = _hidden(swept, unit, places, ends, motion.valid)
     if mechanism.description.branch != "follow":
         warnings += _warnings(study, margins, swept, changes)
-    return Limits(table, warnings, ends)
+    return table, warnings, ends
 
 
 def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> Floats:

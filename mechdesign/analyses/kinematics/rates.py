@@ -14,7 +14,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.outputs import second
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.kinematics import KinematicsSection
@@ -23,10 +23,17 @@ from mechdesign.study.schema.reliability import ReliabilitySection
 
 @dataclass(frozen=True, eq=False)
 class DriveRates:
-    """Velocities and accelerations of the drives (radians and lengths), one entry a drive; nan where there are none."""
+    """Velocities and accelerations of the drives, or of as many coordinates (radians and lengths); nan where none."""
 
     velocities: Sequence[Value]
     accelerations: Sequence[Value]
+
+    def take(self, index: Ints | int) -> DriveRates:
+        """Those of some poses, or of one; numbers are the same at all."""
+        return DriveRates(*(
+            [value if np.ndim(value) == 0 else value[index] for value in values]
+            for values in (self.velocities, self.accelerations)
+        ))  # fmt: skip
 
 
 def of_given(study: Study, section: KinematicsSection | ReliabilitySection) -> bool:
@@ -52,25 +59,27 @@ def drive_rates(
     names = solved.given if inverse else study.mechanism.drives
     coordinates = [study.mechanism.coordinate(name) for name in names]
     if section.speed is None:
-        speeds, bends = (
-            [radians(study, c, known.get(c.name, 0.0)) for c in coordinates]
-            for known in (section.rates, section.accelerations)
-        )
+        rates = constant_rates(study, section, names)
     else:
         nowhere = np.full(poses.count, np.nan)
-        speeds, bends = (
+        rates = DriveRates(*(
             [radians(study, c, known.get(c.name, nowhere)[solved.rows] * section.speed**order) for c in coordinates]
             for order, known in ((1, poses.slopes), (2, poses.bends))
-        )
-    return inverse_rates(study.mechanism, linear, coordinates, speeds, bends) if inverse else DriveRates(speeds, bends)
+        ))  # fmt: skip
+    return inverse_rates(study.mechanism, linear, coordinates, rates) if inverse else rates
+
+
+def constant_rates(study: Study, section: KinematicsSection | ReliabilitySection, names: Sequence[str]) -> DriveRates:
+    """Rates of some coordinates, as a section gives them in numbers."""
+    coordinates = [study.mechanism.coordinate(name) for name in names]
+    return DriveRates(*(
+        [radians(study, c, known.get(c.name, 0.0)) for c in coordinates]
+        for known in (section.rates, section.accelerations)
+    ))  # fmt: skip
 
 
 def inverse_rates(
-    mechanism: Mechanism,
-    linear: Linearization,
-    given: Sequence[Coordinate],
-    velocities: Sequence[Value],
-    accelerations: Sequence[Value],
+    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate], rates: DriveRates
 ) -> DriveRates:
     """Drive rates that give as many coordinates their velocities v and accelerations a.
 
@@ -83,15 +92,15 @@ def inverse_rates(
         At configurations of shape (n,).
     given : sequence of Coordinate
         As many as drives.
-    velocities, accelerations : sequence of Value
+    rates : DriveRates
         Of each of them.
     """
     matrix, good = _inverted(mechanism, linear, given)
-    speeds = _solve(matrix, good, velocities)
+    speeds = _solve(matrix, good, rates.velocities)
     velocity = linear.velocity(speeds)
     coasting = linear.acceleration(velocity, [0.0] * len(given))
-    rest = [a - second(linear.configuration, c, velocity, coasting) for a, c in zip(accelerations, given, strict=True)]
-    return DriveRates(speeds, _solve(matrix, good, rest))
+    own = [second(linear.configuration, coordinate, velocity, coasting) for coordinate in given]
+    return DriveRates(speeds, _solve(matrix, good, [a - b for a, b in zip(rates.accelerations, own, strict=True)]))
 
 
 def drive_velocities(

@@ -14,6 +14,7 @@ from mechdesign.analyses.optimize.files import optimum_files
 from mechdesign.analyses.optimize.goals import Evaluated, Evaluator, Goal, goals_of
 from mechdesign.analyses.optimize.judging import CHUNK, Batch, Designs, Judge
 from mechdesign.analyses.optimize.sensitivity import active_bounds, neighbours, sensitivity_table
+from mechdesign.analyses.optimize.shown import best_design
 from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
 from mechdesign.analyses.workspace.analysis import index_meanings
 from mechdesign.analyses.workspace.question import GRID_TOLERANCE, questions
@@ -101,7 +102,8 @@ def optimize(
     files, doubts = optimum_files(study, compared, marked)
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
     warnings = (*doubt, *_warnings(study, designs), *doubts)
-    return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files)
+    drawn = {"best": lambda: best_design(compared)}
+    return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files, drawn=drawn)
 
 
 def _goals(study: Study) -> tuple[Goal, ...]:

@@ -13,11 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.reliability.error_limits import Band, Disc
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.simulation import Setting
-from mechdesign.analyses.reliability.sources import Sources
-from mechdesign.analyses.reliability.tolerances import Tolerance, moments
+from mechdesign.analyses.reliability.task import Task
+from mechdesign.analyses.reliability.tolerances import Tolerance
 from mechdesign.numerics.arrays import Floats, Ints
 
 # Tolerances stay between these multiples of what is given.
@@ -30,24 +28,22 @@ _TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
-    """Failure probabilities of the first-order model, of tolerances so many times as wide as given.
+class ToleranceModel:
+    """Costs and failure probabilities by the first-order model, of tolerances so many times as wide as given.
 
     Parameters
     ----------
-    settings : sequence of Setting
-        Poses.
-    linear : FirstOrder
-        Of all poses, with the given tolerances.
+    task : Task
+        With the given tolerances.
+    tolerances : sequence of Tolerance
+        Of all sources.
     free : ndarray of int
         Sources whose tolerance is allocated.
     widest : ndarray
         As many times as the given one each of them may be.
     """
 
-    settings: Sequence[Setting]
-    sources: Sources
-    linear: FirstOrder
+    task: Task
     tolerances: Sequence[Tolerance]
     free: Ints
     widest: Floats
@@ -58,23 +54,17 @@ class Model:
         scales[self.free] = np.exp(x)
         return scales
 
-    def with_scales(self, scales: Floats) -> FirstOrder:
+    def linear(self, scales: Floats) -> FirstOrder:
         """The linear model of these tolerances."""
-        mean, variance = moments(self.sources, scales)
-        owner = self.linear.owner
-        return replace(self.linear, mean=mean[owner], variance=variance[owner])
+        return replace(self.task.linear, sources=self.task.sources.widened(scales))
 
     def failures(self, scales: Floats, which: Sequence[int]) -> Floats:
-        """Probability of failure at some of the poses."""
+        """Probability of failure at some of the task's settings."""
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
         from mechdesign.analyses.reliability.probability import failure_probability
 
-        rows = [self.settings[k].pose for k in which]
-        linear = self.with_scales(scales).take(rows)
-        covariance, mean = linear.covariance(), linear.shift()
-        bands: Sequence[Band] = self.settings[0].bands
-        discs: Sequence[Disc] = self.settings[0].discs
-        return np.array([failure_probability(c, bands, discs, m) for c, m in zip(covariance, mean.T, strict=True)])
+        linear, question = self.linear(scales).take([self.task.settings[k].pose for k in which]), self.task.question
+        return failure_probability(linear.covariance(), question.bands, question.discs, linear.shift().T)
 
     def cost(self, x: Floats) -> tuple[float, Floats]:
         """Cost of all that is allocated, and its derivatives by x."""
@@ -101,7 +91,7 @@ class UnreachableError(Exception):
         self.failures = failures
 
 
-def cheapest(model: Model, allowed: Floats) -> Floats:
+def cheapest(model: ToleranceModel, allowed: Floats) -> Floats:
     """Factors of all tolerances.
 
     Parameters
@@ -118,7 +108,7 @@ def cheapest(model: Model, allowed: Floats) -> Floats:
 
     count = len(model.free)
     lowest, highest = np.full(count, np.log(TIGHTEST)), np.log(model.widest)
-    every = range(len(model.settings))
+    every = range(len(model.task.settings))
     wanted = _distance(allowed)
 
     def margins(x: Floats, which: Sequence[int]) -> Floats:

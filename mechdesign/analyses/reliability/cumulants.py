@@ -71,8 +71,7 @@ def cumulants(sources: Sources) -> Cumulants:
 def _pin(pin: Pin) -> tuple[float, float, float]:
     """E[x^2], E[x^4] and E[x^2 y^2] of a pin's offset (x, y)."""
     law = PIN_LAWS[pin.analytic]
-    shift, second, skew, flat = (0.0, 0.0, 0.0, 0.0) if pin.spread is None else pin.spread.moments
-    radius = pin.radius + shift
+    radius, second, skew, flat = pin.moments
     squared = radius**2 + second
     fourth = radius**4 + 6.0 * radius**2 * second + 4.0 * radius * skew + flat
     return law.variance * squared, law.fourth * fourth, law.fourth * fourth / 3.0

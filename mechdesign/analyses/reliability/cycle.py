@@ -10,43 +10,26 @@ that it cannot reach).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.sampling import CHUNK, generator
-from mechdesign.analyses.reliability.simulation import Setting, errors_of, keeps, limited_part
+from mechdesign.analyses.reliability.simulation import CHUNK, Setting, errors_of, generator, keeps
 from mechdesign.analyses.reliability.sources import Sources
-from mechdesign.analyses.reliability.task import Found, Partial, Task, wanted_precision
+from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
+from mechdesign.numerics.arrays import Ints
 from mechdesign.parallel import map_chunks
+from mechdesign.study.schema.methods import METHODS
 
 # Streams of their own: no other name has four numbers.
 _STREAM = (3, 0)
 # Mechanisms times poses of a chunk: about a second's work, so that an interrupt is soon heard.
 _WORK = 1_500_000
 _FEWEST = 200
-# Methods whose values at the poses are samples of the errors.
-_SAMPLED = ("monte_carlo", "quasi_monte_carlo", "auto")
 
 
-@dataclass(frozen=True)
-class Count:
-    """Made mechanisms of a chunk: all, those that failed, those that cannot be assembled somewhere, poses solved."""
-
-    samples: int = 0
-    failures: int = 0
-    invalid: int = 0
-    evaluations: int = 0
-
-    def __add__(self, other: Count) -> Count:
-        return Count(
-            self.samples + other.samples, self.failures + other.failures, self.invalid + other.invalid,
-            self.evaluations + other.evaluations,
-        )  # fmt: skip
-
-
-def with_cycle(found: Found, task: Task, before: Sequence[Found]) -> Found:
+def with_cycle(found: MethodResult, task: Task, before: Sequence[MethodResult]) -> MethodResult:
     """What a method says, with its estimate of the whole cycle where one is asked.
 
     Methods that sample the errors simulate whole cycles by Monte Carlo, `auto` until its precision is reached; of all
@@ -57,16 +40,16 @@ def with_cycle(found: Found, task: Task, before: Sequence[Found]) -> Found:
     Partial
         On an interrupt, with what was counted so far.
     """
-    if not task.settings or not task.settings[0].limited or not task.cycle:
+    if not task.settings or not task.question.limited or not task.poses.motion:
         return found
-    if len(task.settings) < task.poses:
+    if len(task.settings) < task.poses.count:
         # The nominal mechanism itself does not reach some pose.
-        nothing = float("nan")
-        return replace(found, cycle=Estimate(nothing, nothing, nothing, 0))
-    if found.method not in _SAMPLED:
+        return replace(found, cycle=Estimate(np.nan, np.nan, np.nan, 0))
+    method = METHODS[found.method]
+    if not method.errors:
         return replace(found, cycle=bounds([found.estimates[setting.pose] for setting in task.settings]))
-    known = [each.cycle for each in before if each.method in _SAMPLED[:2] and each.cycle is not None]
-    if known and found.method in _SAMPLED[:2]:
+    known = [each.cycle for each in before if METHODS[each.method].errors and not METHODS[each.method].precise]
+    if known and not method.precise:
         return replace(found, cycle=known[0])
     return _simulated(found, task)
 
@@ -81,57 +64,41 @@ def bounds(estimates: Sequence[Estimate]) -> Estimate:
     return Estimate(high, low, high, 0)
 
 
-def notes(found: Sequence[Found], task: Task) -> list[str]:
-    """Sentences about made mechanisms that cannot be assembled at some pose, and where `auto` ended too early."""
-    sentences = []
-    simulated = {each.method: each.cycle for each in found if each.cycle is not None and each.cycle.samples}
-    for cycle in list(simulated.values())[:1]:
-        if cycle.invalid:
-            sentences.append(
-                f"{cycle.invalid} of {cycle.samples} made mechanisms cannot be assembled at some pose of the cycle; "
-                "they count as failures"
-            )
-    last = simulated.get("auto")
-    if last is not None and last.failures and not wanted_precision(task).reached(last.failure, last.low, last.high):
-        sentences.append(
-            f"auto: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at {last.failure:.3g}, "
-            f"not as precise as asked; it ends at {last.samples} made mechanisms, which reliability.samples sets"
-        )
-    return sentences
-
-
-def _simulated(found: Found, task: Task) -> Found:
-    samples, precision = task.samples, None
-    if found.method == "auto":
-        precision = wanted_precision(task)
-        samples = max(task.samples, task.most // task.poses)
-    settings = [limited_part(setting) for setting in task.settings]
+def _simulated(found: MethodResult, task: Task) -> MethodResult:
+    precise = METHODS[found.method].precise
+    samples = max(task.samples, task.most // task.poses.count) if precise else task.samples
+    settings = [setting.narrowed() for setting in task.settings]
     size = max(_FEWEST, min(CHUNK, _WORK // len(settings)))
     chunks = -(-samples // size)
-    total = Count()
+    total = np.zeros(4, dtype=np.int64)
 
-    def work(chunk: int) -> Count:
+    def work(chunk: int) -> Ints:
         return count_chunk(settings, task.sources, task.seed, chunk, min(size, samples - chunk * size))
 
     task.progress.start(samples, "whole cycles")
-    done, until = 0, chunks if precision is None else 1
+    done, until = 0, 1 if precise else chunks
     try:
         while done < chunks:
             for part in map_chunks(work, range(done, until), task.jobs):
                 total += part
-                task.progress.update(part.samples)
+                task.progress.update(int(part[0]))
             done, until = until, min(chunks, 2 * until)
             estimate = _estimate(total)
-            if precision is not None and precision.reached(estimate.failure, estimate.low, estimate.high):
+            if precise and task.precision.reached(estimate.failure, estimate.low, estimate.high):
                 break
     except KeyboardInterrupt:
-        cycle = _estimate(total) if total.samples else None
-        raise Partial(replace(found, cycle=cycle)) from None
+        raise Partial(replace(found, cycle=_estimate(total) if total[0] else None)) from None
     return replace(found, cycle=_estimate(total))
 
 
-def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk: int, count: int) -> Count:
-    """Draw `count` made mechanisms and move each through all poses; what cannot be assembled moves no further."""
+def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk: int, count: int) -> Ints:
+    """Draw `count` made mechanisms and move each through all poses; what cannot be assembled moves no further.
+
+    Returns
+    -------
+    ndarray of int, shape (4,)
+        Mechanisms drawn, those that failed, those that cannot be assembled somewhere, and poses solved.
+    """
     drawn = sources.draw(generator(seed, chunk, 0, *_STREAM), count)
     within = np.ones(count, dtype=bool)
     evaluations = 0
@@ -143,17 +110,14 @@ def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk:
             drawn = sources.redraw_pins(drawn, generator(seed, chunk, place, *_STREAM), left)
         errors, valid = errors_of(setting, sources.made(drawn), left)
         evaluations += left
-        kept = keeps(setting, errors)
-        assert kept is not None
-        within &= kept
+        within &= keeps(setting.question, errors)
         if not valid.all():
             drawn, within = drawn.take(valid), within[valid]
-    return Count(count, count - int(np.count_nonzero(within)), count - len(within), evaluations)
+    return np.array([count, count - np.count_nonzero(within), count - len(within), evaluations])
 
 
-def _estimate(count: Count) -> Estimate:
+def _estimate(counted: Ints) -> Estimate:
     from mechdesign.analyses.reliability.engine.intervals import binomial
 
-    low, high = binomial(count.failures, count.samples)
-    value = count.failures / count.samples if count.samples else float("nan")
-    return Estimate(value, low, high, count.evaluations, count.samples, count.failures, count.invalid)
+    samples, failures, invalid, evaluations = counted.tolist()
+    return Estimate(failures / samples, *binomial(failures, samples), evaluations, samples, failures, invalid)

@@ -42,7 +42,8 @@ class Disc:
     radius: float
 
 
-def correlation(covariance: Floats) -> float:
-    """Correlation of two errors, shape (2, 2); nan where one does not vary [S2, eq. 11, which prints its inverse]."""
-    product = float(np.sqrt(covariance[0, 0] * covariance[1, 1]))
-    return float(covariance[0, 1]) / product if product > 0 else float("nan")
+def correlation(covariance: Floats) -> Floats:
+    """Correlation of two errors, of shape (..., 2, 2); nan where one does not vary [S2, eq. 11, prints its inverse]."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        product = np.sqrt(covariance[..., 0, 0] * covariance[..., 1, 1])
+        return np.asarray(np.where(product > 0, covariance[..., 0, 1] / product, np.nan))

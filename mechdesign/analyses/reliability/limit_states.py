@@ -6,8 +6,9 @@ import numpy as np
 
 from mechdesign.analyses.reliability.engine.problem import Problem
 from mechdesign.analyses.reliability.first_order import derivatives
-from mechdesign.analyses.reliability.simulation import Setting, errors_of, limited_part, solve
-from mechdesign.analyses.reliability.sources import Made, Sources
+from mechdesign.analyses.reliability.question import Question
+from mechdesign.analyses.reliability.simulation import Setting, errors_of, solve
+from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.errors import MechanismError
 from mechdesign.numerics.arrays import Floats
 
@@ -20,24 +21,25 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
 
     What has no closed derivative is differenced.
     """
-    setting = limited_part(setting)
+    setting = setting.narrowed()
+    question = setting.question
 
     def margins(u: Floats) -> Floats:
         errors, valid = errors_of(setting, sources.made(sources.at(u, directed=True)), u.shape[1])
-        found = np.stack([margin for margin, _ in _margins(setting, errors)])
+        found = np.stack([margin for margin, _ in _margins(question, errors)])
         found[:, ~valid] = np.nan
         return found
 
     def gradients(u: Floats) -> tuple[Floats, Floats]:
-        count = u.shape[1]
         made = sources.made(sources.at(u, directed=True))
-        configuration = solve(setting, made)
-        errors, valid = errors_of(setting, made, count)
+        errors, valid = errors_of(setting, made, u.shape[1])
         names, slopes = _slopes(sources, u)
-        by_name = derivatives(setting.mechanism, configuration, setting.channels, names, setting.rates, setting.elastic)
+        by_name = derivatives(
+            setting.mechanism, solve(setting, made), question.channels, names, setting.rates, setting.elastic
+        )
         by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes)
         found, steep = [], []
-        for margin, weights in _margins(setting, errors):
+        for margin, weights in _margins(question, errors):
             found.append(margin)
             steep.append(sum((weight * by_variable[channel] for channel, weight in weights), np.zeros(u.shape)))
         values, rates = np.stack(found), np.stack(steep)
@@ -51,15 +53,15 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
     return Problem(len(sources.owners), margins, gradients, sources.circles)
 
 
-def _margins(setting: Setting, errors: list[Floats]) -> list[tuple[Floats, list[tuple[int, Floats | float]]]]:
+def _margins(question: Question, errors: Floats) -> list[tuple[Floats, list[tuple[int, Floats | float]]]]:
     """Margin of each limit, and its derivative by the channels that it depends on."""
     found: list[tuple[Floats, list[tuple[int, Floats | float]]]] = []
-    for band in setting.bands:
+    for band in question.bands:
         if np.isfinite(band.high):
             found.append((band.high - errors[band.output], [(band.output, -1.0)]))
         if np.isfinite(band.low):
             found.append((errors[band.output] - band.low, [(band.output, 1.0)]))
-    for disc in setting.discs:
+    for disc in question.discs:
         x, y = errors[disc.x], errors[disc.y]
         size = np.hypot(x, y)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -73,13 +75,9 @@ def _slopes(sources: Sources, u: Floats) -> tuple[list[str], Floats]:
     steps = _STEP * np.eye(d)[:, :, None]
     either = np.concatenate([(u + way * steps).swapaxes(0, 1).reshape(d, d * n) for way in (1, -1)], axis=1)
     made = sources.made(sources.at(either, directed=True))
-    values = _all(made)
+    values = {**made.places, **made.drives, **made.loads}
     slopes = np.empty((len(values), d, n))
     for row, value in zip(slopes, values.values(), strict=True):
         ahead, back = np.broadcast_to(value, (2 * d * n,)).reshape(2, d, n)
         row[...] = (ahead - back) / (2 * _STEP)
     return list(values), slopes
-
-
-def _all(made: Made) -> dict[str, Floats]:
-    return {**made.places, **made.drives, **made.loads}

@@ -7,8 +7,9 @@ standard normal variables. [Rosenblatt, Remarks on a multivariate transformation
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -19,22 +20,38 @@ from mechdesign.study.schema.reliability import Spread
 SIGMAS = 3.0
 
 
-class Marginal(Protocol):
+class Marginal(ABC):
     """The law of one deviation from its nominal value."""
 
+    # Half the width of the tolerance in standard deviations.
+    reach = SIGMAS
+
+    @classmethod
+    @abstractmethod
+    def within(cls, low: float, high: float, nominal: float) -> Self:
+        """The law that a tolerance of these deviations means; what is lognormal is nominal + deviation."""
+
     @property
+    @abstractmethod
     def moments(self) -> tuple[float, float, float, float]:
         """Mean, and second to fourth central moment."""
 
     @property
+    @abstractmethod
     def ends(self) -> tuple[float, float]:
         """Lowest and highest deviation that a worst case counts with: of unbounded laws three sigma."""
 
+    @abstractmethod
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Independent deviations, shape (count,)."""
 
+    @abstractmethod
     def at(self, u: Floats) -> Floats:
         """Deviations at values of a standard normal variable, increasing, in the shape of `u`."""
+
+    @abstractmethod
+    def widened(self, factor: float) -> Self:
+        """The law of a tolerance as many times as wide, about the same middle."""
 
 
 def marginal(spread: Spread, nominal: float, factor: float = 1.0) -> Marginal:
@@ -45,57 +62,74 @@ def marginal(spread: Spread, nominal: float, factor: float = 1.0) -> Marginal:
     spread : Spread
         Tolerance or sigma, and distribution; in the study's units.
     nominal : float
-        Nominal value in the core's units: what is lognormal is nominal + deviation.
+        Nominal value in the core's units.
     factor : float
         The core's units in one of the study's.
     """
+    law = LAWS[spread.distribution]
     if spread.sigma is not None:
-        middle, sigma = 0.0, factor * spread.sigma
-        half = sigma * HALF_WIDTHS.get(spread.distribution, SIGMAS)
-        low, high = -half, half
-    else:
-        assert spread.tolerance is not None
-        low, high = (factor * end for end in spread.tolerance)
-        middle, sigma = 0.5 * (low + high), 0.5 * (high - low) / SIGMAS
-    if spread.distribution == "uniform":
-        return Uniform(low, high)
-    if spread.distribution == "triangular":
-        return Triangular(low, min(max(0.0, low), high), high)
-    if spread.distribution == "truncated_normal":
-        return TruncatedNormal(middle, sigma)
-    if spread.distribution == "lognormal":
-        return Lognormal(nominal, nominal + middle, sigma)
-    return Normal(middle, sigma)
+        half = law.reach * spread.sigma
+        return law.within(-factor * half, factor * half, nominal)
+    assert spread.tolerance is not None
+    low, high = spread.tolerance
+    return law.within(factor * low, factor * high, nominal)
 
 
 @dataclass(frozen=True)
-class Normal:
-    """Normal with this mean and standard deviation; a tolerance [low, high] is three sigma about its middle."""
+class _Bell(Marginal):
+    """Of this mean; a tolerance is three standard deviations `sigma` about its middle."""
 
     mean: float
     sigma: float
 
-    @property
-    def moments(self) -> tuple[float, float, float, float]:
-        return self.mean, self.sigma**2, 0.0, 3.0 * self.sigma**4
+    @classmethod
+    def within(cls, low: float, high: float, nominal: float) -> Self:
+        return cls(0.5 * (low + high), 0.5 * (high - low) / SIGMAS)
 
     @property
     def ends(self) -> tuple[float, float]:
         return self.mean - SIGMAS * self.sigma, self.mean + SIGMAS * self.sigma
 
+    def widened(self, factor: float) -> Self:
+        return replace(self, sigma=factor * self.sigma)
+
+
+@dataclass(frozen=True)
+class _Bounded(Marginal):
+    """Between two ends."""
+
+    low: float
+    high: float
+
+    @classmethod
+    def within(cls, low: float, high: float, nominal: float) -> Self:
+        return cls(low, high)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        return self.low, self.high
+
+    def widened(self, factor: float) -> Self:
+        middle, half = 0.5 * (self.low + self.high), 0.5 * factor * (self.high - self.low)
+        return replace(self, low=middle - half, high=middle + half)
+
+
+class Normal(_Bell):
+    """Normal."""
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        return self.mean, self.sigma**2, 0.0, 3.0 * self.sigma**4
+
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return _shifted(rng.standard_normal(count), self.sigma, self.mean)
+        return self.mean + self.sigma * rng.standard_normal(count)
 
     def at(self, u: Floats) -> Floats:
         return np.asarray(self.mean + self.sigma * u)
 
 
-@dataclass(frozen=True)
-class TruncatedNormal:
+class TruncatedNormal(_Bell):
     """Normal, cut at three standard deviations `sigma` of what is cut: nothing lies outside the tolerance."""
-
-    mean: float
-    sigma: float
 
     @property
     def moments(self) -> tuple[float, float, float, float]:
@@ -104,10 +138,6 @@ class TruncatedNormal:
         second = 1.0 - tail
         return self.mean, self.sigma**2 * second, 0.0, self.sigma**4 * (3.0 * second - SIGMAS**2 * tail)
 
-    @property
-    def ends(self) -> tuple[float, float]:
-        return self.mean - SIGMAS * self.sigma, self.mean + SIGMAS * self.sigma
-
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         drawn = rng.standard_normal(count)
         outside = np.flatnonzero(np.abs(drawn) > SIGMAS)
@@ -115,7 +145,7 @@ class TruncatedNormal:
             again = rng.standard_normal(len(outside))
             drawn[outside] = again
             outside = outside[np.abs(again) > SIGMAS]
-        return _shifted(drawn, self.sigma, self.mean)
+        return np.asarray(self.mean + self.sigma * drawn)
 
     def at(self, u: Floats) -> Floats:
         from scipy.special import ndtr, ndtri
@@ -126,24 +156,18 @@ class TruncatedNormal:
         return np.asarray(self.mean + self.sigma * np.copysign(below, u))
 
 
-@dataclass(frozen=True)
-class Uniform:
-    """Uniform between two ends."""
+class Uniform(_Bounded):
+    """Uniform between the ends."""
 
-    low: float
-    high: float
+    reach = math.sqrt(3.0)
 
     @property
     def moments(self) -> tuple[float, float, float, float]:
         half = 0.5 * (self.high - self.low)
         return 0.5 * (self.low + self.high), half**2 / 3.0, 0.0, half**4 / 5.0
 
-    @property
-    def ends(self) -> tuple[float, float]:
-        return self.low, self.high
-
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        return _shifted(rng.random(count), self.high - self.low, self.low)
+        return self.low + (self.high - self.low) * rng.random(count)
 
     def at(self, u: Floats) -> Floats:
         from scipy.special import ndtr
@@ -152,13 +176,15 @@ class Uniform:
         return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
 
 
-@dataclass(frozen=True)
-class Triangular:
-    """Triangular between two ends, most likely at `mode`: at the nominal value where the tolerance has it."""
+class Triangular(_Bounded):
+    """Triangular between the ends, most likely at the nominal value where the tolerance has it."""
 
-    low: float
-    mode: float
-    high: float
+    reach = math.sqrt(6.0)
+
+    @property
+    def mode(self) -> float:
+        """The deviation that is most likely."""
+        return min(max(0.0, self.low), self.high)
 
     @property
     def moments(self) -> tuple[float, float, float, float]:
@@ -166,10 +192,6 @@ class Triangular:
         second = (a * a + b * b + c * c - a * b - a * c - b * c) / 18.0
         third = (a + b - 2 * c) * (2 * a - b - c) * (a - 2 * b + c) / 270.0
         return (a + b + c) / 3.0, second, third, 2.4 * second**2
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        return self.low, self.high
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         if self.high == self.low:
@@ -187,44 +209,40 @@ class Triangular:
 
 
 @dataclass(frozen=True)
-class Lognormal:
-    """nominal + deviation is lognormal, with this mean and standard deviation; both positive."""
+class Lognormal(_Bell):
+    """nominal + deviation is lognormal, and positive; `mean` and `sigma` are the deviation's."""
 
     nominal: float
-    mean: float
-    sigma: float
+
+    @classmethod
+    def within(cls, low: float, high: float, nominal: float) -> Self:
+        return cls(0.5 * (low + high), 0.5 * (high - low) / SIGMAS, nominal)
 
     @property
-    def _shape(self) -> float:
-        """Standard deviation of the logarithm."""
-        return math.sqrt(math.log1p((self.sigma / self.mean) ** 2))
+    def _size(self) -> float:
+        """Mean of what is lognormal."""
+        return self.nominal + self.mean
 
     @property
     def moments(self) -> tuple[float, float, float, float]:
         second = self.sigma**2
-        w = 1.0 + (self.sigma / self.mean) ** 2
+        w = 1.0 + (self.sigma / self._size) ** 2
         third = second**1.5 * (w + 2.0) * math.sqrt(w - 1.0)
-        return self.mean - self.nominal, second, third, second**2 * (w**4 + 2 * w**3 + 3 * w**2 - 3.0)
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        middle = self.mean - self.nominal
-        return middle - SIGMAS * self.sigma, middle + SIGMAS * self.sigma
+        return self.mean, second, third, second**2 * (w**4 + 2 * w**3 + 3 * w**2 - 3.0)
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         return self.at(rng.standard_normal(count))
 
     def at(self, u: Floats) -> Floats:
-        s = self._shape
-        return np.asarray(self.mean - self.nominal + self.mean * np.expm1(s * u - 0.5 * s * s))
+        # Standard deviation of the logarithm.
+        s = math.sqrt(math.log1p((self.sigma / self._size) ** 2))
+        return np.asarray(self.mean + self._size * np.expm1(s * u - 0.5 * s * s))
 
 
-# Half the width of a bounded law, in its standard deviations.
-HALF_WIDTHS = {"uniform": math.sqrt(3.0), "triangular": math.sqrt(6.0)}
-
-
-def _shifted(drawn: Floats, factor: float, offset: float) -> Floats:
-    drawn *= factor
-    if offset:
-        drawn += offset
-    return drawn
+LAWS: dict[str, type[Marginal]] = {
+    "normal": Normal,
+    "truncated_normal": TruncatedNormal,
+    "uniform": Uniform,
+    "triangular": Triangular,
+    "lognormal": Lognormal,
+}

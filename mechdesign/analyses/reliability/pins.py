@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -45,20 +46,14 @@ class PinLaw:
         return ratio * u, ratio * v
 
 
-def _normal(rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
+def _normal(rng: np.random.Generator, count: int, cut: float = math.inf) -> tuple[Floats, Floats]:
+    """Of sigma 1/3, drawn anew where half the squared radius is beyond `cut`."""
     x, y = rng.standard_normal((2, count))
-    x *= 1.0 / 3.0
-    y *= 1.0 / 3.0
-    return x, y
-
-
-def _normal_in_disc(rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
-    x, y = rng.standard_normal((2, count))
-    outside = np.flatnonzero(x * x + y * y > 2.0 * _CUT)
+    outside = np.flatnonzero(x * x + y * y > 2.0 * cut) if math.isfinite(cut) else np.zeros(0, dtype=np.intp)
     while len(outside):
         again_x, again_y = rng.standard_normal((2, len(outside)))
         x[outside], y[outside] = again_x, again_y
-        outside = outside[again_x * again_x + again_y * again_y > 2.0 * _CUT]
+        outside = outside[again_x * again_x + again_y * again_y > 2.0 * cut]
     x *= 1.0 / 3.0
     y *= 1.0 / 3.0
     return x, y
@@ -77,39 +72,31 @@ def _contact(rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
     return np.cos(angle), np.sin(angle)
 
 
-def _ratio(squared: Floats, half: Floats) -> Floats:
-    """sqrt(squared / (2 half)); the limit of small ones follows from `squared`'s own series by a small floor."""
-    return np.asarray(np.sqrt(squared / (2.0 * half)))
+def _stretch(squared: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+    """The ratio from the squared offset; the limit of small ones follows from its own series by a small floor."""
+
+    def ratio(half: Floats) -> Floats:
+        half = np.maximum(half, 1e-290)
+        return np.asarray(np.sqrt(squared(half) / (2.0 * half)))
+
+    return ratio
 
 
-def _stretch_normal(half: Floats) -> Floats:
-    return np.full_like(half, 1.0 / 3.0)
-
-
-def _stretch_in_disc(half: Floats) -> Floats:
-    half = np.maximum(half, _TINY)
+def _squared_in_disc(half: Floats) -> Floats:
     # P(offset > s) = (exp(-9 s^2/2) - outside)/(1 - outside) is that of the Rayleigh variable, exp(-half).
-    return _ratio(-np.log1p((1.0 - _OUTSIDE) * np.expm1(-half)) / _CUT, half)
+    return -np.log1p((1.0 - _OUTSIDE) * np.expm1(-half)) / _CUT
 
 
-def _stretch_uniform(half: Floats) -> Floats:
-    half = np.maximum(half, _TINY)
-    return _ratio(-np.expm1(-half), half)
-
-
-def _stretch_contact(half: Floats) -> Floats:
-    return _ratio(np.ones_like(half), np.maximum(half, _TINY))
-
-
-_TINY = 1e-290
 # Mean squared offset, in units of 1/_CUT, of the exponential law cut at _CUT, and its mean square.
 _FIRST = (1.0 - (1.0 + _CUT) * _OUTSIDE) / (1.0 - _OUTSIDE)
 _SECOND = (2.0 - (_CUT**2 + 2.0 * _CUT + 2.0) * _OUTSIDE) / (1.0 - _OUTSIDE)
 
 # In `normal_in_disc` the variance is that of the cut law, which S2 draws but does not use in its formula.
 PIN_LAWS: Mapping[str, PinLaw] = {
-    "normal": PinLaw(1.0 / 9.0, 3.0 / 81.0, _normal, _stretch_normal),
-    "normal_in_disc": PinLaw(0.5 * _FIRST / _CUT, 0.375 * _SECOND / _CUT**2, _normal_in_disc, _stretch_in_disc),
-    "uniform": PinLaw(1.0 / 4.0, 1.0 / 8.0, _uniform, _stretch_uniform),
-    "contact": PinLaw(1.0 / 2.0, 3.0 / 8.0, _contact, _stretch_contact),
+    "normal": PinLaw(1.0 / 9.0, 3.0 / 81.0, _normal, lambda half: np.full_like(half, 1.0 / 3.0)),
+    "normal_in_disc": PinLaw(
+        0.5 * _FIRST / _CUT, 0.375 * _SECOND / _CUT**2, partial(_normal, cut=_CUT), _stretch(_squared_in_disc)
+    ),
+    "uniform": PinLaw(1.0 / 4.0, 1.0 / 8.0, _uniform, _stretch(lambda half: -np.expm1(-half))),
+    "contact": PinLaw(1.0 / 2.0, 3.0 / 8.0, _contact, _stretch(np.ones_like)),
 }

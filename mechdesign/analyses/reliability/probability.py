@@ -7,16 +7,16 @@ reliability is one minus it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
 from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.statistics import FAR, outside, rectangle_failure
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-# Beyond this many standard deviations the normal density is zero in double precision.
-_FAR = 39.0
 _LATTICE = 8191
 _SHIFTS = 8
 # Below this sum of the limits' probabilities a lattice sees too few failures; points that are drawn there instead.
@@ -28,43 +28,60 @@ _SIDES = 64
 
 def failure_probability(
     covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats | None = None
-) -> float:
-    """Probability that normal errors break any limit.
+) -> Floats:
+    """Probability that normal errors break any limit, shape (...); nan where they are not known.
 
     Parameters
     ----------
-    covariance : ndarray, shape (outputs, outputs)
+    covariance : ndarray, shape (..., outputs, outputs)
         May be singular.
     bands, discs
         All limits must hold. One or two limited outputs are integrated to about 1e-14 of the result; more by a
         randomised lattice, to about 1e-5 of it, or where they are rarely broken by sampling, to about 1e-3.
-    mean : ndarray, shape (outputs,), optional
+    mean : ndarray, shape (..., outputs), optional
         Of the errors; left out, zero.
     """
-    sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    mean = np.zeros(len(covariance)) if mean is None else mean
-    if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
-        return float("nan")
-    bands = [Band(b.output, b.low - float(mean[b.output]), b.high - float(mean[b.output])) for b in bands]
-    if len(bands) == 1 and not discs:
-        (band,) = bands
-        return _outside(band.low, band.high, float(sigma[band.output]))
-    if len(bands) == 2 and not discs:
-        one, two = bands
-        return _rectangle(one, two, covariance)
+    mean = np.zeros(covariance.shape[:-1]) if mean is None else mean
+    if len(bands) <= 2 and not discs:
+        ends = [_standard(band, covariance, mean) for band in bands]
+        if len(ends) < 2:
+            return outside(*ends[0])
+        pair = [band.output for band in bands]
+        low, high = (np.stack([each[k] for each in ends]) for k in (0, 1))
+        return rectangle_failure(low, high, correlation(covariance[..., pair, :][..., pair]))
+    found = np.full(covariance.shape[:-2], np.nan)
+    for place in np.ndindex(found.shape):
+        if np.isfinite(covariance[place]).all() and np.isfinite(mean[place]).all():
+            found[place] = _of_several(covariance[place], bands, discs, mean[place])
+    return found
+
+
+def _standard(band: Band, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
+    """A band's ends in standard deviations; an error that does not vary keeps it or breaks it."""
+    sigma = np.sqrt(np.maximum(covariance[..., band.output, band.output], 0.0))
+    low, high = band.low - mean[..., band.output], band.high - mean[..., band.output]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (
+            np.where(sigma == 0, np.where(low <= 0, -np.inf, np.inf), low / sigma),
+            np.where(sigma == 0, np.where(high >= 0, np.inf, -np.inf), high / sigma),
+        )
+
+
+def _of_several(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats) -> float:
+    """Of one circle, or of several limits."""
     if len(discs) == 1 and not bands:
-        (disc,) = discs
-        pair = [disc.x, disc.y]
-        return disc_failure(covariance[np.ix_(pair, pair)], disc.radius, mean[pair])
-    rare = _rare(covariance, bands, discs, sigma, mean)
-    return _lattice(covariance, bands, discs, mean) if rare is None else rare
+        pair = [discs[0].x, discs[0].y]
+        return disc_failure(covariance[np.ix_(pair, pair)], discs[0].radius, mean[pair])
+    rare = _rare(covariance, bands, discs, mean)
+    if rare is not None:
+        return rare
+    about_mean = [replace(b, low=b.low - float(mean[b.output]), high=b.high - float(mean[b.output])) for b in bands]
+    return _lattice(covariance, about_mean, discs, mean)
 
 
-def _rare(
-    covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], sigma: Floats, mean: Floats
-) -> float | None:
+def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats) -> float | None:
     """Probability outside any of several limits where it is small; None where a lattice is better."""
-    total = sum(_outside(band.low, band.high, float(sigma[band.output])) for band in bands)
+    total = sum(float(outside(*_standard(band, covariance, mean))) for band in bands)
     for disc in discs:
         pair = [disc.x, disc.y]
         total += disc_failure(covariance[np.ix_(pair, pair)], disc.radius, mean[pair])
@@ -73,7 +90,7 @@ def _rare(
     squares, axes = np.linalg.eigh(covariance)
     rows = axes * np.sqrt(np.maximum(squares, 0.0))
     slopes = [way * rows[band.output] for band in bands for way in (1.0, -1.0)]
-    ends = [end for band in bands for end in (band.high, -band.low)]
+    ends = [end for b in bands for end in (b.high - mean[b.output], mean[b.output] - b.low)]
     # What is outside a circle is beyond a side of the polygon in it.
     turns = 2 * np.pi * np.arange(_SIDES) / _SIDES
     for disc in discs:
@@ -136,61 +153,6 @@ def half_spaces(
     return min(total * float(np.mean(weights)), 1.0)
 
 
-def _outside(low: float, high: float, sigma: float) -> float:
-    """P(normal of mean zero outside [low, high])."""
-    if sigma == 0:
-        return 0.0 if low <= 0 <= high else 1.0
-    return float(ndtr(low / sigma) + ndtr(-high / sigma))
-
-
-def _rectangle(one: Band, two: Band, covariance: Floats) -> float:
-    pair = covariance[np.ix_([one.output, two.output], [one.output, two.output])]
-    sigma = np.sqrt(np.diagonal(pair))
-    if not sigma.all():
-        # An error that does not vary keeps its limit or breaks it; the other one decides.
-        parts = [_outside(b.low, b.high, float(s)) for b, s in zip((one, two), sigma, strict=True)]
-        return parts[0] + (1 - parts[0]) * parts[1]
-    lows, highs = np.array([one.low, two.low]) / sigma, np.array([one.high, two.high]) / sigma
-    return rectangle_failure(lows, highs, correlation(pair))
-
-
-def rectangle_failure(low: Floats, high: Floats, rho: float) -> float:
-    """P(standard bivariate normal with correlation `rho` outside the rectangle) [S2, eqs. 10, 11].
-
-    Parameters
-    ----------
-    low, high : ndarray, shape (2,)
-        In standard deviations; may be infinite.
-
-    Notes
-    -----
-    P(x outside) plus the integral over x inside of its density times P(y outside | x), by Gauss-Legendre panels of
-    one standard deviation, refined where y given x crosses a limit within a narrow band (rho near +-1).
-    """
-    if not (low < high).all():
-        return 1.0
-    # Rounding may carry the correlation of one error with itself beyond 1.
-    rest = np.sqrt(max(0.0, (1.0 - rho) * (1.0 + rho)))
-    if rest < 1e-12:
-        # y is x or -x: one error with the tighter of the two limits.
-        other = (low[1], high[1]) if rho > 0 else (-high[1], -low[1])
-        return _outside(max(low[0], other[0]), min(high[0], other[1]), 1.0)
-    begin, end = max(low[0], -_FAR), min(high[0], _FAR)
-    total = _outside(low[0], high[0], 1.0)
-    if begin >= end:
-        return total
-    edges = [np.linspace(begin, end, int(np.ceil(end - begin)) + 1)]
-    width = rest / max(abs(rho), rest)
-    for limit in (low[1], high[1]):
-        if np.isfinite(limit) and width < 0.5:
-            edges.append(limit / rho + width * np.array([-16, -8, -6, -4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8, 16]))
-    joined = np.unique(np.concatenate(edges))
-    x, weight = _panels(joined[(joined >= begin) & (joined <= end)])
-    density = np.exp(-0.5 * x * x) / np.sqrt(2 * np.pi)
-    tails = ndtr((low[1] - rho * x) / rest) + ndtr((rho * x - high[1]) / rest)
-    return float(total + np.sum(weight * density * tails))
-
-
 def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) -> float:
     """P(bivariate normal outside a circle about zero); `covariance` of shape (2, 2), `mean` of shape (2,), else zero.
 
@@ -205,9 +167,9 @@ def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) 
         return 0.0 if a == 0 and np.hypot(m, n) <= radius > 0 else 1.0
     if b < 1e-12 * a:
         half = np.sqrt(radius**2 - n * n) if abs(n) <= radius else 0.0
-        return _outside(-half - m, half - m, float(a)) if half else 1.0
-    total = _outside(-radius - m, radius - m, float(a))
-    begin, end = (np.arcsin(np.clip((m + way * _FAR * a) / radius, -1.0, 1.0)) for way in (-1, 1))
+        return float(outside((-half - m) / a, (half - m) / a)) if half else 1.0
+    total = float(outside((-radius - m) / a, (radius - m) / a))
+    begin, end = (np.arcsin(np.clip((m + way * FAR * a) / radius, -1.0, 1.0)) for way in (-1, 1))
     if begin == end:
         return total
     # The chance that y is outside changes within b of where the circle is as high as y's mean: panels shrink there.

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mechdesign.analyses.kinematics.motion import default_outputs
-from mechdesign.analyses.kinematics.rates import of_given
 from mechdesign.analyses.poses import expand_outputs, radians
 from mechdesign.analyses.reliability.error_limits import Band, Channel, Disc
-from mechdesign.analyses.reliability.first_order import Rates
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
@@ -27,16 +26,12 @@ class Question:
 
     Parameters
     ----------
-    orders : int
-        1 where positions are asked only, 3 with velocities and accelerations.
     channels : tuple of Channel
         Outputs, order by order: all positions first.
     pair : (int, int) or None
         The two limited channels, where there are just two; without limits, the two outputs.
     """
 
-    outputs: tuple[Coordinate, ...]
-    orders: int
     channels: tuple[Channel, ...]
     bands: tuple[Band, ...]
     discs: tuple[Disc, ...]
@@ -46,6 +41,22 @@ class Question:
     def limited(self) -> bool:
         """Whether a reliability is asked."""
         return bool(self.bands or self.discs)
+
+    @cached_property
+    def limited_channels(self) -> list[int]:
+        """Channels that have limits."""
+        return sorted({b.output for b in self.bands} | {k for d in self.discs for k in (d.x, d.y)})
+
+    @cached_property
+    def narrowed(self) -> Question:
+        """The question of these alone."""
+        place = {channel: k for k, channel in enumerate(self.limited_channels)}
+        return Question(
+            tuple(self.channels[k] for k in self.limited_channels),
+            tuple(replace(band, output=place[band.output]) for band in self.bands),
+            tuple(replace(disc, x=place[disc.x], y=place[disc.y]) for disc in self.discs),
+            None,
+        )
 
 
 def ask(study: Study, section: ReliabilitySection) -> Question:
@@ -82,18 +93,7 @@ def ask(study: Study, section: ReliabilitySection) -> Question:
     elif not limited and len(outputs) == 2:
         pair = (0, 1)
     channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
-    return Question(tuple(outputs), orders, channels, tuple(bands), tuple(discs), pair)
-
-
-def constant_rates(study: Study, section: ReliabilitySection) -> Rates | None:
-    """Rates of the drives that are the same everywhere; None where they follow from a motion."""
-    if of_given(study, section):
-        return None
-    return Rates(*(
-        tuple(float(radians(study, study.mechanism.coordinate(name), known.get(name, 0.0)))
-              for name in study.mechanism.drives)
-        for known in (section.rates, section.accelerations)
-    ))  # fmt: skip
+    return Question(channels, tuple(bands), tuple(discs), pair)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
@@ -115,7 +115,7 @@ def unsaid(study: Study, question: Question) -> list[str]:
     sentences = []
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         node = study.mechanism.graph.node(point)
-        about = [output.name for output in question.outputs if node in _nodes(output)]
+        about = [c.name for c in question.channels if not c.order and node in _nodes(c.coordinate)]
         told = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
         if about and rest and not told:
             sentences.append(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,35 +22,36 @@ MOST, HEAVY = 1e6, 1e100
 
 
 @dataclass(frozen=True)
-class Source:
-    """One random source as the first-order analysis sees it.
+class Scalar:
+    """A dimension that varies: a ``parameter``, a ``place``, a ``drive`` or a ``load``.
 
     Parameters
     ----------
-    name : str
-        As the study names it: a parameter, a place, a drive, a load or a joint.
-    directions : tuple of mapping
-        Per independent component (one, or a pin's x and y), derivatives of places, drives and loads (radians, lengths).
-    mean, variance : float
-        Of each component (a parameter's in its own unit, an angle's in radians).
-    ends : (float, float)
-        Lowest and highest deviation: the tolerance, or of a pin the largest radial clearance in any direction.
+    law : Marginal
+        Of a parameter in its own unit, of an angle in radians.
+    moves : mapping of str to (float, str)
+        Derivative of each place, drive or load that it changes (radians, lengths), and the quantity of that.
     """
-
-    name: str
-    directions: tuple[Mapping[str, float], ...]
-    mean: float
-    variance: float
-    ends: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Scalar:
-    """A dimension that varies: a ``parameter``, a ``place``, a ``drive`` or a ``load``."""
 
     name: str
     kind: str
     law: Marginal
+    moves: Mapping[str, tuple[float, str]]
+
+    @property
+    def directions(self) -> list[dict[str, float]]:
+        """Of the single component, derivatives of places, drives and loads."""
+        return [{name: slope for name, (slope, _) in self.moves.items()}]
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Mean and variance."""
+        return self.law.moments[:2]
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest deviation: the tolerance."""
+        return self.law.ends
 
 
 @dataclass(frozen=True)
@@ -62,18 +62,47 @@ class Pin:
     ----------
     radius : float
         Mean radial clearance.
-    spread : Marginal or None
-        Law of its deviation.
+    law : Marginal or None
+        Of its deviation.
+    analytic, sampled : str
+        Laws of the pin's place, of the analytic methods and of those that sample.
     places : tuple of str
         What the pin moves: the offsets of its point in its link, or the link's length.
+    factor : float
+        Of the radial clearance, its mean and its deviation alike.
     """
 
     name: str
     radius: float
-    spread: Marginal | None
+    law: Marginal | None
     analytic: str
     sampled: str
     places: tuple[str, ...]
+    factor: float = 1.0
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        """Mean of the radial clearance, and its second to fourth central moment."""
+        mean, *central = (0.0,) * 4 if self.law is None else self.law.moments
+        second, third, fourth = (self.factor**k * moment for k, moment in enumerate(central, start=2))
+        return self.factor * (self.radius + mean), second, third, fourth
+
+    @property
+    def directions(self) -> list[dict[str, float]]:
+        """Of the components x and y. Along a binary link the pin changes its length; across it, in the second order."""
+        return [{name: 1.0} for name in self.places]
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Mean and variance of each component [S2, eqs. 5, 6]."""
+        mean, variance, _, _ = self.moments
+        return 0.0, PIN_LAWS[self.analytic].variance * (variance + mean**2)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The largest radial clearance in any direction."""
+        largest = self.factor * (self.radius + (0.0 if self.law is None else self.law.ends[1]))
+        return -largest, largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,32 +167,25 @@ class Sources:
     correlation: Correlation | None
 
     @property
-    def owners(self) -> tuple[str, ...]:
-        """The source of each standard normal variable of `at`: scalars, then each pin's radius, x and y."""
-        return (*(scalar.name for scalar in self.scalars),
-                *(pin.name for pin in self.pins for _ in range(2 + (pin.spread is not None))))  # fmt: skip
+    def all(self) -> tuple[Scalar | Pin, ...]:
+        """Each with its name, as the study gives it."""
+        return *self.scalars, *self.pins
 
-    @cached_property
-    def first_order(self) -> tuple[Source, ...]:
-        """Sources with the pins' variances of the analytic method [S2, eqs. 5, 6]."""
-        found = []
-        for scalar in self.scalars:
-            mean, variance, _, _ = scalar.law.moments
-            slopes = {scalar.name: 1.0}
-            if scalar.kind == "parameter":
-                # Of one that changes nothing there are none.
-                slopes = _geometric(self.study.parameters.derivatives(scalar.name))
-            found.append(Source(scalar.name, (slopes,), mean, variance, scalar.law.ends))
-        for pin in self.pins:
-            mean, variance, _, _ = (0.0, 0.0, 0.0, 0.0) if pin.spread is None else pin.spread.moments
-            spread = PIN_LAWS[pin.analytic].variance * (variance + (pin.radius + mean) ** 2)
-            reach = pin.radius + (0.0 if pin.spread is None else pin.spread.ends[1])
-            # Along a binary link the pin changes its length; across it, only in the second order.
-            found.append(Source(pin.name, tuple({name: 1.0} for name in pin.places), 0.0, spread, (-reach, reach)))
-        return tuple(found)
+    @property
+    def owners(self) -> list[str]:
+        """The source of each standard normal variable of `at`: scalars, then each pin's radius, x and y."""
+        pins = [pin.name for pin in self.pins for _ in range(2 + (pin.law is not None))]
+        return [scalar.name for scalar in self.scalars] + pins
+
+    def widened(self, factors: Sequence[float] | Floats) -> Sources:
+        """The same where tolerances are as many times as wide; of a clearance, the radius and its tolerance."""
+        each = [float(factor) for factor in factors]
+        scalars = tuple(replace(s, law=s.law.widened(f)) for s, f in zip(self.scalars, each, strict=False))
+        pins = tuple(replace(p, factor=f) for p, f in zip(self.pins, each[len(scalars) :], strict=True))
+        return replace(self, scalars=scalars, pins=pins)
 
     def correlated(self) -> Floats | None:
-        """Correlation coefficients of the components of `first_order`; None where all are independent."""
+        """Correlation coefficients of the components of `all`; None where all are independent."""
         if self.correlation is None:
             return None
         count = len(self.scalars) + sum(len(pin.places) for pin in self.pins)
@@ -181,7 +203,7 @@ class Sources:
         radii: list[Floats | float] = []
         pins = []
         for pin in self.pins:
-            radii.append(pin.radius if pin.spread is None else pin.radius + pin.spread.draw(rng, count))
+            radii.append(pin.factor * (pin.radius if pin.law is None else pin.radius + pin.law.draw(rng, count)))
             pins.append(PIN_LAWS[pin.sampled].draw(rng, count))
         return Drawn(scalars, radii, pins)
 
@@ -194,7 +216,7 @@ class Sources:
         """The variables of `at` of which the direction alone counts: the places of pins in contact."""
         found, row = [], len(self.scalars)
         for pin in self.pins:
-            row += 2 + (pin.spread is not None)
+            row += 2 + (pin.law is not None)
             if pin.sampled == "contact":
                 found.append((row - 2, row - 1))
         return found
@@ -211,7 +233,7 @@ class Sources:
         radii: list[Floats | float] = []
         pins = []
         for pin in self.pins:
-            radii.append(pin.radius if pin.spread is None else pin.radius + pin.spread.at(next(rest)))
+            radii.append(pin.factor * (pin.radius if pin.law is None else pin.radius + pin.law.at(next(rest))))
             place = next(rest), next(rest)
             given = directed and pin.sampled == "contact"
             pins.append(place if given else PIN_LAWS[pin.sampled].at(*place))
@@ -259,24 +281,24 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
     scalars = []
     warnings = []
     for name, dimension in section.dimensions.items():
-        nominal, factor = 0.0, 1.0
+        nominal = 0.0
         if name in study.parameters.nominal:
             kind, nominal = "parameter", study.parameters.nominal[name]
-            moved = [place for place, slope in _geometric(study.parameters.derivatives(name)).items() if slope]
+            slopes = _geometric(study.parameters.derivatives(name))
+            moved = [place for place, slope in slopes.items() if slope]
             if not moved:
                 warnings.append(f"parameter '{name}' changes no dimension of the mechanism")
             elif len(moved) > 1:
                 warnings.append(f"parameter '{name}' varies {', '.join(moved)} together")
-        elif name in LOADS:
-            kind = "load"
         else:
-            kind = "drive" if name in mechanism.drives else "place"
-            quantity = mechanism.quantity(name) if kind == "drive" else mechanism.description.places[name].quantity
-            factor = study.units.angle_factor if quantity == "angle" else 1.0
-            nominal = mechanism.nominal[name] if kind == "place" else 0.0
+            kind, slopes = "load" if name in LOADS else "drive" if name in mechanism.drives else "place", {name: 1.0}
             if kind == "place":
+                nominal = mechanism.nominal[name]
                 warnings += _twice(study, name, section.dimensions)
-        scalars.append(Scalar(name, kind, marginal(dimension, nominal, factor)))
+        moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
+        turned = kind != "parameter" and moves[name][1] == "angle"
+        law = marginal(dimension, nominal, study.units.angle_factor if turned else 1.0)
+        scalars.append(Scalar(name, kind, law, moves))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
     pins = tuple(_pin(point, clearance) for point, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))
@@ -284,26 +306,24 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
     return sources, warnings
 
 
+def _quantity(mechanism: Mechanism, name: str) -> str:
+    """Quantity of a place, a drive or a load."""
+    places = mechanism.description.places
+    return LOADS[name] if name in LOADS else places[name].quantity if name in places else mechanism.quantity(name)
+
+
 def _check_sizes(sources: Sources) -> None:
     """Refuse what no mechanism of this size varies by: its squares are no numbers any more."""
-    study, mechanism = sources.study, sources.study.mechanism
+    study, size = sources.study, sources.study.mechanism.size or 1.0
+    most = {"angle": (MOST, "a million radians"), "force": (HEAVY, "1e100"), "moment": (HEAVY, "1e100")}
     for scalar in sources.scalars:
-        slopes = {scalar.name: 1.0}
-        if scalar.kind == "parameter":
-            slopes = _geometric(study.parameters.derivatives(scalar.name))
-        for name, slope in slopes.items():
-            drive = scalar.kind == "drive"
-            angle = (
-                scalar.kind != "load"
-                and (mechanism.quantity(name) if drive else mechanism.description.places[name].quantity) == "angle"
-            )
-            most = HEAVY if scalar.kind == "load" else MOST * (1.0 if angle else mechanism.size or 1.0)
-            if not max(abs(slope * end) for end in scalar.law.ends) <= most:
-                size = "a million radians" if angle else "a million times the size of the mechanism"
-                message = f"varies by more than {'1e100' if scalar.kind == 'load' else size}"
+        for slope, quantity in scalar.moves.values():
+            allowed, words = most.get(quantity, (MOST * size, "a million times the size of the mechanism"))
+            if not max(abs(slope * end) for end in scalar.law.ends) <= allowed:
+                message = f"varies by more than {words}"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
     for pin in sources.pins:
-        if not pin.radius + (0.0 if pin.spread is None else pin.spread.ends[1]) <= MOST * (mechanism.size or 1.0):
+        if not pin.ends[1] <= MOST * size:
             message = "is more than a million times the size of the mechanism"
             raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
 

@@ -4,96 +4,139 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
-from mechdesign.analyses.reliability.engine.precision import Precision as Wanted
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.reliability.deflection import Elastic
+from mechdesign.analyses.reliability.engine.precision import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.first_order import FirstOrder
+from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
+from mechdesign.analyses.reliability.question import Question
 from mechdesign.analyses.reliability.simulation import Setting, Sums
 from mechdesign.analyses.reliability.sources import Sources
-from mechdesign.numerics.arrays import Floats
-from mechdesign.progress import Progress
-from mechdesign.study.schema.reliability import Precision
+from mechdesign.mechanism import Reason
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.progress import NULL, Progress
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+from mechdesign.study.schema.checker import ORDERS as QUANTITIES
 
-# Samples that `auto` draws at most where the study says nothing, and its precision.
+Strings = NDArray[np.str_]
+
+# Samples that `auto` draws at most where the study says nothing, and its precision: a twentieth of the probability.
 MOST, RELATIVE = 2_000_000, 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What all methods are asked.
+    """What all methods are asked, and the nominal mechanism at every pose.
 
     Parameters
     ----------
-    settings : sequence of Setting
-        Poses that can be assembled.
+    reason : int8 array, shape (poses,)
+        See `mechdesign.mechanism.Reason`.
+    nominal : ndarray, shape (channels, poses)
+        Values of the channels (radians, lengths).
     linear : FirstOrder
         Of all poses.
-    channels, poses : int
-        How many there are.
+    elastic : Elastic or None
+        Deflections at all poses.
+    settings : sequence of Setting
+        Poses that can be assembled, in their order; none where only the first order is asked.
     samples : int
         As the study asks.
     most : int
-        Samples of `auto`.
-    cycle : bool
-        Whether the poses are one motion, whose probability as a whole is asked.
+        Samples of methods that end where their precision is reached.
     """
 
-    settings: Sequence[Setting]
+    study: Study
+    poses: Poses
+    question: Question
     sources: Sources
+    reason: NDArray[np.int8]
+    nominal: Floats
     linear: FirstOrder
-    channels: int
-    poses: int
-    seed: int
-    samples: int
-    most: int
-    precision: Precision | None
-    jobs: int | None
-    progress: Progress
-    cycle: bool = False
+    elastic: Elastic | None = None
+    settings: Sequence[Setting] = ()
+    seed: int = 0
+    samples: int = 0
+    most: int = MOST
+    precision: Precision = field(default_factory=lambda: Precision(RELATIVE, None))
+    jobs: int | None = 1
+    progress: Progress = NULL
+
+    @cached_property
+    def assembled(self) -> Flags:
+        """Poses that can be computed, those outside the limits of motion included."""
+        return np.isin(self.reason, (Reason.OK, Reason.LIMIT))
+
+    @cached_property
+    def scale(self) -> Floats:
+        """Study units in one unit of the core, shape (channels,)."""
+        turn = 1.0 / self.study.units.angle_factor
+        return np.array([turn if c.coordinate.quantity == "angle" else 1.0 for c in self.question.channels])
+
+    @cached_property
+    def labels(self) -> tuple[Strings, Strings, Strings]:
+        """Output, order and unit of each channel."""
+        channels, label = self.question.channels, self.study.units.label
+        return (
+            np.array([c.coordinate.name for c in channels]),
+            np.array([ORDERS[c.order] for c in channels]),
+            np.array([label(QUANTITIES.get(c.coordinate.quantity, ("none",) * 3)[c.order]) for c in channels]),
+        )
+
+    def where(self, pose: int) -> str:
+        """A pose in words."""
+        return pose_in_words(self.study, self.poses, pose)
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class MethodResult:
     """What a method says.
 
     Parameters
     ----------
     estimates : dict of int to Estimate
         By pose, where there are limits.
-    mean, sigma : ndarray, shape (channels, poses), or None
-        Of the errors (radians, lengths); None where the method gives no moments.
-    rho : ndarray, shape (poses,)
-        Correlation of the two outputs.
     sums : dict of int to Sums
         By pose, of methods that sample the errors.
     used : dict of int to str
         By pose, the method that the value comes from, where it is not this one.
     rungs : dict of int to dict of str to Estimate
         By pose, what the methods tried before say.
+    mean, sigma : ndarray, shape (channels, poses), or None
+        Of the errors (radians, lengths); None where the method gives no moments.
+    rho : ndarray, shape (poses,), or None
+        Correlation of the two outputs.
     cycle : Estimate or None
         Of the whole motion.
     """
 
     method: str
     estimates: dict[int, Estimate] = field(default_factory=dict)
-    mean: Floats | None = None
-    sigma: Floats | None = None
-    rho: Floats | None = None
     sums: dict[int, Sums] = field(default_factory=dict)
     used: dict[int, str] = field(default_factory=dict)
     rungs: dict[int, dict[str, Estimate]] = field(default_factory=dict)
+    mean: Floats | None = None
+    sigma: Floats | None = None
+    rho: Floats | None = None
     cycle: Estimate | None = None
+
+    def add(self, other: MethodResult) -> None:
+        """Join what is said of other poses."""
+        self.estimates.update(other.estimates)
+        self.sums.update(other.sums)
+        self.used.update(other.used)
+        self.rungs.update(other.rungs)
 
 
 class Partial(KeyboardInterrupt):
     """An interrupted method, and what it had found."""
 
-    def __init__(self, found: Found) -> None:
+    def __init__(self, found: MethodResult) -> None:
         super().__init__()
         self.found = found
-
-
-def wanted_precision(task: Task) -> Wanted:
-    """What the study asks of `auto`, or a twentieth of the probability of failure."""
-    asked = task.precision
-    return Wanted(RELATIVE, None) if asked is None else Wanted(asked.relative, asked.half_width)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
-import numpy as np
-
-from mechdesign.analyses.reliability.marginals import Lognormal, Marginal, Normal, Triangular, TruncatedNormal, Uniform
-from mechdesign.analyses.reliability.sources import Scalar, Sources
+from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import Clearance, Cost, Dimension
@@ -66,6 +63,7 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
     found = []
     for scalar in sources.scalars:
         dimension = section.dimensions[scalar.name]
+        unit = "" if scalar.kind == "parameter" else study.units.label(scalar.moves[scalar.name][1])
         half = dimension.sigma
         kind = "sigma"
         if half is None:
@@ -74,45 +72,11 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
             half, kind = 0.5 * (high - low), "tolerance"
         asked = half > 0 and (scalar.kind != "load" or scalar.name in given)
         cost = given.get(scalar.name, Cost()) if asked else None
-        found.append(Tolerance(scalar.name, half, kind, _unit(study, scalar), cost))
+        found.append(Tolerance(scalar.name, half, kind, unit, cost))
     for pin in sources.pins:
         cost = given.get(pin.name) if pin.radius > 0 else None
         found.append(Tolerance(pin.name, pin.radius, "clearance", study.units.label("length"), cost))
     return found
-
-
-def _unit(study: Study, scalar: Scalar) -> str:
-    mechanism = study.mechanism
-    if scalar.kind == "parameter":
-        return ""
-    if scalar.kind == "load":
-        return study.units.label("moment" if scalar.name.endswith("mz") else "force")
-    if scalar.kind == "drive":
-        return study.units.label(mechanism.quantity(scalar.name))
-    return study.units.label(mechanism.description.places[scalar.name].quantity)
-
-
-def scaled(law: Marginal, scale: float) -> Marginal:
-    """The law of a tolerance as many times as wide, about the same middle."""
-    if isinstance(law, Normal | TruncatedNormal | Lognormal):
-        return replace(law, sigma=scale * law.sigma)
-    assert isinstance(law, Uniform | Triangular)
-    middle, half = 0.5 * (law.low + law.high), 0.5 * scale * (law.high - law.low)
-    low, high = middle - half, middle + half
-    return Uniform(low, high) if isinstance(law, Uniform) else Triangular(low, min(max(0.0, low), high), high)
-
-
-def moments(sources: Sources, scales: Floats) -> tuple[Floats, Floats]:
-    """Mean and variance of each of `Sources.first_order` where tolerances are as many times as wide.
-
-    Of a clearance the radius and its tolerance are as many times as large together.
-    """
-    given = sources.first_order
-    found = [scaled(s.law, scale).moments[:2] for s, scale in zip(sources.scalars, scales.tolist(), strict=False)]
-    found += [(0.0, source.variance * scale**2)
-              for source, scale in zip(given[len(found) :], scales[len(found) :].tolist(), strict=True)]  # fmt: skip
-    mean, variance = np.array(found).reshape(-1, 2).T
-    return mean, variance
 
 
 def retold(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.poses import judge_failures, pose_in_words, solve_poses, study_poses
+from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
 from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held
@@ -28,6 +29,7 @@ from mechdesign.analyses.stiffness.tables import (
 )
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
@@ -39,6 +41,7 @@ from mechdesign.threads import one_thread
 CHUNK = 8192
 # Wrenches (of unit size) nearer to dependence than this are told: the answer hangs on rounding and on tolerances.
 NEAR_SINGULAR = 1e-4
+Pose = tuple[int, Configuration]
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,8 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     warnings, failed = judge_failures(study, poses, solved.reason)
     warnings += _cautions(study, poses, body, solved.held)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(solved.reason))}
-    return Result("stiffness", tables(study, body, poses, solved), warnings, counts, failed)
+    drawn = _drawn(body, poses, solved)
+    return Result("stiffness", tables(study, body, poses, solved), warnings, counts, failed, drawn=drawn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +115,50 @@ class Solved:
         See `mechdesign.mechanism.Reason`.
     effects : Effects or None
         What the study's loads do, where it has any.
+    first, loose : (int, Configuration) or None
+        The first valid pose and the first that has a free twist, with their rows.
     """
 
     held: Held
     reason: NDArray[np.int8]
     springs: list[Springs]
     effects: Effects | None
+    first: Pose | None
+    loose: Pose | None
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What pictures show of one pose.
+
+    Parameters
+    ----------
+    row : int
+        Its row among the study's poses.
+    springs : list of Springs
+        Those of this pose, one each.
+    twists : mapping of str to ndarray, shape (3, loads)
+        How each vertex shifts and turns under the study's loads, about the asked point.
+    """
+
+    body: Body
+    row: int
+    configuration: Configuration
+    springs: list[Springs]
+    twists: dict[str, Floats]
+
+
+def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
+    """All poses; the first valid one, and the first that has a free twist."""
+    drawn: dict[str, Any] = {"poses": poses}
+    for name, pose in (("first", solved.first), ("loose", solved.loose)):
+        if pose is not None:
+            row, configuration = pose
+            here = [(each, each.row == row) for each in solved.springs]
+            springs = [Springs(*(v[of] for v in vars(each).values())) for each, of in here if of.any()]
+            twists = dict(zip(body.network.paths, solved.effects.twists[row], strict=True)) if solved.effects else {}
+            drawn[name] = Drawn(body, row, configuration, springs, twists)
+    return drawn
 
 
 def solve(study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress: Progress = NULL) -> Solved:
@@ -126,9 +168,12 @@ def solve(study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress
     springs: list[Springs] = []
     loads = body.section.loads
     effects = Effects.unknown(body.network, poses.count, len(loads)) if loads else None
+    first: Pose | None = None
+    loose: Pose | None = None
     for solved in solve_poses(study, poses):
         configuration = solved.configuration
         reason[solved.rows] = configuration.reason
+        first = first or _pose(solved, configuration.valid)
         assembled = np.flatnonzero(np.isin(configuration.reason, (Reason.OK, Reason.LIMIT)))
         chunks = [assembled[k : k + CHUNK] for k in range(0, len(assembled), CHUNK)]
         batches = (configuration.take(index) for index in chunks)
@@ -140,7 +185,14 @@ def solve(study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress
             if effects is not None and moved is not None:
                 effects.put(rows, moved)
             progress.update(len(index))
-    return Solved(held, reason, springs, effects)
+        loose = loose or _pose(solved, np.isfinite(held.free[solved.rows, 0]))
+    return Solved(held, reason, springs, effects, first, loose)
+
+
+def _pose(solved: SolvedPoses, wanted: Flags) -> Pose | None:
+    """The first of some solved poses that is wanted, and its row."""
+    index = np.flatnonzero(wanted)[:1]
+    return (int(solved.rows[index[0]]), solved.configuration.take(index)) if len(index) else None
 
 
 def tables(study: Study, body: Body, poses: Poses, solved: Solved) -> dict[str, Table]:

@@ -24,15 +24,18 @@ class Effects:
     ----------
     forces : ndarray, shape (n, joints, loads, 3)
         Force and moment about the joint's place, on the first body by the second, in the order of `joints_of`.
-    moved : complex ndarray, shape (n, points, loads)
-        Displacements of the points that `points_of` names.
+    twists : ndarray, shape (n, vertices, 3, loads)
+        How the vertices of `Network.paths` shift and turn, about the asked point.
     places : complex ndarray, shape (n, points)
-        Where those are without a load.
+        Where the points that `points_of` names are without a load.
+    origin : complex ndarray, shape (n,)
+        Where the asked point is.
     """
 
     forces: Floats
-    moved: Complexes
+    twists: Floats
     places: Complexes
+    origin: Complexes
 
     @staticmethod
     def unknown(network: Network, poses: int, loads: int) -> Effects:
@@ -40,13 +43,21 @@ class Effects:
         joints, points = len(joints_of(network)), len(points_of(network))
         return Effects(
             np.full((poses, joints, loads, 3), np.nan),
-            np.full((poses, points, loads), complex(np.nan, np.nan)),
+            np.full((poses, len(network.paths), 3, loads), np.nan),
             np.full((poses, points), complex(np.nan, np.nan)),
+            np.full(poses, complex(np.nan, np.nan)),
         )
 
     def put(self, rows: Ints, part: Effects) -> None:
         """Fill in some poses."""
-        self.forces[rows], self.moved[rows], self.places[rows] = part.forces, part.moved, part.places
+        for name, values in vars(part).items():
+            getattr(self, name)[rows] = values
+
+    def moved(self, network: Network) -> Complexes:
+        """Displacements of the points that `points_of` names, shape (n, points, loads)."""
+        vertices = list(network.paths)
+        dx, dy, turn = np.moveaxis(self.twists[:, [vertices.index(v) for _, _, v in points_of(network)]], 2, 0)
+        return np.asarray(dx + 1j * dy + 1j * turn * (self.places - self.origin[:, None])[:, :, None])
 
 
 def joints_of(network: Network) -> list[int]:
@@ -67,15 +78,16 @@ def effects_of(
     applied = np.array(loads)[:, :size].T
     origin = configuration.point(at)
     effects = Effects.unknown(network, len(origin), len(loads))
+    effects.origin[:] = origin
     for row, k in enumerate(joints_of(network)):
         wrench = loaded.wrenches[:, k] @ applied
         arm = (configuration.point(network.edges[k].point) - origin)[:, None]
         moment = wrench[:, 2] - (arm.real * wrench[:, 1] - arm.imag * wrench[:, 0])
         effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
-    for row, (_, point, vertex) in enumerate(points_of(network)):
-        twist = loaded.displacements[vertex] @ applied
-        place = effects.places[:, row] = configuration.point(point)
-        effects.moved[:, row] = twist[:, 0] + 1j * twist[:, 1] + 1j * twist[:, 2] * (place - origin)[:, None]
+    for row, vertex in enumerate(network.paths):
+        effects.twists[:, row] = loaded.displacements[vertex] @ applied
+    for row, (_, point, _) in enumerate(points_of(network)):
+        effects.places[:, row] = configuration.point(point)
     return effects
 
 
@@ -106,8 +118,9 @@ def forces_table(study: Study, poses: Poses, network: Network, effects: Effects)
 def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
     """``displacements.csv``: where every point goes, a row a pose, load and point of a link."""
     points = points_of(network)
-    count, number, loads = effects.moved.shape
-    moved = effects.moved.swapaxes(1, 2).ravel()
+    moves = effects.moved(network)
+    count, number, loads = moves.shape
+    moved = moves.swapaxes(1, 2).ravel()
     places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
     length = study.units.label("length")
     columns = _of_loads(study, poses, loads, number)

@@ -16,6 +16,7 @@ from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Cir
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
 from mechdesign.analyses.workspace.question import COLUMNS, Answer, Question, answer, areas_of_pieces, questions, split
+from mechdesign.analyses.workspace.shown import poses_along
 from mechdesign.analyses.workspace.singularities import singular_everywhere
 from mechdesign.analyses.workspace.tables import (
     PIECE,
@@ -117,8 +118,9 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     if several:
         tables.append(Table("pieces", stacked(pieces), "pieces of the region that do not hang together"))
     empty = sum(not given.panels.closes[0] for given in answers)
-    return Result("workspace", {table.name: table for table in tables}, tuple(warnings),
-                  {"regions": len(asked), "empty": empty})  # fmt: skip
+    named = {table.name: table for table in tables}
+    along = poses_along(study, regions[0][1].held, named["boundary"])
+    return Result("workspace", named, tuple(warnings), {"regions": len(asked), "empty": empty}, drawn={"along": along})
 
 
 def _unreachable(study: Study, asked: Sequence[Question]) -> str:

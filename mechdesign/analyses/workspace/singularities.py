@@ -104,7 +104,7 @@ def _in_words(mechanism: Mechanism, group: Group) -> str:
 def singular_everywhere(field: Field) -> bool:
     """Whether every pose is a forward singularity, so that determinants are nothing but rounding."""
     margins = field.margins(field.surroundings, {}, assembly=False)
-    closures = [kind == "singularity" for kind, _ in field.labels[: len(margins)]]
+    closures = [kind != "limit" for kind, _ in field.labels[: len(margins)]]
     z = field.surroundings[(margins[closures] > 0).all(axis=0)]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         regular = np.asarray(regularity(field.mechanism.linearize(field.configuration(z, {}))))

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
 from mechdesign.report.figures import style
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.configuration import Configuration
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 # Of the mechanism's size: nearer to a beam than this, a bracket is too short to be seen.
 SHORTEST = 0.005

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import Turn, drive_arrows, name_labels, obstacles
 from mechdesign.report.figures.labels import paper, place_labels
 from mechdesign.report.figures.scene import GROUND, Guide, Scene, hull, pose
 from mechdesign.report.figures.shapes import Pen
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism import Mechanism
-    from mechdesign.mechanism.configuration import Configuration
 
 DRIVE = style.VERMILION
 LINKS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")

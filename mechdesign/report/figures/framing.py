@@ -13,8 +13,8 @@ from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 
 PAD = 0.5  # inches around what is drawn, for symbols and names
-LEAST = 1.5  # inches, height of a window
-HIGHEST = 6.2  # inches, of a whole picture
+LEAST, TALLEST = 1.5, 5.3  # inches, height of a window
+TITLE = 0.36  # inches above a window for a line of words
 # Inches left of a window and below it, for axis labels, and above and right of it.
 LEFT, BELOW, ABOVE, RIGHT = 0.78, 0.55, 0.12, 0.15
 
@@ -59,37 +59,45 @@ def fit(
     return Window(middle, scale, width, max(scale * tall + 2 * pad, min(LEAST, height)))
 
 
+def windows(
+    window: Window,
+    unit: str,
+    count: int = 1,
+    columns: int = 1,
+    *,
+    gap: float = LEFT,
+    above: float = ABOVE,
+    top: float = 0.0,
+) -> tuple[Figure, list[Axes]]:
+    """A figure of `count` windows in rows.
+
+    Parameters
+    ----------
+    gap : float
+        Inches between columns; with room for it each has an axis label of its own, or else the first one.
+    above, top : float
+        Inches above each window and above all of them, for titles.
+    """
+    rows = -(-count // columns)
+    outer = BELOW + rows * (window.height + above) + top
+    figure = style.new_figure(style.WIDTH, outer, layout=None)
+    panels = []
+    for k in range(count):
+        row, column = divmod(k, columns)
+        left, low = LEFT + column * (window.width + gap), BELOW + (rows - 1 - row) * (window.height + above)
+        axes = figure.add_axes((left / style.WIDTH, low / outer, window.width / style.WIDTH, window.height / outer))
+        window.limit(axes)
+        lowest, first = k + columns >= count, column == 0 or gap >= LEFT
+        axes.tick_params(labelleft=first, labelbottom=lowest)
+        axes.set_xlabel(style.axis_label("x", unit) if lowest else "")
+        axes.set_ylabel(style.axis_label("y", unit) if first else "")
+        panels.append(axes)
+    return figure, panels
+
+
 def framed(
     places: Complexes | Iterable[complex], unit: str, *, height: float, above: float = ABOVE
 ) -> tuple[Figure, Axes]:
-    """A figure with one window as wide as the page, its axes labelled; `above` it, inches are left for a title."""
-    window = fit(places, style.WIDTH - LEFT - RIGHT, height)
-    outer = window.height + BELOW + above
-    figure = style.new_figure(style.WIDTH, outer, layout=None)
-    axes = figure.add_axes(
-        (LEFT / style.WIDTH, BELOW / outer, window.width / style.WIDTH, window.height / outer)
-    )  # fmt: skip
-    window.limit(axes)
-    axes.set_xlabel(style.axis_label("x", unit))
-    axes.set_ylabel(style.axis_label("y", unit))
-    return figure, axes
-
-
-def equal_canvas(places: np.ndarray, unit: str) -> tuple[Figure, Axes]:
-    """Axes of one scale that hold the places, as large as the page allows."""
-    low = complex(places.real.min(), places.imag.min())
-    high = complex(places.real.max(), places.imag.max())
-    wide, tall = max((high - low).real, 1e-9), max((high - low).imag, 1e-9)
-    pad, left, below, above = 0.55, 0.68, 0.5, 0.35
-    inches = min((style.WIDTH - left - 0.15 - 2 * pad) / wide, (HIGHEST - below - above - 2 * pad) / tall)
-    width, height = style.WIDTH - left - 0.15, max(inches * tall + 2 * pad, 1.5)
-    outer = height + below + above
-    figure = style.new_figure(style.WIDTH, outer, layout=None)
-    axes = figure.add_axes((left / style.WIDTH, below / outer, width / style.WIDTH, height / outer))
-    middle = (low + high) / 2
-    axes.set_xlim(middle.real - width / 2 / inches, middle.real + width / 2 / inches)
-    axes.set_ylim(middle.imag - height / 2 / inches, middle.imag + height / 2 / inches)
-    axes.set_aspect("equal")
-    axes.set_xlabel(style.axis_label("x", unit))
-    axes.set_ylabel(style.axis_label("y", unit))
+    """A figure with one window as wide as the page; `above` it, inches are left for a title."""
+    figure, (axes,) = windows(fit(places, style.WIDTH - LEFT - RIGHT, height), unit, above=above)
     return figure, axes

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.shown import solve_shown
 from mechdesign.errors import MechdesignError
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.beams import draw_beams
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
-from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, fit, framed, scale_of
+from mechdesign.report.figures.framing import LEFT, RIGHT, extent, fit, framed, scale_of, windows
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.scene import Scene, pose, travels
-from mechdesign.report.figures.sweep import solve_sweep
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism.configuration import Configuration
-    from mechdesign.study import Study
+from mechdesign.report.figures.sweep import Sweep
+from mechdesign.results import Result
+from mechdesign.study import Study
 
 Panel = tuple[str, "Configuration", int]
 _POSES = 100  # poses from which the range of the motion is taken
@@ -29,28 +28,29 @@ _ROUGH = 10.0  # points on paper: a place drawn nearer than this lies under the 
 _TALLEST = 4.2
 
 
-def mechanism_figure(study: Study, title: str = "sketch pose") -> Figure:
+def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -> Figure:
     """The sketch pose, under `title`, and the first pose of the study's kinematics, on one scale.
 
-    Use inside `style.context`.
+    Where the result carries no motion, a few poses of it are solved. Use inside `style.context`.
     """
     mechanism = study.mechanism
     sketch = mechanism.sketch_configuration
     panels: list[Panel] = [(title, sketch, 0)]
     scenes = [pose(mechanism, sketch)]
     try:
-        sweep = solve_sweep(study, _POSES)
+        sweep = Sweep.of(result.drawn["motion"] if "motion" in result.drawn else solve_shown(study, _POSES))
     except MechdesignError:
         return _compose(study, panels, travels(_drawable(scenes)))
-    poses = [pose(mechanism, sweep.configuration, k) for k in range(len(sweep.rows))]
-    first = next((k for k, scene in enumerate(poses) if scene is not None), None)
+    some = np.unique(np.linspace(0, len(sweep.rows) - 1, _POSES).round().astype(int)).tolist()
+    poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
+    first = next((k for k, scene in poses.items() if scene is not None), None)
     if first is not None:
         note = "first pose" if first == 0 else "first pose that can be assembled"
         if _same(scenes[0], poses[first]):
             panels = []
             note = f"{title.removesuffix(' pose')} and {note}"
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
-        scenes += poses
+        scenes += poses.values()
     return _compose(study, panels, travels(_drawable(scenes)))
 
 
@@ -89,7 +89,7 @@ def _same(one: Scene | None, other: Scene | None) -> bool:
 
 def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
     """Panels beside or above each other, whichever shows the mechanism larger."""
-    mechanism, unit = study.mechanism, study.units.label("length")
+    mechanism = study.mechanism
     places: list[complex] = []
     for _, configuration, index in panels:
         scene = pose(mechanism, configuration, index)
@@ -104,26 +104,12 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
         return scale_of(wide, tall, *_room(columns, count // columns))
 
     columns = count if count == 1 or scale(count) >= 0.55 * scale(1) else 1
-    rows = count // columns
-    window: Window = fit(places, *_room(columns, rows))
+    window = fit(places, *_room(columns, count // columns))
     titles = [textwrap.fill(title, int(window.width * _LETTERS)) for title, _, _ in panels]
     above = _TITLE + _LINE * max(title.count("\n") for title in titles)
-    outer = rows * (window.height + above) + BELOW
-    figure = style.new_figure(style.WIDTH, outer, layout=None)
-    for k, (_, configuration, index) in enumerate(panels):
-        column, row = k % columns, k // columns
-        left = LEFT + column * (window.width + LEFT)
-        low = BELOW + (rows - 1 - row) * (window.height + above)
-        axes = figure.add_axes(
-            (left / style.WIDTH, low / outer, window.width / style.WIDTH, window.height / outer)
-        )  # fmt: skip
-        window.limit(axes)
-        axes.set_title(titles[k], loc="left")
-        axes.set_ylabel(style.axis_label("y", unit))
-        if row == rows - 1:
-            axes.set_xlabel(style.axis_label("x", unit))
-        else:
-            axes.tick_params(labelbottom=False)
+    figure, grid = windows(window, study.units.label("length"), count, columns, above=above)
+    for axes, title, (_, configuration, index) in zip(grid, titles, panels, strict=True):
+        axes.set_title(title, loc="left")
         draw_beams(axes, study, configuration, index)
         draw_mechanism(axes, mechanism, configuration, index, travel=travel)
     return figure

@@ -22,7 +22,6 @@ _LEFT, _RIGHT, _TOP, _APART = 0.88, 0.3, 0.62, 0.42  # inches
 _TALL = 1.75
 # Below the lowest panel: its axis alone, and with a legend of one or two rows.
 BARE, WITH_LEGEND = 0.6, 0.95
-_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _LETTER = 0.56  # mean width of a letter in font sizes
 
 
@@ -109,11 +108,8 @@ def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) 
 
 
 def number(value: float) -> str:
-    """A probability in three digits, as it is set in print: 1.66·10⁻⁹."""
-    if value == 0 or value >= 1e-3:
-        return f"{value:.3g}"
-    digits, power = f"{value:.2e}".split("e")
-    return f"{digits}\N{MIDDLE DOT}10{str(int(power)).translate(_RAISED)}"
+    """A probability in three digits."""
+    return f"{value:.3g}" if value == 0 or value >= 1e-3 else style.in_powers(value)
 
 
 def fitting(labels: Sequence[str]) -> int:

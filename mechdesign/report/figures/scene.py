@@ -7,15 +7,12 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Description, Fixed, Line, Link, Slot, Term
-
-if TYPE_CHECKING:
-    from mechdesign.mechanism import Mechanism
-    from mechdesign.mechanism.configuration import Configuration
 
 GROUND = "ground"
 

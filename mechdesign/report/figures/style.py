@@ -33,6 +33,8 @@ COLORMAP = "cividis"
 
 _PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
 
+_RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
+
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 10,
@@ -83,6 +85,12 @@ def axis_label(name: str, unit: str = "") -> str:
     for plain, printed in _PRINTED.items():
         unit = unit.replace(plain, printed)
     return f"{name} [{unit}]" if unit else name
+
+
+def in_powers(value: float) -> str:
+    """Three digits of a number as it is set in print: 1.66\N{MIDDLE DOT}10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT NINE}."""
+    digits, power = f"{value:.2e}".split("e")
+    return f"{digits}\N{MIDDLE DOT}10{str(int(power)).translate(_RAISED)}"
 
 
 def to_png(figure: Figure) -> bytes:

@@ -1,4 +1,4 @@
-"""A study's sweep or path as pictures need it: solved at a bounded number of poses, with the paths of its points."""
+"""The poses of a motion that a result carries, with what pictures need of them: paths of points, travel of slides."""
 
 from __future__ import annotations
 
@@ -8,47 +8,37 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.poses import radians, study_poses
-from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.analyses.shown import Shown
+from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures.framing import extent
 from mechdesign.report.figures.scene import link_points, pose, travels
-from mechdesign.study import Poses, Study
 
-MOST_POSES = 2001
 _TRAVEL_POSES = 100  # poses from which the travel of the slides is taken
 # Two poses are one where no point is farther apart than this part of the mechanism's size.
 _CLOSED = 1e-3
 
 
-def is_motion(poses: Poses) -> bool:
-    """Whether poses follow one another: a sweep of one coordinate or a path, not a list or a grid."""
-    return not poses.listed and len(poses.grid) == 1 and poses.count > 1
-
-
 @dataclass(frozen=True, eq=False)
-class Sweep:
-    """Poses in the order of a motion.
+class Sweep(Shown):
+    """Poses in the order of a motion."""
 
-    Parameters
-    ----------
-    rows : ndarray of int
-        Row of each pose among the study's; all of them, unless there are more than a picture can show.
-    values : mapping of str to ndarray
-        The coordinates given, in the study's units.
-    """
-
-    study: Study
-    rows: Ints
-    values: dict[str, Floats]
-    configuration: Configuration
+    @classmethod
+    def of(cls, shown: Shown) -> Sweep:
+        """What a result carries."""
+        return cls(shown.study, shown.poses, shown.rows, shown.configuration)
 
     @property
     def mechanism(self) -> Mechanism:
         """The mechanism that moves."""
         return self.study.mechanism
+
+    @cached_property
+    def values(self) -> dict[str, Floats]:
+        """The coordinates given, in the study's units."""
+        return {name: self.poses.values[name][self.rows] for name in self.poses.groups[0].names}
 
     @cached_property
     def valid(self) -> Ints:
@@ -88,7 +78,7 @@ class Sweep:
     @property
     def returns(self) -> bool:
         """Whether the first and the last pose are one."""
-        if study_poses(self.study, "kinematics").closed:
+        if self.poses.closed:
             return True
         _, wide, tall = extent(self.extent)
         return all(abs(path[-1] - path[0]) <= _CLOSED * max(wide, tall) for path in self.places.values())
@@ -105,22 +95,6 @@ class Sweep:
             unit = self.study.units.label(self.mechanism.quantity(name))
             parts.append(f"{name} = {values[index] + 0.0:.4g} {unit}".rstrip().replace(" ", "\N{NO-BREAK SPACE}"))
         return ", ".join(parts)
-
-
-def solve_sweep(study: Study, most: int = MOST_POSES) -> Sweep:
-    """Solve the study's sweep or path, at most that many of its poses.
-
-    Raises
-    ------
-    MechdesignError
-        Where the coordinates given do not determine the mechanism.
-    """
-    group = study_poses(study, "kinematics").groups[0]
-    rows = np.unique(np.linspace(0, len(group.rows) - 1, most).round().astype(np.intp))
-    plan = study.mechanism.plan(group.names)
-    values = {name: group.values[name][rows] for name in group.names}
-    given = [radians(study, c, v) for c, v in zip(plan.structure.given, values.values(), strict=True)]
-    return Sweep(study, rows, values, plan.solve(given))
 
 
 def ranks(mechanism: Mechanism, outputs: tuple[str, ...] = ()) -> dict[str, int]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from mechdesign.mechanism.model import Fixed, Line, Prismatic, Slot
 from mechdesign.mechanism.model import Joint as JointModel
@@ -14,113 +16,103 @@ from mechdesign.study.build.names import GROUND
 from mechdesign.errors import suggestion
 
 
+class _WrongJoint(Exception):
+    """What is wrong with a joint has been noted."""
+
+
 def build(builder: Builder) -> dict[str, JointModel]:
     """Build every joint of the section whose names are right."""
-    makers: dict[str, Callable[..., JointModel | None]] = {"prismatic": _prismatic, "slot": _slot, "fixed": _fixed}
-    joints = {
-        name: makers[section.kind](builder, name, section, getattr(section, section.kind))
-        for name, section in builder.section.joints.items()
-    }
-    return {name: joint for name, joint in joints.items() if joint is not None}
+    makers: dict[str, Callable[..., JointModel]] = {"prismatic": _prismatic, "slot": _slot, "fixed": _fixed}
+    joints: dict[str, JointModel] = {}
+    for name, section in builder.section.joints.items():
+        with contextlib.suppress(_WrongJoint):
+            joints[name] = makers[section.kind](builder, name, section, getattr(section, section.kind))
+    return joints
 
 
-def _pair(builder: Builder, path: KeyPath, pair: tuple[str, str]) -> bool:
-    if not builder.check_named("link", pair, path):
-        return False
-    if pair[0] == pair[1]:
-        builder.report(path, f"a joint of link {pair[0]!r} with itself")
-        return False
-    return True
+def _refuse(builder: Builder, path: KeyPath, message: str) -> NoReturn:
+    builder.report(path, message)
+    raise _WrongJoint
 
 
-def _on_link(builder: Builder, link: str, point: str, path: KeyPath) -> bool:
+def _check_named(builder: Builder, what: str, names: Sequence[str], path: KeyPath) -> None:
+    if not builder.check_named(what, names, path):
+        raise _WrongJoint
+    if len(names) == 2 and names[0] == names[1]:
+        _refuse(builder, path, f"a joint of link {names[0]!r} with itself")
+
+
+def _check_on_link(builder: Builder, link: str, point: str, path: KeyPath) -> None:
     points = builder.names.points_of(link)
-    if point in points:
-        return True
-    hint = suggestion(point, points) or f"; it has {', '.join(points)}"
-    builder.report(path, f"link {link!r} has no point {point!r}{hint}")
-    return False
+    if point not in points:
+        hint = suggestion(point, points) or f"; it has {', '.join(points)}"
+        _refuse(builder, path, f"link {link!r} has no point {point!r}{hint}")
 
 
-def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line | None:
-    path: KeyPath = ("joints", name)
+def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line:
+    path: KeyPath = ("joints", name, "through")
     through = section.through or ()
-    if not all(_on_link(builder, link, point, (*path, "through", k)) for k, point in enumerate(through)):
-        return None
+    for k, point in enumerate(through):
+        _check_on_link(builder, link, point, (*path, k))
     if len(through) == 2:
         points = builder.links[link].points
         far = [point for point in through if point not in points]
         if far:
             message = f"{far[0]!r} moves along leg {link!r}: a line needs two points of one body; give 'direction'"
-            builder.report((*path, "through"), message)
-            return None
+            _refuse(builder, path, message)
         first, second = ([builder.nominal(term) for term in points[point]] for point in through)
         if first == second:
-            builder.report((*path, "through"), f"{' and '.join(map(repr, through))} are one place: no direction")
-            return None
+            _refuse(builder, path, f"{' and '.join(map(repr, through))} are one place: no direction")
         return Line(link, through[0], 0.0, through[1])
     direction = builder.place(f"{name}.direction", section.direction or 0.0, "angle")
     return Line(link, through[0] if through else None, direction)
 
 
-def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Prismatic | None:
+def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Prismatic:
     path: KeyPath = ("joints", name)
-    if not _pair(builder, (*path, "prismatic"), pair):
-        return None
+    _check_named(builder, "link", pair, (*path, "prismatic"))
     guide, slider = pair
-    point = section.point
-    if point is None:
-        points = builder.names.points_of(slider)
-        if len(points) != 1:
-            builder.report(path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
-            return None
-        point = points[0]
-    elif not _on_link(builder, slider, point, (*path, "point")):
-        return None
+    points = builder.names.points_of(slider)
+    if section.point is not None:
+        _check_on_link(builder, slider, section.point, (*path, "point"))
+    elif len(points) != 1:
+        _refuse(builder, path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
     line = _line(builder, name, section, guide)
-    if line is None:
-        return None
-    return Prismatic(name, line, slider, point, builder.place(f"{name}.angle", section.angle or 0.0, "angle"))
+    angle = builder.place(f"{name}.angle", section.angle or 0.0, "angle")
+    return Prismatic(name, line, slider, section.point or points[0], angle)
 
 
-def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slot | None:
+def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slot:
     path: KeyPath = ("joints", name)
-    if not builder.check_name(guide, builder.section.links, "link", (*path, "slot")):
-        return None
+    _check_named(builder, "link", (guide,), (*path, "slot"))
     if section.point is None:
-        builder.report(path, "a slot needs the 'point' of another link that slides in it")
-        return None
-    if not builder.check_name(section.point, builder.names.owners, "point", (*path, "point")):
-        return None
+        _refuse(builder, path, "a slot needs the 'point' of another link that slides in it")
+    _check_named(builder, "point", (section.point,), (*path, "point"))
     if builder.names.owners[section.point] == [guide]:
-        builder.report((*path, "point"), f"point {section.point!r} is on link {guide!r} itself, which has the slot")
-        return None
-    line = _line(builder, name, section, guide)
-    return None if line is None else Slot(name, line, section.point)
+        message = f"point {section.point!r} is on link {guide!r} itself, which has the slot"
+        _refuse(builder, (*path, "point"), message)
+    return Slot(name, _line(builder, name, section, guide), section.point)
 
 
-def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed | None:
+def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed:
     path: KeyPath = ("joints", name)
-    if not _pair(builder, (*path, "fixed"), pair):
-        return None
+    _check_named(builder, "link", pair, (*path, "fixed"))
     shared = [point for point in builder.names.points_of(pair[0]) if point in builder.names.points_of(pair[1])]
-    point = section.point
-    if point is None:
-        if len(shared) != 1:
-            builder.report(path, f"links {pair[0]!r} and {pair[1]!r} share {len(shared)} points: say which, as 'point'")
-            return None
-        point = shared[0]
-    elif not all(_on_link(builder, link, point, (*path, "point")) for link in pair):
-        return None
+    if section.point is not None:
+        for link in pair:
+            _check_on_link(builder, link, section.point, (*path, "point"))
+    elif len(shared) != 1:
+        message = f"links {pair[0]!r} and {pair[1]!r} share {len(shared)} points: say which, as 'point'"
+        _refuse(builder, path, message)
+    point = section.point or shared[0]
     if section.angle is not None:
         return Fixed(name, pair, point, builder.place(f"{name}.angle", section.angle, "angle"))
-    directions = [builder.link_direction(link) for link in pair]
-    if directions[0] is None or directions[1] is None:
-        lost = pair[0] if directions[0] is None else pair[1]
+    one, other = (builder.link_direction(link) for link in pair)
+    if one is None or other is None:
+        lost = pair[0] if one is None else pair[1]
         message = f"its angle is left out and so measured from the sketch, which does not show how link {lost!r} lies"
-        builder.report(path, message)
-        return None
-    angle = (directions[1] - directions[0]) / builder.units.angle_factor
+        _refuse(builder, path, message)
+    angle = (other - one) / builder.units.angle_factor
     return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle", measured=True))
 
 

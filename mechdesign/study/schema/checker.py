@@ -26,6 +26,7 @@ class Checker:
         self.parameters = parameters
         self.parts = parts
         self.known, self.kind = builder.reporter.known, builder.reporter.kind
+        self.report = builder.reporter.report
 
     def coordinate(
         self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = ()
@@ -37,11 +38,9 @@ class Checker:
         quantity = self.names.coordinates.get(name)
         if quantity is None:
             if name in self.names.owners:
-                self.reporter.report(
-                    path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key
-                )
+                self.report(path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key)
             elif name in self.names.moving:
-                self.reporter.report(path, f"{name!r} is a link; its coordinate is {name}.angle", at_key=at_key)
+                self.report(path, f"{name!r} is a link; its coordinate is {name}.angle", at_key=at_key)
             else:
                 what = "coordinate or parameter" if others else "coordinate"
                 self.known(name, [*self.names.coordinates, *others], what, path, at_key=at_key)
@@ -62,26 +61,26 @@ class Checker:
             if name not in self.names.owners:
                 self.coordinate(name, (*path, index))
             if seen.intersection(parts):
-                self.reporter.report((*path, index), f"{name!r} is listed twice")
+                self.report((*path, index), f"{name!r} is listed twice")
             seen.update(parts)
 
     def load(self, load: tuple[float, ...], path: KeyPath, *, on_pin: bool) -> tuple[float, ...]:
         """A load of the stiffness section's point or link as fx, fy, mz."""
         if len(load) not in ((2, 3) if on_pin else (3,)):
-            self.reporter.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
+            self.report(path, f"a load is [fx, fy, mz], not {len(load)} numbers")
             return 0.0, 0.0, 0.0
         for place, kind in enumerate(("force", "force", "moment")[: len(load)]):
             self.kind((*path, place), kind)
         if on_pin and any(load[2:]):
-            self.reporter.report((*path, 2), NO_MOMENT)
+            self.report((*path, 2), NO_MOMENT)
         return (*load, 0.0)[:3]
 
     def range(self, low: float | None, high: float | None, path: KeyPath) -> None:
         """Check that the end of a range is beyond its beginning."""
         if low is not None and high is not None and high <= low:
-            self.reporter.report((*path, "to"), f"{high:g} is not beyond 'from', {low:g}")
+            self.report((*path, "to"), f"{high:g} is not beyond 'from', {low:g}")
 
     def needs(self, section: str | None, what: str, path: KeyPath) -> None:
         """Check that the study has a section that something cannot do without."""
         if section is not None and self.reporter.raw((section,)) is None:
-            self.reporter.report(path, f"{what} needs the {section} section, and the study has none")
+            self.report(path, f"{what} needs the {section} section, and the study has none")

@@ -130,7 +130,7 @@ class OptimizeSection(fields.Model):
 def check(checker: Checker, section: OptimizeSection) -> None:
     """Check the variables of an optimisation, its method, and the results that its goals name."""
     root: KeyPath = ("optimize",)
-    report = checker.reporter.report
+    report = checker.report
     if not section.variables:
         report((*root, "variables"), "an optimisation needs at least one variable")
     if not section.maximize and not section.minimize:

@@ -88,7 +88,7 @@ class MotionSection(PoseSection):
 def check(checker: Checker, command: str, section: PoseSection) -> None:
     """Check the names and units of the coordinates that poses give, and of rates and accelerations at them."""
     if section.at_nodes and checker.reporter.raw(("workspace",)) is None:
-        checker.reporter.report((command, "poses"), "needs the workspace section, whose nodes are meant")
+        checker.report((command, "poses"), "needs the workspace section, whose nodes are meant")
     for index, pose in enumerate(section.poses or ()):
         checker.coordinates(pose, (command, "poses", index))
     checker.coordinates(section.sweep or (), (command, "sweep"))
@@ -98,7 +98,7 @@ def check(checker: Checker, command: str, section: PoseSection) -> None:
         place: KeyPath = (command, "path", name)
         if checker.coordinate(name, place, at_key=True) is not None and (given.spline or given.shape is not None):
             what = "spline" if given.spline else f"{given.shape}"
-            checker.reporter.report(place, f"{name!r} is no point: a {what} is the path of a point", at_key=True)
+            checker.report(place, f"{name!r} is no point: a {what} is the path of a point", at_key=True)
     if isinstance(section, MotionSection):
         checker.coordinates(section.rates, (command, "rates"), 1)
         checker.coordinates(section.accelerations, (command, "accelerations"), 2)
@@ -130,37 +130,37 @@ def _rates(checker: Checker, command: str, section: MotionSection) -> None:
                 message += f", or of all that the poses give, {', '.join(sorted(one))}"
             elif len(given) > 1:
                 message += " where poses give different coordinates"
-            checker.reporter.report((command, key, name), message, at_key=True)
+            checker.report((command, key, name), message, at_key=True)
         missing = sorted(one - set(values)) if of_given and values else []
         if missing:
             message = f"{', '.join(missing)} missing: {key} are those of all coordinates that the poses give"
-            checker.reporter.report((command, key), message, at_key=True)
+            checker.report((command, key), message, at_key=True)
         if values and not of_given and len(drives) > 1 and one and not one <= set(drives) and _moves(source):
             others = ", ".join(sorted(one))
             message = (
                 f"rates of drives that do not change are not those of this motion, which {others} give: say 'speed', "
                 f"of a point along its path, or the {key} of {others}; those of the drives follow from them"
             )
-            checker.reporter.report((command, key), message, at_key=True)
+            checker.report((command, key), message, at_key=True)
 
 
 def _speed(checker: Checker, command: str, section: MotionSection) -> None:
     for key in ("rates", "accelerations"):
         if getattr(section, key):
-            checker.reporter.report(
+            checker.report(
                 (command, key), f"'speed' and {key!r} are both given; a path is passed at one of them", at_key=True
             )
     path = _source(checker, section).path
     if path is None:
         message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"
-        checker.reporter.report((command, "speed"), message, at_key=True)
+        checker.report((command, "speed"), message, at_key=True)
         return
     points = [name for name in path if name in checker.names.owners]
     points += [n[:-2] for n in path if n.endswith(".x") and f"{n[:-2]}.y" in path and n[:-2] not in points]
     if len(points) != 1:
         which = " and ".join(points) or "no point"
         message = f"a speed is that of one point along its path, and this path is that of {which}; give 'rates' instead"
-        checker.reporter.report((command, "speed"), message, at_key=True)
+        checker.report((command, "speed"), message, at_key=True)
 
 
 def _source(checker: Checker, section: PoseSection) -> PoseSection:

@@ -7,23 +7,13 @@ from typing import Annotated, Any, NamedTuple, Protocol
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.numbers import Context, failure, read_number, shown
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
 PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")
-METHODS = (
-    "analytic",
-    "second_order",
-    "monte_carlo",
-    "quasi_monte_carlo",
-    "form",
-    "importance_sampling",
-    "auto",
-)
-# Those that solve made mechanisms at random.
-SAMPLING = frozenset(("monte_carlo", "quasi_monte_carlo", "importance_sampling", "auto"))
 DEFAULT_METHODS = ("analytic", "monte_carlo")
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}

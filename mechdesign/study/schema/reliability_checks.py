@@ -29,7 +29,7 @@ _ROUNDING = 1e-9
 
 def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
     """Note what is wrong; returns the section with wildcards and the clearances' links filled in."""
-    meant = _said(checker, section)
+    meant = _links_of_points(checker, section)
     dimensions = _dimensions(checker, section)
     clearances = {
         point: found
@@ -44,19 +44,19 @@ def check(checker: Checker, section: ReliabilitySection) -> ReliabilitySection:
     pairs = [frozenset(pair[:2]) for pair in section.correlation]
     for index, pair in enumerate(pairs):
         if pair in pairs[:index]:
-            checker.reporter.report(("reliability", "correlation", index), "this pair is given twice")
+            checker.report(("reliability", "correlation", index), "this pair is given twice")
     if not section.methods:
-        checker.reporter.report(("reliability", "methods"), "name at least one method")
+        checker.report(("reliability", "methods"), "name at least one method")
     for index, method in enumerate(section.methods):
         if method in section.methods[:index]:
-            checker.reporter.report(("reliability", "methods", index), f"{method!r} is given twice")
+            checker.report(("reliability", "methods", index), f"{method!r} is given twice")
     if section.allocate is not None:
         _allocate(checker, section, dimensions, clearances)
     load = _load(checker, section, dimensions)
     plain = {name: split_link(checker.names, name)[1] for name in (*(section.outputs or ()), *section.limits)}
     limits = {plain[name]: limit for name, limit in section.limits.items()}
     if len(limits) < len(section.limits):
-        checker.reporter.report(("reliability", "limits"), "the same error is limited twice")
+        checker.report(("reliability", "limits"), "the same error is limited twice")
     outputs = None if section.outputs is None else tuple(plain[name] for name in section.outputs)
     checker.outputs(outputs, ("reliability", "outputs"))
     return section.model_copy(
@@ -81,7 +81,7 @@ def split_link(names: Names, name: str) -> tuple[str, str, str]:
     return link, rest, point
 
 
-def _said(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
+def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
     """The link that outputs and limits mean by each point, where they say; what contradicts itself is noted."""
     found: dict[str, str] = {}
     given: list[tuple[KeyPath, str, bool]] = [
@@ -95,17 +95,17 @@ def _said(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
         links = checker.names.owners[point]
         if link not in links:
             message = f"link {link!r} has no point {point!r}; it belongs to {' and '.join(links)}"
-            checker.reporter.report(path, message, at_key=at_key)
+            checker.report(path, message, at_key=at_key)
         elif found.setdefault(point, link) != link:
             message = f"{point!r} is that of link {found[point]!r} elsewhere; all outputs and limits mean one of them"
-            checker.reporter.report(path, message, at_key=at_key)
+            checker.report(path, message, at_key=at_key)
         own = section.clearances.get(point)
         if own is not None and link in links and (own.link == link or len(links) < 2):
             message = (
                 f"the clearance of {point!r} moves its pin in link {link!r}, and the coordinates of {point!r} are "
                 "those of what else it joins; give reliability.clearances another 'link', or none"
             )
-            checker.reporter.report(path, message, at_key=at_key)
+            checker.report(path, message, at_key=at_key)
     return found
 
 
@@ -117,7 +117,7 @@ def _carrier(links: list[str], meant: str | None) -> str:
 def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension]) -> tuple[float, ...] | None:
     """The load as fx, fy, mz."""
     path: KeyPath = ("reliability", "load")
-    report, stiffness = checker.reporter.report, checker.parts.get("stiffness")
+    report, stiffness = checker.report, checker.parts.get("stiffness")
     random = [name for name in LOADS if name in dimensions]
     if checker.reporter.raw(("stiffness",)) is None:
         missing = "a load acts at the point of the stiffness section, and the study has none"
@@ -140,11 +140,11 @@ def _allocate(
         checker.known(name, known, "dimension or clearance that varies,", ("reliability", "allocate", "cost", name),
                       at_key=True)  # fmt: skip
     if not section.limits:
-        checker.reporter.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
+        checker.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
     wide = [name for name, dimension in dimensions.items() if name not in LOADS and _varies(dimension)]
     if not wide and not section.allocate.cost:
         message = "nothing to allocate: no dimension has a tolerance, and a clearance is held unless 'cost' names it"
-        checker.reporter.report(("reliability", "allocate"), message)
+        checker.report(("reliability", "allocate"), message)
 
 
 def _varies(dimension: Dimension) -> bool:
@@ -228,7 +228,7 @@ def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath)
     if dimension.distribution == "lognormal":
         nominal = checker.parameters.nominal.get(name)
         if name in checker.names.drives or name in LOADS or (nominal is not None and nominal <= 0):
-            checker.reporter.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
+            checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
     if name in checker.parameters.nominal:
         return
     if name in LOADS:

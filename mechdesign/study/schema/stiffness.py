@@ -123,12 +123,12 @@ def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
     root: KeyPath = ("stiffness",)
     right = checker.known(section.at, checker.names.owners, "point", (*root, "at"))
     if right and section.link is None and GROUND in checker.names.owners[section.at]:
-        checker.reporter.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
+        checker.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
     if section.link is not None and checker.known(section.link, checker.names.moving, "moving link", (*root, "link")):
         points = checker.names.points_of(section.link)
         if right and section.at not in points:
             message = f"link {section.link!r} has no point {section.at!r}; it has {', '.join(points)}"
-            checker.reporter.report((*root, "at"), message)
+            checker.report((*root, "at"), message)
     for link, profile in section.elastic.items():
         path: KeyPath = (*root, "elastic", link)
         checker.known(link, checker.names.moving, "moving link", path, at_key=True)
@@ -153,7 +153,7 @@ def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
         if bearing.moment is not None:
             checker.kind((*path, "moment"), "rotational_stiffness")
             if joint not in slides:
-                checker.reporter.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
+                checker.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
     loads = [
         checker.load(load, (*root, "loads", index), on_pin=section.link is None)
         for index, load in enumerate(section.loads)

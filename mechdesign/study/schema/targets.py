@@ -66,7 +66,7 @@ def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) 
             continue
         coordinates = (f"{owner}.x", f"{owner}.y") if point else (owner,)
         for name in [name for name in coordinates if name in seen][:1]:
-            checker.reporter.report(path, f"{name} has a target already, by {seen[name]!r}", at_key=True)
+            checker.report(path, f"{name} has a target already, by {seen[name]!r}", at_key=True)
         seen.update(dict.fromkeys(coordinates, owner))
         quantity = "length" if point else checker.names.coordinates[owner]
         if value.expression is None:
@@ -84,12 +84,12 @@ def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, 
     """Whether the target of a coordinate is an expression over others."""
     if point:
         message = f"the target of a point is a path; give {owner}.x and {owner}.y their expressions"
-        checker.reporter.report(path, message)
+        checker.report(path, message)
         return False
     right = True
     for name in sorted(expression.names):
         if name == owner:
-            checker.reporter.report(path, f"{owner!r} is what the target is for: it cannot depend on it")
+            checker.report(path, f"{owner!r} is what the target is for: it cannot depend on it")
             right = False
         elif name not in checker.parameters.nominal:
             right &= checker.coordinate(name, path, others=checker.parameters.nominal) is not None
@@ -103,12 +103,12 @@ def _table(
     try:
         table = np.array(value.rows) if value.file is None else read_table(folder / value.file, most=3)
     except StudyError as error:
-        checker.reporter.report(path, str(error))
+        checker.report(path, str(error))
         return None
     columns = table.shape[1]
     if columns not in (count, count + 1):
         what = "[x, y] or [drive, x, y]" if count == 2 else "[value] or [drive, value]"
-        checker.reporter.report(path, f"a row of the target of {owner!r} is {what}, not {columns} numbers")
+        checker.report(path, f"a row of the target of {owner!r} is {what}, not {columns} numbers")
         return None
     if value.file is None and quantity != "none":
         for index, place in np.ndindex(len(table), count):
@@ -118,7 +118,7 @@ def _table(
     table = table[np.argsort(table[:, 0], kind="stable")]
     same = np.flatnonzero(np.diff(table[:, 0]) == 0)
     if len(same):
-        checker.reporter.report(path, f"the drive's value {table[same[0], 0]:g} stands in two rows")
+        checker.report(path, f"the drive's value {table[same[0], 0]:g} stands in two rows")
         return None
     return table
 

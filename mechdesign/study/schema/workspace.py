@@ -100,15 +100,15 @@ def check(checker: Checker, section: WorkspaceSection) -> None:
     checker.coordinates(section.at, (*root, "at"))
     ranges = [name for name, values in section.at.items() if isinstance(values, Over)]
     if len(ranges) > 1:
-        checker.reporter.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
+        checker.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
     for name, values in section.at.items():
         if isinstance(values, Over):
             checker.range(values.from_, values.to, (*root, "at", name))
         elif not values:
-            checker.reporter.report((*root, "at", name), "an empty list of values")
+            checker.report((*root, "at", name), "an empty list of values")
     for index, name in enumerate(section.indices or ()):
         checker.needs(NEEDED.get(name), f"the index {name!r}", (*root, "indices", index))
     scan = section.scan
     if (scan.from_ is None) != (scan.to is None):
-        checker.reporter.report((*root, "scan"), "'from' and 'to' belong together")
+        checker.report((*root, "scan"), "'from' and 'to' belong together")
     checker.range(scan.from_, scan.to, (*root, "scan"))

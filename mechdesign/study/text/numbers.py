@@ -84,42 +84,32 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Study
     """
     if isinstance(raw, StudyNumber):
         return raw
-    value = _read(raw, context, kind)
-    largest = LONGEST if kind == "length" else LARGEST
+    if isinstance(raw, bool) or not isinstance(raw, int | float | str):
+        raise failure(f"expected a number, not {shown(raw)}")
+    try:
+        value = _read_text(raw, context, kind) if isinstance(raw, str) else StudyNumber(float(raw))
+    except (QuantityError, ExpressionError) as error:
+        raise failure(str(error)) from None
+    except OverflowError:
+        raise failure("too large a number") from None
+    if not isinstance(raw, str) and not math.isfinite(value.nominal):
+        raise failure(f"expected a finite number, not {value.nominal:g}")
+    largest, what = (LONGEST, "length") if kind == "length" else (LARGEST, "number")
     if abs(value.nominal) > largest:
-        what = "length" if kind == "length" else "number"
         raise failure(f"{shown(raw)} is too large a {what}: none is beyond {largest:g}; choose a larger unit")
     return value
 
 
-def _read(raw: object, context: Context, kind: str | None) -> StudyNumber:
-    if isinstance(raw, bool) or not isinstance(raw, int | float | str):
-        raise failure(f"expected a number, not {shown(raw)}")
-    if isinstance(raw, str):
-        return _read_text(raw, context, kind)
-    try:
-        number = float(raw)
-    except OverflowError:
-        raise failure("too large a number") from None
-    if not math.isfinite(number):
-        raise failure(f"expected a finite number, not {number:g}")
-    return StudyNumber(number)
-
-
 def _read_text(text: str, context: Context, kind: str | None) -> StudyNumber:
-    try:
-        if QUANTITY.fullmatch(text):
-            number = context.units.convert(text, kind)
-            if not math.isfinite(number):
-                raise failure(f"{text!r} is too large a number")
-            return StudyNumber(number)
-        expression = context.expression(text)
-        for name in sorted(expression.names - set(context.parameters)):
-            raise failure(f"unknown name {name!r} in {shown(text)}{_known_names(name, context)}")
-        result = expression.evaluate(context.parameters)
-        return StudyNumber(float(result), expression if expression.names else None)
-    except (QuantityError, ExpressionError) as error:
-        raise failure(str(error)) from None
+    if QUANTITY.fullmatch(text):
+        number = context.units.convert(text, kind)
+        if not math.isfinite(number):
+            raise failure(f"{text!r} is too large a number")
+        return StudyNumber(number)
+    expression = context.expression(text)
+    for name in sorted(expression.names - set(context.parameters)):
+        raise failure(f"unknown name {name!r} in {shown(text)}{_known_names(name, context)}")
+    return StudyNumber(float(expression.evaluate(context.parameters)), expression if expression.names else None)
 
 
 def read_expression(raw: object, context: Context) -> Expression:

@@ -137,7 +137,7 @@ class Reporter:
                 found.append(segment)
                 data = data[segment]
             elif data is None or not found:
-                # Of a section that is empty, or missing, nothing is written, and no short form leaves anything out.
+                # An empty or missing section has no short forms.
                 return (*found, segment, *remaining)
             elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
                 found.append(LIST_FORM[str(segment)])

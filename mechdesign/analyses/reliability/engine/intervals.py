@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import betaincinv, gammaincinv, stdtrit
+from scipy.special import betaincinv, gammaincinv
 
 from mechdesign.analyses.reliability.engine.precision import CONFIDENCE
 from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.statistics import student
 
 
 def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -47,11 +48,6 @@ def _gamma(mean: float, variance: float, share: float) -> float:
 def replicated(means: Floats) -> tuple[float, float]:
     """Student's interval of the mean of independent estimates."""
     count = len(means)
-    half = -stdtrit(count - 1, 0.5 * (1.0 - CONFIDENCE)) * float(np.std(means, ddof=1)) / np.sqrt(count)
+    half = student(count - 1, CONFIDENCE) * float(np.std(means, ddof=1)) / float(np.sqrt(count))
     mean = float(np.mean(means))
-    return max(mean - float(half), 0.0), min(mean + float(half), 1.0)
-
-
-def simulation_error(failure: float, samples: int) -> float:
-    """Error of a simulated reliability at 99.7 %, three standard errors [S2, eq. 16]."""
-    return 3.0 * float(np.sqrt(failure * (1.0 - failure) / samples))
+    return max(mean - half, 0.0), min(mean + half, 1.0)

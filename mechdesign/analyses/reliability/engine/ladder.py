@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.design_points import find
-from mechdesign.analyses.reliability.engine.form import form
-from mechdesign.analyses.reliability.engine.importance import importance_sampling
+from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
 from mechdesign.analyses.reliability.engine.precision import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 
@@ -17,6 +15,9 @@ from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 PILOT, FEW = 4000, 40_000
 # So many failures tell their probability well enough to plan by.
 MANY = 30
+# A step beyond plain samples: from the problem, its design points, a generator, the most samples and the precision.
+# None says nothing; an estimate without samples claims no interval, and checks those that do.
+Rung = Callable[[Problem, DesignPoints, np.random.Generator, int, Precision], Estimate | None]
 # Two methods disagree where their intervals are farther apart than this factor.
 FACTOR = 1.5
 
@@ -25,6 +26,7 @@ def climb(
     problem: Problem,
     precision: Precision,
     plain: Callable[[int], Estimate],
+    rungs: Mapping[str, Rung],
     rng: np.random.Generator,
     most: int,
     most_plain: int,
@@ -35,6 +37,8 @@ def climb(
     ----------
     plain : callable
         Monte Carlo with so many samples all told; keeps what it has drawn before.
+    rungs : mapping of str to Rung
+        The methods that are tried in this order where plain samples do not do.
     most, most_plain : int
         Samples that are drawn at most by any method, and by Monte Carlo.
 
@@ -44,14 +48,14 @@ def climb(
         Its evaluations are those of all rungs.
     used : str
         The method that it comes from.
-    rungs : dict of str to Estimate
+    said : dict of str to Estimate
         What each method that was tried says.
     """
-    rungs = {"monte_carlo": plain(min(PILOT, most, most_plain))}
+    said = {"monte_carlo": plain(min(PILOT, most, most_plain))}
 
     def plainly(count: float) -> Estimate:
-        rungs["monte_carlo"] = plain(int(min(most, most_plain, max(count, PILOT))))
-        return rungs["monte_carlo"]
+        said["monte_carlo"] = plain(int(min(most, most_plain, max(count, PILOT))))
+        return said["monte_carlo"]
 
     def precise(estimate: Estimate) -> bool:
         return precision.reached(estimate.failure, estimate.low, estimate.high)
@@ -61,24 +65,29 @@ def climb(
         share = estimate.failure if estimate.failures >= MANY else estimate.high
         return 1.1 * precision.needed(share, share * (1.0 - share))
 
-    found, used = rungs["monte_carlo"], "monte_carlo"
+    found, used = said["monte_carlo"], "monte_carlo"
     if not precise(found) and enough(found) <= FEW:
         found = plainly(enough(found))
     if not precise(found):
         points = find(problem, rng)
-        if not len(problem.circles):
-            # The mean of tangents over directions costs more than what it checks.
-            rungs["form"] = form(problem, points)
-        sampled = importance_sampling(problem, points, rng, most, precision)
-        rungs["importance_sampling"] = sampled
-        # Plain samples see every failure: what they exclude has missed some of them.
-        missed = not sampled.failures or sampled.high < found.low
-        if missed or not precise(sampled):
+        candidates: dict[str, Estimate] = {}
+        for name, rung in rungs.items():
+            tried = rung(problem, points, rng, most, precision)
+            if tried is None:
+                continue
+            said[name] = tried
+            # Plain samples see every failure: what they exclude has missed some of them.
+            if tried.failures and tried.high >= found.low:
+                candidates[name] = tried
+                if precise(tried):
+                    break
+        if not any(map(precise, candidates.values())):
             found = plainly(enough(found) if found.failures >= MANY else np.inf)
-        if not missed and (precise(sampled) or sampled.high - sampled.low < found.high - found.low):
-            found, used = sampled, "importance_sampling"
-    total = problem.evaluations + rungs["monte_carlo"].evaluations
-    return replace(found, evaluations=total), used, rungs
+        for name, tried in candidates.items():
+            if precise(tried) or tried.high - tried.low < found.high - found.low:
+                found, used = tried, name
+    total = problem.evaluations + said["monte_carlo"].evaluations
+    return replace(found, evaluations=total), used, said
 
 
 def disagree(one: Estimate, other: Estimate) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.intervals import binomial, replicated
-from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Problem, failed
+from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate
 from mechdesign.numerics.arrays import Floats
 
 REPLICATES = 16
@@ -35,18 +35,6 @@ def points(dimension: int, count: int, seed: int) -> Iterator[Floats]:
     for begin in range(0, count, BLOCK):
         # The scrambling leaves points at 0 a chance of one in 2^30.
         yield ndtri(np.clip(sequence.random(min(BLOCK, count - begin)), 2.0**-32, 1 - 2.0**-32)).T
-
-
-def quasi_monte_carlo(problem: Problem, seed: int, samples: int) -> Estimate:
-    """Probability of failure; `seed` names the scramblings."""
-    counts, broken, invalid = replicates(samples), [], 0
-    for k, count in enumerate(counts):
-        broken.append(0)
-        for u in points(problem.dimension, count, seed + k):
-            margins = problem.margins(u)
-            broken[-1] += int(failed(margins).sum())
-            invalid += int(np.isnan(margins).any(axis=0).sum())
-    return estimate(broken, counts[0], invalid)
 
 
 def estimate(broken: Sequence[int], count: int, invalid: int) -> Estimate:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elasticity, elasticity
 from mechdesign.analyses.reliability.error_limits import Channel
-from mechdesign.analyses.reliability.first_order import Rates, linear_errors
+from mechdesign.analyses.reliability.first_order import linear_errors
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.workspace.indices.assembled import assembled_only
 from mechdesign.analyses.workspace.indices.index import Evaluate, Index
@@ -19,7 +20,7 @@ from mechdesign.numerics.arrays import Floats
 if TYPE_CHECKING:
     from mechdesign.study import Study
 
-STILL = Rates((), ())
+STILL = DriveRates((), ())
 
 
 def prepare(study: Study) -> Evaluate:

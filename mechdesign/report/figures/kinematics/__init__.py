@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures.kinematics.curves import curves_figure
 from mechdesign.report.figures.kinematics.modes import modes_figure
 from mechdesign.report.figures.kinematics.paths import paths_figure
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.sweep import is_motion, solve_sweep
+from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Result
 from mechdesign.study import Study
 
@@ -20,14 +19,14 @@ def figures(study: Study, result: Result) -> Gallery:
     Lists and grids of poses have neither curves nor paths.
     """
     found = Gallery()
-    if is_motion(study_poses(study, "kinematics")):
+    if result.drawn["poses"].motion:
         found.add("motion", curves_figure, study, result)
-        found.add("paths", _paths, study)
+        found.add("paths", _paths, result)
     if "modes" in result.tables:
-        found.add("modes", modes_figure, study)
+        found.add("modes", modes_figure, study, result)
     return found
 
 
-def _paths(study: Study) -> Figure | None:
-    sweep = solve_sweep(study)
+def _paths(result: Result) -> Figure | None:
+    sweep = Sweep.of(result.drawn["motion"])
     return paths_figure(sweep) if len(sweep.valid) else None

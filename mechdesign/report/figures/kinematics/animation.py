@@ -15,27 +15,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import framed
+from mechdesign.report.figures.framing import TITLE, framed
 from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
-from mechdesign.report.figures.sweep import Sweep, is_motion, solve_sweep
-from mechdesign.study import Study
+from mechdesign.report.figures.sweep import Sweep
+from mechdesign.results import Result
 
 FRAMES = 72
 _COLORS, _WHITE = 128, 244
-_TITLE = 0.36  # inches above the drawing, for the pose in words
 _CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and of a frame
 _DPI = 100  # 800 pixels wide
 
 
-def animation(study: Study) -> bytes:
+def animation(result: Result) -> bytes:
     """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
-    if not is_motion(study_poses(study, "kinematics")):
-        return b""
-    sweep = solve_sweep(study)
-    return gif(sweep) if len(sweep.valid) else b""
+    sweep = Sweep.of(result.drawn["motion"])
+    return gif(sweep) if sweep.poses.motion and len(sweep.valid) else b""
 
 
 def gif(sweep: Sweep) -> bytes:
@@ -47,7 +43,7 @@ def gif(sweep: Sweep) -> bytes:
     # A closed motion begins again with its last pose; another shows its inner poses twice.
     most = FRAMES + 1 if closed else FRAMES // 2 + 1
     some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
-    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST, above=_TITLE)
+    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST, above=TITLE)
     figure.set_dpi(_DPI)
     draw_paths(axes, sweep)
     pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)

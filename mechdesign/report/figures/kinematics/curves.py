@@ -14,7 +14,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from mechdesign.analyses.poses import study_poses
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.sweep import ranks
@@ -53,7 +52,7 @@ class _Curve:
 def curves_figure(study: Study, result: Result) -> Figure | None:
     """Every output over the swept coordinate, or along the path; None where nothing changes."""
     table = result.tables["motion"]
-    poses = study_poses(study, "kinematics")
+    poses = result.drawn["poses"]
     moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
     if not moving:
         return None

@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import study_poses
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
@@ -63,7 +62,7 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
             for point in link_points(link):
                 owners.setdefault(point, name)
     for point, path in sweep.places.items():
-        if sweep.closed and study_poses(sweep.study, "kinematics").closed:
+        if sweep.closed and sweep.poses.closed:
             # A closed path is listed without its begin at its end.
             path = np.append(path, path[0])
         line, share = _LOOKS[min(ranked[point] + lift, 2)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from mechdesign.report.figures.optimize.designs import designs_of
 from mechdesign.report.figures.optimize.fronts import front_figure
 from mechdesign.report.figures.optimize.optimum import optimum_figure
@@ -11,9 +9,7 @@ from mechdesign.report.figures.optimize.parallel import convergence, parallel_ax
 from mechdesign.report.figures.optimize.scores import goal_maps, score_curves, score_surface
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 # A map of fewer designs is no map.
 FEWEST = 9
@@ -36,5 +32,5 @@ def figures(study: Study, result: Result) -> Gallery:
         found.add("pareto", front_figure, designs, result.tables["pareto"])
     if study.optimize.method == "search":
         found.add("convergence", convergence, designs)
-    found.add("optimum", optimum_figure, study, designs)
+    found.add("optimum", optimum_figure, result, designs)
     return found

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign.analyses.optimize.designs import normalised
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.results import Result, Table
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +44,7 @@ class Designs:
 
     def share(self, goal: str) -> Floats:
         """A goal as a fraction of its range over the feasible designs, 1 the best; nan for the others."""
-        values = self[goal]
-        low, high = values[self.feasible].min(), values[self.feasible].max()
-        share = (values - low) / (high - low) if high > low else np.zeros_like(values)
-        return np.where(self.feasible, 1 - share if self.goals[goal] and high > low else share, np.nan)
+        return normalised(self[goal], self.feasible, smallest=self.goals[goal])
 
     def score(self, row: int) -> Floats:
         """Weighted sum of the goals' shares, with the weights of a row of the table of optima."""

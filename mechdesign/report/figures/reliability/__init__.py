@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.analyses.poses import pose_in_words, study_poses
+from mechdesign.analyses.poses import pose_in_words
 from mechdesign.report.figures.panels import along
 from mechdesign.report.figures.planes import plane
 from mechdesign.report.figures.reliability.allocation import allocation_figure
@@ -23,7 +23,7 @@ from mechdesign.study.poses import Poses
 
 def figures(study: Study, result: Result) -> Gallery:
     """Whatever the result holds enough of to draw."""
-    poses, tables = study_poses(study, "reliability"), result.tables
+    poses, tables = result.drawn["poses"], result.tables
     swept, over = along(study, poses), plane(study, poses, study.reliability)
     found = Gallery()
     if swept is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +13,7 @@ from mechdesign.numerics.arrays import Flags
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
+from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
 
 SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
@@ -24,7 +26,7 @@ class Look:
     words: str
     color: str
     marker: str
-    dashes: Literal["-", "--", ":", ""]
+    dashes: Literal["-", "--", ":", "-.", ""]
 
     @property
     def simulated(self) -> bool:
@@ -32,19 +34,21 @@ class Look:
         return self.dashes == ""
 
 
-# Vermilion is left to limits.
-LOOKS = {
-    "analytic": Look("first order", style.BLUE, "D", "-"),
-    "second_order": Look("second order", style.SKY, "s", "--"),
-    "form": Look("FORM", style.GREEN, "P", ":"),
-    "monte_carlo": Look("Monte Carlo", style.INK, "o", ""),
-    "quasi_monte_carlo": Look("quasi Monte Carlo", style.FAINT, "^", ""),
-    "importance_sampling": Look("importance sampling", style.PURPLE, "X", ""),
-    "auto": Look("auto", style.ORANGE, "*", ""),
-}
-# What is nearest to the truth, the best first: of probabilities, and of moments (which auto takes from fewer samples).
-_PROBABILITIES = ("auto", "importance_sampling", "quasi_monte_carlo", "monte_carlo", "second_order", "form", "analytic")
-_MOMENTS = ("quasi_monte_carlo", "monte_carlo", "auto", "second_order", "analytic")
+class _Looks(Mapping[str, Look]):
+    """By the names of methods, in the order in which they are drawn: what is computed below what is sampled."""
+
+    def __getitem__(self, name: str) -> Look:
+        method = METHODS[name]
+        return Look(method.words, getattr(style, method.color), method.marker, "" if method.sampled else method.dashes)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(METHODS, key=lambda name: METHODS[name].sampled))
+
+    def __len__(self) -> int:
+        return len(METHODS)
+
+
+LOOKS = _Looks()
 
 
 def methods(table: Table) -> list[str]:
@@ -55,12 +59,17 @@ def methods(table: Table) -> list[str]:
 
 def best_probability(table: Table) -> str:
     """The method whose probabilities stand where there is room for one only."""
-    return next(method for method in _PROBABILITIES if method in methods(table))
+    return max(methods(table), key=lambda name: METHODS[name].accuracy)
 
 
 def best_moments(table: Table) -> str:
-    """The method whose moments stand where there is room for one only."""
-    return next(method for method in _MOMENTS if method in methods(table))
+    """The method whose moments stand where there is room for one only; those that end early have fewer samples."""
+
+    def rank(name: str) -> tuple[bool, bool, int]:
+        method = METHODS[name]
+        return method.errors, not method.precise, method.accuracy
+
+    return max(methods(table), key=rank)
 
 
 def select(table: Table, **chosen: str) -> Flags:

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import pose_in_words, study_poses
-from mechdesign.analyses.stiffness.analysis import ask, evaluate
-from mechdesign.mechanism import Configuration
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.report.figures import style
 from mechdesign.report.figures.annotations import name_labels, obstacles
 from mechdesign.report.figures.drawing import draw_mechanism, link_colors
-from mechdesign.report.figures.framing import equal_canvas
+from mechdesign.report.figures.framing import TALLEST, TITLE, framed
 from mechdesign.report.figures.labels import place_labels
+from mechdesign.report.figures.panels import along
 from mechdesign.report.figures.planes import Plane, map_sheet, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, pose
-from mechdesign.report.figures.stiffness.deflected import deflections, first_pose, free_motion
+from mechdesign.report.figures.stiffness.deflected import deflections, free_motion
 from mechdesign.report.figures.stiffness.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
 from mechdesign.results import Result
-from mechdesign.study import Study
+from mechdesign.study import Poses, Study
 
 MOST_DIRECTIONS = 4
 _COIL = 0.17  # length of a coil over the size of the mechanism
@@ -28,11 +28,13 @@ _COIL = 0.17  # length of a coil over the size of the mechanism
 def figures(study: Study, result: Result) -> Gallery:
     """``springs`` (first pose), ``directions`` (a few poses), and over many poses ``stiffness``, curves or a map."""
     found = Gallery()
-    found.add("springs", _springs, study)
-    found.add("deflections", deflections, study)
-    found.add("free", free_motion, study, result)
+    drawn, poses = result.drawn, result.drawn["poses"]
+    if "first" in drawn:
+        found.add("springs", _springs, study, poses, drawn["first"])
+        found.add("deflections", deflections, study, poses, drawn["first"])
+    if "loose" in drawn:
+        found.add("free", free_motion, study, result, drawn["loose"])
     found.add("directions", _directions, study, result)
-    poses = study_poses(study, "stiffness")
     if not poses.listed and poses.count > 2:
         over = plane(study, poses, study.stiffness)
         if over is not None:
@@ -42,19 +44,15 @@ def figures(study: Study, result: Result) -> Gallery:
     return found
 
 
-def _springs(study: Study) -> Figure | None:
-    found = first_pose(study)
-    if found is None:
-        return None
-    configuration, row = found
-    scene = pose(study.mechanism, configuration)
-    coils = _coils(study, configuration, scene) if scene is not None else []
+def _springs(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
+    scene = pose(study.mechanism, drawn.configuration)
+    coils = _coils(study, drawn, scene) if scene is not None else []
     if scene is None or not coils:
         return None
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
-    figure, axes = equal_canvas(places, study.units.label("length"))
-    axes.set_title(f"equivalent springs at {pose_in_words(study, study_poses(study, 'stiffness'), row)}", loc="left")
-    draw_mechanism(axes, study.mechanism, configuration, labels=False, drives=False)
+    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
+    axes.set_title(f"equivalent springs at {pose_in_words(study, poses, drawn.row)}", loc="left")
+    draw_mechanism(axes, study.mechanism, drawn.configuration, labels=False, drives=False)
     draw_coils(axes, coils)
     points = [label for label in name_labels(scene, link_colors(study.mechanism), (), style.INK) if not label.italic]
     blocked = np.concatenate([obstacles(axes, scene, (), {}), coil_obstacles(axes, coils)])
@@ -62,26 +60,22 @@ def _springs(study: Study) -> Figure | None:
     return figure
 
 
-def _coils(study: Study, configuration: Configuration, scene: Scene) -> list[Coil]:
-    asked = ask(study)
-    if asked.legs is None:
-        return []
-    _, springs, _ = evaluate(asked, configuration)
-    length = _COIL * scene.span
+def _coils(study: Study, drawn: Drawn, scene: Scene) -> list[Coil]:
+    legs, length = drawn.body.legs or (), _COIL * scene.span
     coils = []
-    for spring in springs:
-        leg, angle = asked.legs[int(spring.leg[0])], float(spring.angle[0])
+    for spring in drawn.springs:
+        leg, angle = legs[int(spring.leg[0])], float(spring.angle[0])
         if np.isnan(angle):
             continue
         place, along = complex(spring.place[0]), complex(np.exp(1j * angle))
-        base, tip = (complex(configuration.point(point)[0]) for point in (leg.base, leg.tip))
+        base, tip = scene.points[leg.base], scene.points[leg.tip]
         inward = ((base - place) * along.conjugate()).real
         grounded = abs(inward) > length and abs(base - place - inward * along) < 1e-6 * scene.span
         if grounded:
             anchor = base
         else:
             # Its line passes the leg's base: away from the body.
-            body = complex(configuration.point(asked.section.at)[0])
+            body = scene.points[drawn.body.section.at]
             anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
         text = quantity(float(spring.stiffness[0]), study.units.label("stiffness"))
         coils.append(Coil(text, place, anchor, tip, length, grounded))
@@ -95,7 +89,7 @@ def _directions(study: Study, result: Result) -> Figure | None:
     if not len(known):
         return None
     rows = known[np.unique(np.linspace(0, len(known) - 1, MOST_DIRECTIONS).astype(int))]
-    unit, poses, factor = study.units.label("stiffness"), study_poses(study, "stiffness"), study.units.angle_factor
+    unit, poses, factor = study.units.label("stiffness"), result.drawn["poses"], study.units.angle_factor
     figure = style.new_figure(style.WIDTH, 4.2)
     axes = figure.add_subplot()
     for k, row in enumerate(rows):
@@ -121,9 +115,9 @@ def _directions(study: Study, result: Result) -> Figure | None:
 
 def _curves(study: Study, result: Result) -> Figure | None:
     """Stiffnesses to a force and to a moment along a path; what is rigid or free everywhere has no curve."""
-    table, poses, units = result.tables["stiffness"], study_poses(study, "stiffness"), study.units
-    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
-    along = poses.values[moving[0]] if len(moving) == 1 else np.arange(poses.count)
+    table, poses, units = result.tables["stiffness"], result.drawn["poses"], study.units
+    over = along(study, poses)
+    assert over is not None
     forces = {"k_x": ("-", None), "k_y": ("-", None), "k_min": ("--", style.INK), "k_max": (":", style.INK)}
     panels = [
         (about, kind, looks)
@@ -140,13 +134,11 @@ def _curves(study: Study, result: Result) -> Figure | None:
     for axis, (about, kind, looks) in zip(axes, panels, strict=True):
         for name, (look, color) in looks.items():
             values = np.where(np.isfinite(table[name]), table[name], np.nan)
-            axis.plot(along, values, look, label=name, color=color)
+            axis.plot(over.values, values, look, label=name, color=color)
         axis.set_ylabel(style.axis_label(about, units.label(kind)))
         axis.set_yscale("log")
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    single = len(moving) == 1
-    unit = units.label(study.mechanism.quantity(moving[0])) if single else ""
-    axes[-1].set_xlabel(style.axis_label(moving[0] if single else "pose along the path", unit))
+    axes[-1].set_xlabel(over.label)
     figure.align_ylabels(axes)
     return figure
 

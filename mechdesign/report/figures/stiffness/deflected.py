@@ -6,22 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import pose_in_words, solve_poses, study_poses
-from mechdesign.analyses.stiffness.analysis import Body, ask
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.analyses.stiffness.beams import course_of
-from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.analyses.stiffness.network import Edge
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import equal_canvas
+from mechdesign.report.figures.framing import TALLEST, TITLE, framed
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
-from mechdesign.study import Study
+from mechdesign.study import Poses, Study
 
 MOST_LOADS = 4
 _MOVED = 0.12  # largest drawn displacement over the size of the mechanism
@@ -31,59 +29,38 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
                    3 * _ALONG**2 - 2 * _ALONG**3, _ALONG**3 - _ALONG**2])  # fmt: skip
 
 
-def first_pose(study: Study) -> tuple[Configuration, int] | None:
-    """The first pose that can be assembled, and its row."""
-    for solved in solve_poses(study, study_poses(study, "stiffness")):
-        valid = np.flatnonzero(solved.configuration.valid)
-        if len(valid):
-            return solved.configuration.take(valid[:1]), int(solved.rows[valid[0]])
-    return None
-
-
-def deflections(study: Study) -> Figure | None:
+def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     """The whole mechanism where each load moves it."""
-    found, section = first_pose(study), study.stiffness
-    if found is None or section is None or not section.loads:
+    scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
+    if scene is None or not drawn.twists:
         return None
-    configuration, row = found
-    scene, asked = pose(study.mechanism, configuration), ask(study)
-    if scene is None:
-        return None
-    shapes = _shapes(asked, configuration, scene)
-    loads = np.array(section.loads[:MOST_LOADS])[:, : asked.size]
-    sizes = [max(float(np.abs(move @ each).max()) for _, move in shapes) for each in loads]
+    shapes = _shapes(drawn, scene)
+    loads = np.array(asked.section.loads[:MOST_LOADS])[:, : asked.size]
+    sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
     if not np.isfinite(sizes).all():
         return None
     scales = [round_down(_MOVED * scene.span / max(size, 1e-300)) for size in sizes]
-    drawn = [[rest + scale * (move @ each) for rest, move in shapes] for each, scale in zip(loads, scales, strict=True)]
-    places = np.concatenate([[*scene.points.values()], *(line for lines in drawn for line in lines)])
-    figure, axes = equal_canvas(places, study.units.label("length"))
-    draw_mechanism(axes, study.mechanism, configuration, faint=True)
-    for color, lines, each, scale in zip(style.PALETTE, drawn, loads, scales, strict=False):
+    bent = [[rest + scale * move[:, k] for rest, move in shapes] for k, scale in enumerate(scales)]
+    places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
+    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
+    draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True)
+    for color, lines, each, scale in zip(style.PALETTE, bent, loads, scales, strict=False):
         for line in lines:
             axes.plot(line.real, line.imag, color=color, linewidth=1.8, zorder=5)
         axes.plot([], [], color=color, linewidth=1.8, label=_in_words(study, tuple(each), scale))
-        _mark(axes, lines, asked, color)
+        # The asked point begins the first line.
+        axes.plot([lines[0][0].real], [lines[0][0].imag], "o", color=color, zorder=6)
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(
-        f"deflections, enlarged, at {pose_in_words(study, study_poses(study, 'stiffness'), row)}", loc="left"
-    )
+    axes.set_title(f"deflections, enlarged, at {pose_in_words(study, poses, drawn.row)}", loc="left")
     return figure
 
 
-def _mark(axes: Axes, lines: Sequence[Complexes], asked: Body, color: str) -> None:
-    """The asked point where the load moves it: it begins the first line."""
-    axes.plot([lines[0][0].real], [lines[0][0].imag], "o", color=color, zorder=6)
-
-
-def _shapes(asked: Body, configuration: Configuration, scene: Scene) -> list[tuple[Complexes, Complexes]]:
-    """Lines of all links at rest, shape (n,), and their displacements for each unit load, shape (n, size).
+def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:
+    """Lines of all links at rest, shape (n,), and their displacements by each load, shape (n, loads).
 
     The first begins at the asked point.
     """
-    network, at = asked.network, scene.points[asked.section.at]
-    twists = twists_of(network, asked.section, configuration, asked.length)
-    moved = {name: d[0] for name, d in load(twists, asked.size).displacements.items()}
+    network, at, moved = drawn.body.network, scene.points[drawn.body.section.at], drawn.twists
 
     def shift(vertex: str, place: complex) -> Complexes:
         dx, dy, turn = moved[vertex]
@@ -93,7 +70,7 @@ def _shapes(asked: Body, configuration: Configuration, scene: Scene) -> list[tup
     bent = set()
     for ways in network.ways_along_beams:
         bent.add(network.edges[ways[0]].name)
-        shapes += _bent([network.edges[k] for k in ways], configuration, moved, shift)
+        shapes += _bent([network.edges[k] for k in ways], drawn.configuration, moved, shift)
     for link, points in network.points.items():
         borne = [(scene.points[name], vertex) for name, vertex in points if vertex in moved]
         if link in bent or len(borne) < 2:
@@ -144,17 +121,10 @@ def _beam(
     return np.asarray(tail + _ALONG * span, dtype=np.complex128), np.asarray((straight + 1j * across) * along)
 
 
-def free_motion(study: Study, result: Result) -> Figure | None:
+def free_motion(study: Study, result: Result, drawn: Drawn) -> Figure | None:
     """The asked body moved both ways along its free twist, at the first pose that has one."""
-    table, section = result.tables["stiffness"], study.stiffness
-    rows = np.flatnonzero(np.isfinite(table["free_x"]))
-    if not len(rows) or section is None:
-        return None
-    row = int(rows[0])
-    for solved in solve_poses(study, study_poses(study, "stiffness")):
-        if row in solved.rows:
-            configuration = solved.configuration.take(np.flatnonzero(solved.rows == row))
-    scene = pose(study.mechanism, configuration)
+    table, section, row = result.tables["stiffness"], drawn.body.section, drawn.row
+    scene = pose(study.mechanism, drawn.configuration)
     if scene is None:
         return None
     at = scene.points[section.at]
@@ -171,13 +141,13 @@ def free_motion(study: Study, result: Result) -> Figure | None:
     else:
         ways = [rest + way * scale * move for way in (1, -1)]
     places = np.concatenate([[*scene.points.values()], *ways])
-    figure, axes = equal_canvas(places, study.units.label("length"))
-    draw_mechanism(axes, study.mechanism, configuration)
+    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
+    draw_mechanism(axes, study.mechanism, drawn.configuration)
     for line, dash in zip(ways, ("-", "--"), strict=True):
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(f"free motion at {pose_in_words(study, study_poses(study, 'stiffness'), row)}", loc="left")
+    axes.set_title(f"free motion at {pose_in_words(study, result.drawn['poses'], row)}", loc="left")
     return figure
 
 

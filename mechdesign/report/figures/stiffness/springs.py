@@ -56,8 +56,7 @@ def quantity(value: float, unit: str) -> str:
         return "rigid"
     if 1e-2 <= value < 1e5:
         return f"{value:.3g} {unit}" if value < 1e3 else f"{value:.0f} {unit}"
-    digits, power = f"{value:.2e}".split("e")
-    return f"{digits}·10{str(int(power)).translate(str.maketrans('0123456789-', '⁰¹²³⁴⁵⁶⁷⁸⁹⁻'))} {unit}"
+    return f"{style.in_powers(value)} {unit}"
 
 
 def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mechdesign.numerics.arrays import Complexes
+from mechdesign.analyses.workspace.shown import curves
+from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.rendering import Gallery
@@ -17,14 +17,10 @@ from mechdesign.report.figures.workspace.inscribed import inscribed_figure
 from mechdesign.report.figures.workspace.maps import map_figures
 from mechdesign.report.figures.workspace.point_paths import path_figures
 from mechdesign.report.figures.workspace.ranges import range_figures
-from mechdesign.report.figures.workspace.regions import ROOM, Region, curves, fill, keys, loci, outline, regions, sheet
+from mechdesign.report.figures.workspace.regions import ROOM, Region, fill, regions, sheet
 from mechdesign.results import Result, Table
+from mechdesign.study import Study
 
-if TYPE_CHECKING:
-    from mechdesign.study import Study
-
-# Poses of the mechanism along all curves of one side of the boundary.
-POSES = {"inner": 2, "outer": 4}
 SIDES = {"inner": style.BLUE, "outer": style.VERMILION}
 DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
 
@@ -44,25 +40,18 @@ def figures(study: Study, result: Result) -> Mapping[str, Figure]:
         return {}
     drawn = Gallery()
     drawn.add("of indices", map_figures, study, found)
-    drawn.add("workspace", workspace_figure, study, found[0])
+    drawn.add("workspace", workspace_figure, study, result, found[0])
     drawn.add("inscribed", inscribed_figure, study, result, found)
     if len(found[0].boundary):
         drawn.add("drives", _drives, study, found[0].boundary)
     return drawn
 
 
-def workspace_figure(study: Study, region: Region, title: str = "") -> Figure:
+def workspace_figure(study: Study, result: Result, region: Region, title: str = "") -> Figure:
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
-    boundary, section = region.boundary, study.workspace
+    section, mechanism = study.workspace, study.mechanism
     assert section is not None
-    mechanism = study.mechanism
-    plan = mechanism.plan((f"{section.point}.x", f"{section.point}.y", *region.held))
-    held = [
-        value * (study.units.angle_factor if mechanism.quantity(name) == "angle" else 1.0)
-        for name, value in region.held.items()
-    ]
-    places = _places(boundary) if len(boundary) else np.zeros(0, dtype=complex)
-    configuration = plan.solve([places.real, places.imag, *held], limits=False)
+    configuration: Configuration = result.drawn["along"]
     reached = [configuration.point(point) for point in mechanism.points]
     reached += [np.atleast_1d(mechanism.sketch_configuration.point(point)) for point in mechanism.points]
     extent = np.concatenate([region.places(), *(place[np.isfinite(place)] for place in reached)])
@@ -71,29 +60,11 @@ def workspace_figure(study: Study, region: Region, title: str = "") -> Figure:
     page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
     (axes,) = page.axes
     fill(axes, region)
-    page.legend(keys(outline(axes, region), loci(axes, region)))
-    for index in range(len(places)):
+    page.ends([region])
+    for index in range(len(configuration.reason)):
         draw_mechanism(axes, mechanism, configuration, index, faint=True)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
     return page.figure
-
-
-def _places(boundary: Table) -> Complexes:
-    """Places a little inside the boundary, evenly along each of its sides."""
-    found = []
-    middle = complex(np.mean(boundary["x"]), np.mean(boundary["y"]))
-    for side, number in POSES.items():
-        own = [rows for rows in curves(boundary) if str(boundary["side"][rows[0]]) == side]
-        if not own:
-            continue
-        pieces = [boundary["x"][rows] + 1j * boundary["y"][rows] for rows in own]
-        z = np.concatenate(pieces)
-        steps = np.concatenate([np.concatenate([[0.0], np.abs(np.diff(piece))]) for piece in pieces])
-        along = np.cumsum(steps)
-        for share in (np.arange(number) + 0.5) / number:
-            k = int(np.searchsorted(along, share * along[-1]))
-            found.append(z[k] + 1e-3 * (middle - z[k]) * (1 if side == "outer" else -1))
-    return np.array(found)
 
 
 def _drives(study: Study, boundary: Table) -> Figure:

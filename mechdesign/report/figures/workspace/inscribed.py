@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,15 +10,12 @@ from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.workspace.regions import Region, fill, keys, loci, outline, sheet
+from mechdesign.report.figures.workspace.regions import Region, fill, sheet, some
 from mechdesign.results import Result
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 CIRCLE = ("circle_x", "circle_y", "circle_radius")
 RECTANGLE = ("rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height")
-MOST = 6
 _HALO = [withStroke(linewidth=2.2, foreground="white")]
 
 
@@ -28,17 +24,13 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
     table = result.tables["indices"]
     if not any(name in table for name in (*CIRCLE, *RECTANGLE)):
         return None
-    shown = [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST)).astype(int))]
+    shown = some(found)
     places = np.concatenate([region.places() for region in shown])
     page = sheet(study, places, [region.title for region in shown], "largest circle and rectangle in the workspace",
                  bar=False)  # fmt: skip
-    fates: set[str] = set()
-    kinds: set[str] = set()
     unit = study.units.label("length")
     for axes, region in zip(page.axes, shown, strict=True):
         fill(axes, region)
-        fates |= outline(axes, region)
-        kinds |= loci(axes, region)
         size = 9 if len(shown) == 1 else 7.5
         if CIRCLE[0] in table:
             x, y, radius = (float(table[name][region.row]) for name in CIRCLE)
@@ -55,5 +47,5 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
                                          zorder=4))  # fmt: skip
                 axes.annotate(f"{width:.4g} x {height:.4g} {unit}".strip(), corner, (4, 4), textcoords="offset points",
                               color=style.GREEN, fontsize=size, zorder=5, path_effects=_HALO)  # fmt: skip
-    page.legend(keys(fates, kinds))
+    page.ends(shown)
     return page.figure

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from matplotlib import colormaps
@@ -20,17 +20,14 @@ from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.workspace.regions import Grid, Region, keys, loci, outline, sheet
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.report.figures.workspace.regions import Grid, Region, sheet, some
+from mechdesign.study import Study
 
 Extend = Literal["neither", "max"]
 # Columns of the table that are no indices, beside the held coordinates.
 _NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node", "piece")
 # An index whose largest values are a thin tail is cut off above this share of the area, which the bar shows.
 _TAIL = 0.96
-MOST = 6
 # Points on paper between the name of a level and lines of other levels, and other names.
 CLEAR = (5.0, 18.0)
 
@@ -40,7 +37,7 @@ def map_figures(study: Study, found: Sequence[Region]) -> Gallery:
 
     There is none of an index that is infinite everywhere.
     """
-    shown = [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST)).astype(int))]
+    shown = some(found)
     names = [name for name in index_columns(found[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
     maps = Gallery()
     for name in names:
@@ -61,17 +58,10 @@ def _map(study: Study, found: Sequence[Region], column: str) -> Figure:
     point = study.workspace.point if study.workspace else ""
     name = column.replace("_", " ")
     page = sheet(study, places, [region.title for region in found], f"{name} at point {point}: {meaning}", bar=True)
-    fates: set[str] = set()
-    kinds: set[str] = set()
     for axes, region in zip(page.axes, found, strict=True):
         contours(axes, list(region.grids(column)), levels, norm, extend, labels=len(found) == 1)
-        fates |= outline(axes, region)
-        kinds |= loci(axes, region)
-    page.legend(keys(fates, kinds))
-    assert page.bar is not None
-    bar = page.figure.colorbar(ScalarMappable(norm, style.COLORMAP), cax=page.bar, ticks=levels)
-    bar.set_label(style.axis_label(name, unit))
-    bar.outline.set_visible(False)
+    page.ends(found)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, unit), ticks=levels)
     return page.figure
 
 

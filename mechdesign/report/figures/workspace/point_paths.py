@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
@@ -14,9 +12,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.workspace.regions import ROOM, sheet
 from mechdesign.results import Result, Table
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 # The largest speed ratios may belong to dead centres, where they grow without bounds: this share is told apart.
 _TAIL = 0.97
@@ -63,9 +59,7 @@ def _path(study: Study, path: Table) -> Figure:
         axes.add_collection(drawn)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=z)
     assert drawn is not None
-    bar = page.figure.colorbar(drawn, cax=page.bar, extend="max" if tail else "neither")
-    bar.set_label(_label(path))
-    bar.outline.set_visible(False)
+    page.color_bar(drawn, _label(path), extend="max" if tail else "neither")
     return page.figure
 
 

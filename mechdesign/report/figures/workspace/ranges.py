@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -11,15 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
+from mechdesign.analyses.workspace.shown import curves
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.workspace.regions import PALE, ROOM, curves, keys, outline_of, pick, sheet
+from mechdesign.report.figures.workspace.regions import PALE, ROOM, outline_of, pick, sheet
 from mechdesign.results import Result, Table
+from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
 
 MOST = 6
 
@@ -59,7 +57,7 @@ def _region(study: Study, tables: Sequence[Table], titles: Sequence[str], title:
         fates |= outline_of(axes, table)
         alone = len(tables) == 1
         draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=alone, drives=False, faint=not alone)
-    page.legend(keys(fates, set()))
+    page.legend(fates, set())
     return page.figure
 
 
@@ -77,9 +75,7 @@ def _deciding(study: Study, tables: Sequence[Table], titles: Sequence[str], name
             drawn.set_clim(float(values.min()), float(values.max()))
             axes.add_collection(drawn)
     if drawn is not None:
-        bar = page.figure.colorbar(drawn, cax=page.bar)
-        bar.set_label(label)
-        bar.outline.set_visible(False)
+        page.color_bar(drawn, label)
     return page.figure
 
 

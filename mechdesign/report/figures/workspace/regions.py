@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.analyses.workspace.shown import curves
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.results import Result, Table
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 Grid = tuple[Floats, Floats, Floats]
 
@@ -40,6 +40,8 @@ PALE = "#D5EBF8"
 LEFT_OUT = "#ECECEC"
 _LEFT, _RIGHT, _TOP, _BELOW, _BAR, _LEGEND = 0.72, 0.12, 0.34, 0.52, 0.95, 0.24
 _TALLEST = 6.5
+# Regions that a picture shows side by side.
+MOST = 6
 # Free room around what is shown, as a share of its size; with a mechanism there are symbols that reach beyond points.
 _PAD, ROOM = 0.03, 0.07
 
@@ -102,8 +104,8 @@ def regions(study: Study, result: Result) -> list[Region]:
         )
         boundary, others = pick(result.tables["boundary"], values), None
         if study.workspace is not None and study.workspace.assembly == "same" and (local["piece"] > 1).any():
-            others = _rows(local, local["piece"] > 1), _rows(boundary, boundary["piece"] > 1)
-            local, boundary = _rows(local, local["piece"] == 1), _rows(boundary, boundary["piece"] == 1)
+            others = local.take(local["piece"] > 1), boundary.take(boundary["piece"] > 1)
+            local, boundary = local.take(local["piece"] == 1), boundary.take(boundary["piece"] == 1)
         loci = pick(lines, values) if lines is not None and len(lines) else None
         found.append(Region(title, values, row, local, boundary, loci, others))
     return found
@@ -114,18 +116,7 @@ def pick(table: Table, values: Mapping[str, float]) -> Table:
     rows = np.ones(len(table), dtype=bool)
     for name, value in values.items():
         rows &= table[name] == value
-    return _rows(table, rows)
-
-
-def _rows(table: Table, rows: Flags) -> Table:
-    columns = tuple(type(c)(c.name, np.asarray(c.values)[rows], c.unit, c.meaning) for c in table.columns)
-    return Table(table.name, columns, table.meaning)
-
-
-def curves(table: Table) -> Iterator[Ints]:
-    """Rows of each curve of a boundary or of a locus."""
-    for curve in np.unique(table["curve"]):
-        yield np.flatnonzero(table["curve"] == curve)
+    return table.take(rows)
 
 
 def fate(kind: str, at: str) -> str:
@@ -202,17 +193,9 @@ def _edge(x: Floats, y: Floats) -> list[Floats]:
     return [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
 
 
-def keys(fates: set[str], kinds: set[str]) -> list[Line2D]:
-    """Entries of a legend for what `outline` and `loci` have drawn."""
-    entries = [
-        Line2D([], [], color=color, linestyle=dashes, linewidth=1.5, label=words)  # type: ignore[arg-type]
-        for name, (color, dashes, words) in FATES.items() if name in fates
-    ]  # fmt: skip
-    return entries + [
-        Line2D([], [], color=color, linewidth=1.8, label=words)
-        for kind, (color, words) in LOCI.items()
-        if kind in kinds
-    ]
+def some(found: Sequence[Region]) -> list[Region]:
+    """Of many regions a few, spread evenly."""
+    return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST)).astype(int))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,11 +206,29 @@ class Sheet:
     axes: tuple[Axes, ...]
     bar: Axes | None
 
-    def legend(self, entries: Sequence[Line2D]) -> None:
-        """Entries in one row below the panels."""
+    def ends(self, found: Sequence[Region]) -> None:
+        """Draw what ends each region, a panel each, and its singularities, with a legend."""
+        fates, kinds = set[str](), set[str]()
+        for axes, region in zip(self.axes, found, strict=True):
+            fates |= outline(axes, region)
+            kinds |= loci(axes, region)
+        self.legend(fates, kinds)
+
+    def legend(self, fates: set[str], kinds: set[str]) -> None:
+        """Entries in one row below the panels for what `outline` and `loci` have drawn."""
+        lines = [(color, dashes, 1.5, words) for name, (color, dashes, words) in FATES.items() if name in fates]
+        lines += [(color, "-", 1.8, words) for kind, (color, words) in LOCI.items() if kind in kinds]
+        entries = [Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=words)  # type: ignore[arg-type]
+                   for color, dashes, width, words in lines]  # fmt: skip
         if entries:
-            self.figure.legend(handles=list(entries), loc="lower left", ncols=4, columnspacing=1.4, borderaxespad=0.3,
+            self.figure.legend(handles=entries, loc="lower left", ncols=4, columnspacing=1.4, borderaxespad=0.3,
                                bbox_to_anchor=(_LEFT / style.WIDTH - 0.02, 0.0))  # fmt: skip
+
+    def color_bar(self, drawn: ScalarMappable, label: str, **options: Any) -> None:
+        """What the colours of the panels mean."""
+        bar = self.figure.colorbar(drawn, cax=self.bar, **options)
+        bar.set_label(label)
+        bar.outline.set_visible(False)
 
 
 def sheet(

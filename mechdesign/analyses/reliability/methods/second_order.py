@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.reliability.cumulants import Cumulants, cumulants
+from mechdesign.analyses.reliability.methods import normal
 from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Drawn, Sources
-from mechdesign.analyses.reliability.task import Task
+from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
 
@@ -52,12 +53,12 @@ class Quadratic:
         return mean, covariance + mixed + mixed.T + flat
 
 
-def moments(task: Task) -> tuple[Floats, Floats]:
-    """Mean errors, shape (channels, poses), and their covariances, shape (poses, channels, channels)."""
+def run(task: Task) -> MethodResult:
+    """Normal errors of the quadratic model's mean and covariance at every pose."""
     law = cumulants(task.sources)
     steps = step_sizes(task.sources, np.sqrt(np.diagonal(law.covariance)))
-    mean = np.full((task.channels, task.poses), np.nan)
-    covariance = np.full((task.poses, task.channels, task.channels), np.nan)
+    mean = np.full(task.nominal.shape, np.nan)
+    covariance = np.full((task.poses.count, len(mean), len(mean)), np.nan)
 
     def work(setting: Setting) -> tuple[Floats, Floats]:
         return quadratic(setting, task.sources, steps).moments(law)
@@ -66,7 +67,7 @@ def moments(task: Task) -> tuple[Floats, Floats]:
     for setting, (middle, spread) in zip(task.settings, map_chunks(work, task.settings, task.jobs), strict=True):
         mean[:, setting.pose], covariance[setting.pose] = middle, spread
         task.progress.update(1)
-    return mean, covariance
+    return normal("second_order", task, mean, covariance)
 
 
 def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
@@ -83,7 +84,7 @@ def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
     pairs[i, places], pairs[j, places] = steps[i], steps[j]
     z = np.concatenate([np.zeros((count, 1)), single, -single, pairs, -pairs], axis=1)
     errors, valid = errors_of(setting, sources.made(_drawn(sources, z)), z.shape[1])
-    found = np.where(valid, np.stack(errors), np.nan)
+    found = np.where(valid, errors, np.nan)
     ends = np.cumsum([1, count, count, len(i)])
     value, ahead, back, both_ahead, both_back = np.split(found, ends, axis=1)
     hessian = np.empty((len(found), count, count))
@@ -97,22 +98,16 @@ def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
 
 def step_sizes(sources: Sources, sigma: Floats) -> Floats:
     """Step of each component, from its standard deviation and from how far it moves the mechanism."""
-    mechanism = sources.study.mechanism
-    length = mechanism.size or 1.0
-    scale = []
-    for scalar, source, deviation in zip(sources.scalars, sources.first_order, sigma, strict=False):
-        reach = [deviation or 1.0] if scalar.kind == "load" else []
-        for name, slope in source.directions[0].items() if scalar.kind != "load" else ():
-            drive = scalar.kind == "drive"
-            quantity = mechanism.quantity(name) if drive else mechanism.description.places[name].quantity
-            if slope:
-                reach.append((1.0 if quantity == "angle" else length) / abs(slope))
-        scale.append(min(reach, default=1.0))
-    scale += [length] * (2 * len(sources.pins))
-    steps = np.clip(_PART * sigma, _SHORTEST * np.array(scale), _LONGEST * np.array(scale))
+    length = sources.study.mechanism.size or 1.0
+    scale = np.full(len(sigma), length)
+    for k, scalar in enumerate(sources.scalars):
+        reach = [(1.0 if quantity == "angle" else length) / abs(slope)
+                 for slope, quantity in scalar.moves.values() if slope]  # fmt: skip
+        scale[k] = min(reach, default=1.0)
+    steps = np.clip(_PART * sigma, _SHORTEST * scale, _LONGEST * scale)
     # Deflections are linear in the loads, and the longest step leaves the least rounding.
     loads = [k for k, scalar in enumerate(sources.scalars) if scalar.kind == "load"]
-    steps[loads] = np.array(scale)[loads]
+    steps[loads] = np.where(sigma[loads] > 0, sigma[loads], 1.0)
     return steps
 
 

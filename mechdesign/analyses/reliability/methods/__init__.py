@@ -1,0 +1,101 @@
+"""The methods declared in the schema, one a file: ``run(task)`` says what each finds at every pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from importlib import import_module
+
+import numpy as np
+
+from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.error_limits import correlation
+from mechdesign.analyses.reliability.simulation import Setting, Sums
+from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
+from mechdesign.numerics.arrays import Floats
+from mechdesign.parallel import map_chunks
+from mechdesign.study.schema.methods import METHODS
+
+# Streams of random numbers, beside those of the chunks of plain samples.
+SEARCH, QUASI = 1, 2
+
+
+def run(name: str, task: Task) -> MethodResult:
+    """What a method says."""
+    found: MethodResult = import_module(METHODS[name].place).run(task)
+    return found
+
+
+def normal(name: str, task: Task, mean: Floats, covariance: Floats) -> MethodResult:
+    """Normal errors of these means, shape (channels, poses), and covariances, shape (poses, channels, channels).
+
+    No interval is claimed.
+    """
+    question, found = task.question, MethodResult(name)
+    if question.limited:
+        # SciPy takes a quarter of a second to import, and a study without limits does not need it.
+        from mechdesign.analyses.reliability.probability import failure_probability
+
+        rows = np.flatnonzero(task.assembled)
+        values = failure_probability(covariance[rows], question.bands, question.discs, mean.T[rows])
+        found.estimates.update({
+            pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)
+        })  # fmt: skip
+    return _with_moments(found, task, mean, covariance)
+
+
+def sampled(name: str, task: Task, sums: Mapping[int, Sums]) -> MethodResult:
+    """Plain samples, and the estimates that they give."""
+    found = MethodResult(name, sums=dict(sums))
+    if task.question.limited:
+        found.estimates.update({pose: counted(each) for pose, each in sums.items()})
+    return of_sums(found, task)
+
+
+def counted(sums: Sums) -> Estimate:
+    """Estimate from counted failures, with the interval of Clopper and Pearson."""
+    from mechdesign.analyses.reliability.engine.intervals import binomial
+
+    low, high = binomial(sums.failures, sums.samples)
+    invalid = sums.samples - sums.valid
+    return Estimate(sums.failures / sums.samples, low, high, sums.samples, sums.samples, sums.failures, invalid)
+
+
+def of_sums(found: MethodResult, task: Task) -> MethodResult:
+    """The same with the moments of the errors that were sampled."""
+    if not found.sums:
+        return found
+    mean = np.full(task.nominal.shape, np.nan)
+    covariance = np.full((task.poses.count, len(mean), len(mean)), np.nan)
+    for pose, sums in found.sums.items():
+        if sums.valid:
+            mean[:, pose], covariance[pose] = sums.mean, sums.covariance
+    return _with_moments(found, task, mean, covariance)
+
+
+def _with_moments(found: MethodResult, task: Task, mean: Floats, covariance: Floats) -> MethodResult:
+    rho, pair = None, task.question.pair
+    if pair is not None:
+        rho = correlation(covariance[:, pair][:, :, pair])
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2).T, 0.0))
+    return replace(found, mean=mean, sigma=sigma, rho=rho)
+
+
+def pose_by_pose(name: str, task: Task, work: Callable[[Setting], MethodResult]) -> MethodResult:
+    """What `work` says of each pose; an interrupt keeps the poses that are finished."""
+    found = MethodResult(name)
+    task.progress.start(len(task.settings), "poses")
+    try:
+        for part in map_chunks(work, task.settings, task.jobs):
+            found.add(part)
+            task.progress.update(1)
+    except KeyboardInterrupt:
+        raise Partial(of_sums(found, task)) from None
+    return of_sums(found, task)
+
+
+def of_limits(name: str, task: Task, work: Callable[[Setting], Estimate]) -> MethodResult:
+    """What `work` estimates at each pose; nothing where there are no limits."""
+    if not task.question.limited:
+        return MethodResult(name)
+    return pose_by_pose(name, task, lambda setting: MethodResult(name, {setting.pose: work(setting)}))
