@@ -12,8 +12,8 @@ from helpers.syntheses import PROBLEMS
 from scipy.optimize import differential_evolution
 
 import mechdesign
-from mechdesign.analyses.optimize.goals import Evaluator
-from mechdesign.analyses.optimize.objectives import goal
+from mechdesign.analyses.optimize.evaluation import Evaluator
+from mechdesign.analyses.optimize.goals import goal
 
 STUDY = Path(__file__).parent / "three_variables.yaml"
 INDICES = ("GII", "GRI", "SUI")
@@ -27,7 +27,7 @@ def best_of_a_line(bounds: mechdesign.results.Table) -> float:
     l_min = np.arange(1.05, 1.15, 0.0005)
     found = Evaluator(study, [goal(name) for name in INDICES])({"l_min": l_min, "l_1": l_min**0, "l_2": l_min**0})
     low, high = bounds["min"][:3], bounds["max"][:3]
-    values = np.stack(list(found.values.values()))
+    values = found.table[:, : len(INDICES)].T
     return float(((values - low[:, None]) / (high - low)[:, None]).sum(axis=0).max())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from types import ModuleType
 
 import numpy as np
@@ -55,10 +56,9 @@ def analysis(monkeypatch):
     def install(function, command="kinematics"):
         module = ModuleType(f"mechdesign.analyses.{command}.analysis")
         setattr(module, command, function)
-        figures = ModuleType(f"mechdesign.report.figures.{command}")
-        figures.figures = lambda study, result: {}
+        figures = import_module(f"mechdesign.report.figures.{command}")
         monkeypatch.setitem(sys.modules, module.__name__, module)
-        monkeypatch.setitem(sys.modules, figures.__name__, figures)
+        monkeypatch.setattr(figures, "figures", lambda study, result: {})
 
     install(lambda study, **options: answer())
     return install

@@ -131,7 +131,7 @@ def test_path_through_five_points_of_a_line() -> None:
     The points as the documentation of PHCpack gives them. The coupler that the search finds is compared with the exact
     one: ten equations, that the crank's pin keeps its distance from O and the rocker's from D at each point, by Newton.
     """
-    optimum = optimised("path_synthesis")["optimum"]
+    optimum = mechdesign.optimize(study_named("path_synthesis", "optimize.evaluations=500")).main
     points = np.array([0.50 + 1.06j, -0.83 - 0.27j, -0.34 + 0.22j, -0.13 + 0.43j, 0.22 + 0.78j])
     unknown = np.array([0.462, 0.653, 0.446, -0.696, 0.498, *np.radians([-60, 23, -7, -17, -38])])
 
@@ -156,7 +156,7 @@ def test_path_through_five_points_of_a_line() -> None:
     assert found == pytest.approx(unknown[[1, 3, 4]], abs=1e-6)
     ranges = "a: {from: 0.4, to: 0.55}, b: {from: 0.5, to: 0.8}, c: {from: 0.35, to: 0.5}, "
     ranges += "u: {from: -0.8, to: -0.6}, v: {from: 0.4, to: 0.6}"
-    study = study_named("path_synthesis", f"optimize.variables={{{ranges}}}")
+    study = study_named("path_synthesis", f"optimize.variables={{{ranges}}}", "optimize.evaluations=800")
     optimum = mechdesign.optimize(study, jobs=2).main
     assert optimum["kinematics.C.y_error"][0] < 1e-9
     assert [optimum[name][0] for name in "abcuv"] == pytest.approx(unknown[:5], abs=1e-7)

@@ -213,23 +213,24 @@ def aligned(z: np.ndarray, phi: float, cranked: bool) -> tuple[np.ndarray, np.nd
 def test_over_a_range_the_assembly_of_the_sketch(
     study: str, held: str, cranked: bool, drawn: complex, span: tuple[float, float], every: bool
 ) -> None:
-    """Where the determinant keeps the sign it has in the sketch: by counted orientations of random points."""
+    """The determinant keeps its sign of the sketch, in a sector: by counted orientations of random points."""
     at = f"{{from: {span[0]}, to: {span[1]}, all: {str(every).lower()}}}"
-    section = study.replace(held, at).replace("assembly: any", "assembly: same")
+    section = study.replace(held, at).replace("assembly: any", "assembly: same, scan: {from: 0, to: 45}")
     (area,), (error,) = (mechdesign.workspace(study_of(section)).main[name] for name in ("area", "area_error"))
     z = np.random.default_rng(4).uniform((0, -0.2), (1, 0.9), (40_000, 2)) @ np.array([1, 1j])
+    z = z[((z - drawn).imag > 0) & ((z - drawn).real > (z - drawn).imag)]
     sign = np.sign(aligned(np.array([drawn]), 0.0, cranked)[1])
     held_there = np.full(z.shape, every)
     for phi in np.radians(np.linspace(*span, 241)):
         good, determinant = aligned(z, phi, cranked)
         good &= determinant * sign > 0
         held_there = held_there & good if every else held_there | good
-    share = held_there.mean()
+    share, sector = held_there.mean(), 0.5 * (1 - drawn.real) ** 2
     # Four standard deviations; between the orientations that are counted there is a little more (or less).
-    doubt = 4 * 1.1 * np.sqrt(share * (1 - share) / len(z)) + 1e-3 * area
+    doubt = 4 * sector * np.sqrt(share * (1 - share) / len(z)) + 1e-3 * area
     assert error <= 2e-6 * area
     assert area > 0
-    assert abs(area - 1.1 * share) <= doubt + error
+    assert abs(area - sector * share) <= doubt + error
 
 
 def test_over_a_range_without_a_closed_form_is_told() -> None:

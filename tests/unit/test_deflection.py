@@ -12,7 +12,7 @@ from scipy.special import ndtr
 
 import mechdesign
 from mechdesign.analyses.poses import study_poses
-from mechdesign.analyses.workspace.indices import Local
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 
@@ -255,7 +255,7 @@ def test_what_cannot_be_a_load(text: str, override: str, message: str) -> None:
 
 def test_a_map_over_the_workspace_counts_the_deflection() -> None:
     """The indices of the workspace say what the question itself says at its nodes."""
-    from mechdesign.analyses.workspace.indices import prepare
+    from mechdesign.analyses.workspace.index import prepare
     from mechdesign.analyses.workspace.question import questions
 
     text = (

@@ -113,8 +113,8 @@ def test_a_second_peak_beside_the_end_of_the_sweep() -> None:
 
 def test_designs_that_reach_a_limit_are_left_to_be_asked_one_by_one() -> None:
     study = study_of(ROCKER + "kinematics: {sweep: {crank: {from: 0, to: 60, step: 10}}, outputs: [B.x]}\n")
-    places = {"rod.length": np.array([70.0, 20.0])}
-    stack = stacked.tables(study, "kinematics", ["extremes", "loops"], 2, places, {})
+    poses = stacked.poses_of(study, "kinematics")(2, {"rod.length": np.array([70.0, 20.0])}, {})
+    stack = stacked.tables(study, "kinematics", ["extremes", "loops"], poses)
     assert stack.open["extremes"].tolist() == [False, True]
     assert stack.open["loops"].tolist() == [False, True]
     row = by_name(kinematics(study).tables["extremes"])["B.x"]

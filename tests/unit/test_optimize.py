@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.optimize.designs import best, grid, normalised
+from mechdesign.analyses.optimize.goals import goal
+from mechdesign.analyses.optimize.judge import JudgedDesigns
+from mechdesign.analyses.optimize.tables import Comparison
+from mechdesign.analyses.optimize.variables import grid
 from mechdesign.errors import AssemblyError, StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -44,16 +47,28 @@ def test_an_empty_grid_says_so() -> None:
         mechdesign.optimize(study)
 
 
+def compare(values: list[float], *, smallest: bool = False, feasible: int | None = None) -> Comparison:
+    """Designs of one goal, of which the first so many are feasible."""
+    one, count = goal("kinematics.P.x", smallest=smallest), len(values)
+    codes = np.where(np.arange(count) < (count if feasible is None else feasible), 0, 1).astype(np.int32)
+    study = mechdesign.load(CONFIGS / "two_link_arm.yaml")
+    designs = JudgedDesigns(
+        {"r1": np.arange(count) + 1.0}, (one,), (), {one: np.array(values)}, {}, codes, ["", "lost"]
+    )
+    return Comparison(study, designs, np.ones((1, 1)), {})
+
+
 def test_normalisation_over_feasible_designs() -> None:
-    values, feasible = np.array([3.0, 1.0, 2.0, 9.0]), np.array([True, True, True, False])
-    assert normalised(values, feasible, smallest=False)[:3] == pytest.approx([1, 0, 0.5])
-    assert normalised(values, feasible, smallest=True)[:3] == pytest.approx([0, 1, 0.5])
-    assert np.isnan(normalised(values, feasible, smallest=False)[3])
-    assert normalised(np.ones(4), feasible, smallest=True)[:3] == pytest.approx([0, 0, 0])
+    for smallest, shares in ((False, [1, 0, 0.5]), (True, [0, 1, 0.5])):
+        compared = compare([3.0, 1.0, 2.0, 9.0], smallest=smallest, feasible=3)
+        assert compared.cpi[:3] == pytest.approx(shares)
+        assert np.isnan(compared.cpi[3])
+        assert compared.winners.tolist() == [shares.index(1)]
+    assert compare([1.0] * 4, smallest=True).cpi == pytest.approx([0, 0, 0, 0])
 
 
 def test_ties_go_to_the_first_design() -> None:
-    assert best(np.array([np.nan, 1.0, 2.0, 2.0])) == 2
+    assert compare([1.0, 2.0, 2.0, 9.0], feasible=3).winners.tolist() == [1]
 
 
 def test_scores_are_weighted_sums_of_normalised_indices() -> None:
@@ -95,6 +110,15 @@ def test_a_design_without_workspace_is_infeasible() -> None:
     assert result.counts == {"designs": 4, "infeasible": 2}
 
 
+def test_a_workspace_that_follows_each_design() -> None:
+    """A find: indices of a section that depends on a variable had no meaning, which was an error."""
+    variables = "optimize.variables={l_min: {from: 2, to: 2.2, number: 2}}"
+    follows = ("workspace.scan.about=[0*l_min, 0]", "workspace.integrate.tolerance=1e-3")
+    study = mechdesign.load(CONFIGS / "two_rrr.yaml", [variables, "optimize.weights=", *follows])
+    columns = {column.name: column for column in mechdesign.optimize(study).main.columns}
+    assert columns["GII"].meaning == "mean of the inverse condition number over the region"
+
+
 def test_goals_of_other_questions() -> None:
     """The worst pose counts: where the arm reaches farthest is minimised, by the length of its first link."""
     changes = (
@@ -118,7 +142,8 @@ def test_a_goal_that_no_result_has() -> None:
 
 
 def test_threads_do_not_change_a_bit() -> None:
-    study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.variables.l_min.step=0.09"])
+    steps = ("optimize.variables.l_min.step=0.09", "optimize.variables.l_a.step=0.06")
+    study = mechdesign.load(CONFIGS / "two_rrr.yaml", steps)
     one, two = (mechdesign.optimize(study, jobs=jobs).tables["designs"] for jobs in (1, 2))
     assert len(one) > 512
     for column in one.columns:

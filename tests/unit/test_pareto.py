@@ -8,7 +8,7 @@ from helpers.studies import study_of
 from helpers.syntheses import tray
 
 import mechdesign
-from mechdesign.analyses.optimize.explorer import Explorer, Outcome
+from mechdesign.analyses.optimize.explorer import Explorer, Scores
 from mechdesign.analyses.optimize.pareto import crowding, evolve, front, knee
 from mechdesign.analyses.optimize.search import sample
 
@@ -36,7 +36,7 @@ def zdt1(u):
 
 
 def spread(function, margins=lambda u: np.empty((len(u), 0)), seed=0):
-    explorer = Explorer(lambda u: Outcome(function(u), margins(u), np.empty((len(u), 0))), 3, 3000)
+    explorer = Explorer(lambda u: Scores(function(u), margins(u), np.empty((len(u), 0))), 3, 3000)
     evolve(explorer, np.ones(2), sample(3, np.random.default_rng(seed), 100, 100), seed)
     return explorer.known
 

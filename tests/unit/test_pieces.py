@@ -10,7 +10,8 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.analyses.optimize.goals import Evaluator, goal
+from mechdesign.analyses.optimize.evaluation import Evaluator
+from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.region.nodes import workspace_nodes
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
@@ -215,7 +216,7 @@ def values(names: Sequence[str], changes: dict[str, np.ndarray], text: str) -> d
     goals = [goal(name, smallest=False) for name in names]
     found = Evaluator(study, goals)(changes)
     assert not any(found.reasons)
-    return {name: found.values[each] for name, each in zip(names, goals, strict=True)}
+    return dict(zip(names, found.table.T, strict=False))
 
 
 def test_optimize_judges_the_piece_that_workspace_reports() -> None:

@@ -11,12 +11,12 @@ from helpers.syntheses import OPEN, PROBLEMS, held_height, timed_path, tray
 
 import mechdesign
 from mechdesign.analyses.optimize.analysis import _doubts
-from mechdesign.analyses.optimize.cube import from_cube
-from mechdesign.analyses.optimize.explorer import Explorer, Objective, Outcome, Part, Spent
-from mechdesign.analyses.optimize.goals import Evaluator
+from mechdesign.analyses.optimize.evaluation import Evaluator
+from mechdesign.analyses.optimize.explorer import Explorer, Part, Scores, Spent
+from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.optimize.lockstep import side_by_side
-from mechdesign.analyses.optimize.objectives import goal
 from mechdesign.analyses.optimize.search import Ending, search
+from mechdesign.analyses.optimize.variables import from_cube
 from mechdesign.errors import AssemblyError, StudyError
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -35,7 +35,7 @@ optimize:
   minimize: kinematics.P.x
   subject_to: [{result: kinematics.P.y, at_least: 12}]
 """
-FIRST = Objective(np.ones(1))
+FIRST = np.ones(1)
 C30, S30 = np.sqrt(3) / 2, 0.5
 
 
@@ -53,7 +53,7 @@ def rastrigin(u):
 
 def explorer(function, dimensions, margins=None, budget=3000):
     return Explorer(
-        lambda u: Outcome(
+        lambda u: Scores(
             function(u).reshape(len(u), -1),
             np.empty((len(u), 0)) if margins is None else margins(u),
             np.empty((len(u), 0)),
@@ -115,7 +115,7 @@ def worst_of(rows, dimensions, margins=None):
     def outcome(u):
         found = rows(u)
         values = np.abs(found).max(axis=1, keepdims=True)
-        return Outcome(values, np.empty((len(u), 0)) if margins is None else margins(u), found)
+        return Scores(values, np.empty((len(u), 0)) if margins is None else margins(u), found)
 
     places = slice(0, rows(np.zeros((1, dimensions))).shape[1])
     known = Explorer(outcome, dimensions, 5000, [Part(0, 1.0, True, places)])
@@ -150,13 +150,13 @@ def test_two_worst_rows_weighed_under_a_condition_that_is_one():
     def outcome(u):
         off = u - 0.5
         rows = np.concatenate([off, -off, u], axis=1)
-        return Outcome(np.abs(off), 0.4 - u.max(axis=1, keepdims=True), rows)
+        return Scores(np.abs(off), 0.4 - u.max(axis=1, keepdims=True), rows)
 
     parts = [Part(0, 1.0, False, slice(0, 3, 2)), Part(1, 1.0, False, slice(1, 4, 2)),
              Part(2, 1.0, False, slice(4, 6), bound=0.4)]  # fmt: skip
     known = Explorer(outcome, 2, 5000, parts)
     assert search(known, [True, True], [[1.0, 3.0]], 0).checked
-    best = int(np.argmin(known.known.merit(Objective(np.array([1.0, 3.0])))))
+    best = int(np.argmin(known.known.merit(np.array([1.0, 3.0]))))
     assert known.known.u[best] == pytest.approx([0.4, 0.4], abs=1e-8)
 
 
@@ -164,16 +164,19 @@ def test_rows_of_goals_are_those_of_the_tables():
     study = study_of(ARM, "kinematics={sweep: {theta1: {from: 0, to: 50, step: 10}, theta2: 60}, outputs: [P]}")
     goals = [goal("kinematics.P.x", smallest=True), goal("kinematics.P.y"), goal("kinematics.extremes.P.x.max")]
     designs = {"r1": np.array([3.0, 4.0, 5.0]), "r2": np.array([6.0, 5.0, 6.0])}
-    evaluator = Evaluator(study, goals, most_rows=12)
+    evaluator = Evaluator(study, goals, graded=True)
     found = evaluator(designs)
     # An extreme is one row.
-    assert evaluator.rows == {goals[0]: 6, goals[1]: 6}
+    places = evaluator.layout.rows
+    assert list(places) == goals[:2]
     turn = np.exp(1j * np.radians([0, 10, 20, 30, 40, 50]))
     path = designs["r1"][:, None] * turn + designs["r2"][:, None] * np.exp(1j * np.radians(60))
-    assert found.rows[goals[0]] == pytest.approx(path.real)
-    assert found.rows[goals[1]] == pytest.approx(path.imag)
-    assert found.values[goals[0]] == pytest.approx(path.real.max(axis=1))
-    assert not Evaluator(study, goals, most_rows=11)(designs).rows
+    assert found.table[:, places[goals[0]]] == pytest.approx(path.real)
+    assert found.table[:, places[goals[1]]] == pytest.approx(path.imag)
+    assert found.table[:, 0] == pytest.approx(path.real.max(axis=1))
+    evaluator.limit_rows(evaluator.layout.width - evaluator.layout.head - 1)
+    assert not evaluator.layout.rows
+    assert evaluator(designs).table.shape == (3, evaluator.layout.head)
 
 
 def test_no_point_is_evaluated_twice_nor_more_than_allowed():
@@ -315,29 +318,31 @@ def test_what_a_method_needs(change, told):
 def test_designs_that_do_not_assemble_have_a_slope():
     """The longer the links of a tray's five-bar, the less its poses miss; none where all assemble."""
     problem = tray(None)
-    evaluator = Evaluator(study_of(problem.study), [goal("kinematics.S.x", smallest=True)], most_rows=10_000)
+    evaluator = Evaluator(study_of(problem.study), [goal("kinematics.S.x", smallest=True)], graded=True)
     l1 = np.linspace(60, 140, 30)
     designs = {"l1": l1, "l2": l1 + 10, "y0": 0 * l1 + 150}
     found = evaluator(designs)
     open_ = problem.cost(*designs.values()) >= OPEN
     assert 5 < open_.sum() < 25
     assert [bool(reason) for reason in found.reasons] == open_.tolist()
-    assert (np.diff(found.shortfall[open_]) < 0).all()
-    assert (found.shortfall[~open_] == 0).all()
-    assert ((found.assembly_margins < 0).any(axis=1) == open_).all()
+    shortfall = found.table[:, evaluator.layout.shortfall]
+    assert (np.diff(shortfall[open_]) < 0).all()
+    assert (shortfall[~open_] == 0).all()
+    assert ((found.table[:, evaluator.layout.margins] < 0).any(axis=1) == open_).all()
 
 
 def test_residuals_are_what_a_root_mean_square_is_of():
     problem = timed_path(6, lambda t: 30 * np.cos(t) + 20j * np.sin(t) + 60j, {"a": (10, 20), "b": (90, 99)},
                          more={"c": 80, "u": 30, "v": 20, "x0": 3, "y0": 4})  # fmt: skip
     each = goal(problem.goal, smallest=True)
-    evaluator = Evaluator(study_of(problem.study), [each], most_rows=10_000)
+    evaluator = Evaluator(study_of(problem.study), [each], graded=True)
     found = evaluator({"a": np.array([12.0, 18.0]), "b": np.array([95.0, 91.0])})
     assert evaluator.squares == {each}
-    assert found.rows[each].shape == (2, 12)
+    rows = found.table[:, evaluator.layout.rows[each]]
+    assert rows.shape == (2, 12)
     exact = problem.cost(np.array([12.0, 18.0]), np.array([95.0, 91.0]))
-    assert np.sqrt((found.rows[each] ** 2).sum(axis=1)) == pytest.approx(exact, rel=1e-12)
-    assert found.values[each] == pytest.approx(exact, rel=1e-12)
+    assert np.sqrt((rows**2).sum(axis=1)) == pytest.approx(exact, rel=1e-12)
+    assert found.table[:, 0] == pytest.approx(exact, rel=1e-12)
 
 
 def test_errors_over_part_of_a_motion_are_no_optimum():

@@ -18,20 +18,21 @@ from mechdesign.threads import one_thread
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 
-def texts(command, study, **options):
-    result = getattr(mechdesign, command)(mechdesign.load(study), **options)
+def texts(command, study, changes, **options):
+    result = getattr(mechdesign, command)(mechdesign.load(study, changes), **options)
     return {name: to_csv(table) for name, table in result.tables.items()} | dict(result.files)
 
 
 @pytest.mark.parametrize(
-    ("command", "name", "jobs"), [("workspace", "two_rpr", 1), ("optimize", "gallery/path_synthesis", 2)]
+    ("command", "name", "changes", "jobs"),
+    [("workspace", "two_rpr", [], 1), ("optimize", "gallery/path_synthesis", ["optimize.evaluations=500"], 2)],
 )
-def test_tables_do_not_depend_on_threads(command, name, jobs):
+def test_tables_do_not_depend_on_threads(command, name, changes, jobs):
     study = CONFIGS / f"{name}.yaml"
     found = []
     for threads in (1, 2):
         with threadpool_limits(threads, user_api="blas"):
-            found.append(texts(command, study, jobs=jobs))
+            found.append(texts(command, study, changes, jobs=jobs))
     assert found[0] == found[1]
 
 
@@ -39,7 +40,8 @@ def test_files_do_not_depend_on_threads(tmp_path):
     study = CONFIGS / "two_rpr.yaml"
     code = "from mechdesign.cli.app import main; main()"
     for threads in ("1", "2"):
-        arguments = ["workspace", str(study), "--quiet", "--out", str(tmp_path / threads)]
+        change = "workspace.indices=[inverse_condition, sigma_min]"
+        arguments = ["workspace", str(study), "--quiet", "--out", str(tmp_path / threads), "--set", change]
         environment = os.environ | {"OPENBLAS_NUM_THREADS": threads}
         subprocess.run([sys.executable, "-c", code, *arguments], env=environment, check=True, capture_output=True)
     ours, theirs = ({file.name: file.read_bytes() for file in (tmp_path / n).iterdir()} for n in ("1", "2"))

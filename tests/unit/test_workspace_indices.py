@@ -12,9 +12,11 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.poses import study_poses
 from mechdesign.analyses.region.panels import BATCH
-from mechdesign.analyses.workspace.indices import OF_JACOBIAN, Local, prepare
+from mechdesign.analyses.workspace.index import prepare
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import StudyError
+from mechdesign.indices import USUAL
 from mechdesign.study import Study
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -57,17 +59,17 @@ ELASTIC = (
 def local(study: Study, *places: complex) -> dict[str, np.ndarray]:
     """The Jacobian's indices and its determinant at points."""
     found = Local.at(questions(study)[0].field, np.array(places), {})
-    values = {index.name: np.asarray(index.values(found)) for index in prepare(study, OF_JACOBIAN)}
+    values = {index.name: np.asarray(index.values(found)) for index in prepare(study, USUAL)}
     return values | {"det_J": np.asarray(found.determinant)}
 
 
 def arm_statistics() -> dict[str, float]:
     """Over the ring of a two-link arm, for indices of q2 alone: the area element is l1 l2 |sin q2| dq1 dq2."""
-    nodes, weights = np.polynomial.legendre.leggauss(4000)
-    # Split at isotropy, where the singular values meet.
+    nodes, weights = np.polynomial.legendre.leggauss(300)
+    # Split at isotropy, where the singular values meet; largest and smallest values lie there or at the ends.
     edges = [0.0, 0.75 * np.pi, np.pi]
-    q = np.concatenate([0.5 * (b + a) + 0.5 * (b - a) * nodes for a, b in pairwise(edges)])
-    w = np.concatenate([0.5 * (b - a) * weights for a, b in pairwise(edges)])
+    q = np.concatenate([edges, *(0.5 * (b + a) + 0.5 * (b - a) * nodes for a, b in pairwise(edges))])
+    w = np.concatenate([np.zeros(3), *(0.5 * (b - a) * weights for a, b in pairwise(edges))])
     jacobian = np.empty((len(q), 2, 2))
     jacobian[:, 0, 1] = jacobian[:, 1, 1] = 0.0
     jacobian[:, 0] = np.stack([-L2 * np.sin(q), -L2 * np.sin(q)], axis=-1)

@@ -7,9 +7,9 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from mechdesign.analyses.kinematics import targets
-from mechdesign.analyses.kinematics.lines import PoseLine
+from mechdesign.analyses.kinematics.lines import STILL, PoseLine
 from mechdesign.analyses.kinematics.motion import Motion
-from mechdesign.analyses.kinematics.peaks import STILL, Along, Peak, peaks, searched
+from mechdesign.analyses.kinematics.peaks import Along, Peak, peaks, searched
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats, Ints

@@ -34,6 +34,8 @@ GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
 # Poses of a design's sweep that a line begins with, about: of a finer sweep some are left out, but no step becomes
 # longer than so many radians, or so much of the mechanism's size.
 ENOUGH, LONGEST = 4096, 0.02
+# A range below this part of a function's size is rounding.
+STILL = 1e-12
 # A limit this near to a pose of the sweep, in rows, is that pose.
 AT_ROW = 1e-9
 
@@ -48,12 +50,15 @@ class Function:
         Of configurations.
     slope : callable
         Derivative by the swept coordinate: of configurations and the velocities at its unit speed.
+    size : float
+        What rounding in it is judged by.
     radian : float or None
         What a radian is in its unit, where it is an angle.
     """
 
     value: Callable[[Configuration], Value]
     slope: Callable[[Configuration, Rates], Value]
+    size: float = 1.0
     radian: float | None = None
 
 
@@ -62,13 +67,14 @@ def function_of(study: Study, coordinate: Coordinate) -> Function:
     return Function(
         lambda configuration: in_study_units(study, coordinate, configuration.value(coordinate)),
         lambda configuration, velocity: in_study_units(study, coordinate, first(configuration, coordinate, velocity)),
+        study.mechanism.size if coordinate.quantity == "length" else 0.0,
         1 / study.units.angle_factor if coordinate.quantity == "angle" else None,
     )
 
 
 def _frame(k: int) -> Function:
     """The angle of a class of bodies that turn together."""
-    return Function(lambda configuration: np.angle(configuration.rotations[k]), lambda _, v: v.angles[k], 1.0)
+    return Function(lambda configuration: np.angle(configuration.rotations[k]), lambda _, v: v.angles[k], radian=1.0)
 
 
 def thinned(motion: Motion, swept: str) -> Flags:
@@ -283,8 +289,10 @@ class PoseLine:
         """Put poses into segments until no link turns far within one and the functions are smooth there."""
         self.divide(np.flatnonzero(~self.sharp()[self.begin]), GRADED)
         self.divide(np.flatnonzero(~self.sharp()[self.end]), 1 - GRADED[::-1])
-        span = -self.least(self.values) - self.least(-self.values)
-        scale = np.where(np.isnan(self._radians)[:, None], np.where(span > 0, span, np.inf), self._radians[:, None])
+        low, high = self.least(self.values), -self.least(-self.values)
+        sizes = np.array([function.size for function in self._functions])[:, None]
+        moves = high - low > STILL * np.maximum(sizes, np.maximum(np.abs(low), np.abs(high)))
+        scale = np.where(np.isnan(self._radians)[:, None], np.where(moves, high - low, np.inf), self._radians[:, None])
         for _ in range(ROUNDS):
             length = self.place[self.end] - self.place[self.begin]
             rise = self.values[:, self.end] - self.values[:, self.begin]

@@ -20,8 +20,6 @@ Along = Callable[[Ints, Floats], Floats]
 
 # How far from its place an extreme or a zero may be found, as a part of its segment.
 PRECISION = 1e-13
-# A range below this part of a function's size is rounding.
-STILL = 1e-12
 # Where a segment that may hold an extreme is looked at first.
 LOOKS = np.array([0.25, 0.5, 0.75])
 

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mechdesign.analyses.optimize.explorer import ASSEMBLY, Explorer, Objective
+from mechdesign.analyses.optimize.explorer import ASSEMBLY, Explorer
 from mechdesign.analyses.optimize.lockstep import Ask, side_by_side
 from mechdesign.numerics.arrays import Floats, Ints
 
@@ -22,11 +22,17 @@ from mechdesign.numerics.arrays import Floats, Ints
 LADDER = ((1e-4, 0.3), (1e-5, 0.03))
 # Where values are known to a tolerance, differences over less than this are noise.
 ROUGH = ((1e-2, 0.3), (1e-3, 0.05))
-SQUARES_STEP, MOST_SQUARES, MOST_FINAL_SQUARES, MOST_STEPS = 1e-5, 60, 150, 60
+SQUARES_STEP = 1e-5
+# Most steps of least squares, far from their end and near it, and of quadratic programs.
+MOST_SQUARES = 60
+MOST_FINAL_SQUARES = 150
+MOST_STEPS = 60
 # Points asked for one after the other, none of which is better than what was known: a stage ends.
-MOST_IN_VAIN, ROUGH_MOST_IN_VAIN = 30, 12
-# Gains of a step, in parts of what a range changes, below which a descent ends.
-ENOUGH, ROUGH_ENOUGH = 1e-14, 1e-5
+MOST_IN_VAIN = 30
+ROUGH_MOST_IN_VAIN = 12
+# Gains of a step, in parts of what a range changes, below which a quadratic program ends.
+SMALLEST_GAIN = 1e-14
+ROUGH_SMALLEST_GAIN = 1e-5
 # How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
 SLACK = 1e-9
 # Added to the objective where a point has no value and no condition tells why, in parts of what a range changes.
@@ -41,15 +47,15 @@ class _InVain(Exception):
 
 
 def descend(
-    explorer: Explorer, descents: Sequence[tuple[Objective, int]], ladder: Sequence[tuple[float, float]] = LADDER,
+    explorer: Explorer, descents: Sequence[tuple[Floats, int]], ladder: Sequence[tuple[float, float]] = LADDER,
     *, final: bool = False,
 ) -> list[int]:  # fmt: skip
     """Descend from known points, all at once: a batch of designs costs little more than one.
 
     Parameters
     ----------
-    descents : sequence of (Objective, int)
-        What is made small, and the row of `explorer.known` from which.
+    descents : sequence of (ndarray, int)
+        Factors of the goals whose sum is made small, and the row of `explorer.known` from which.
     ladder : sequence of (float, float)
         Steps of differences and half the widths of boxes.
     final : bool
@@ -74,10 +80,10 @@ class _Descent:
     """One descent: the best row so far, and the smooth parts of which its objective consists."""
 
     def __init__(
-        self, explorer: Explorer, objective: Objective, row: int, ladder: Sequence[tuple[float, float]], final: bool
+        self, explorer: Explorer, objective: Floats, row: int, ladder: Sequence[tuple[float, float]], final: bool
     ) -> None:
         self.explorer, self.objective, self.best, self.ladder, self.final = explorer, objective, row, ladder, final
-        self.plain, known = objective.factors.copy(), explorer.known
+        self.plain, known = objective.copy(), explorer.known
         goals = len(self.plain)
         self.edged, self.held, self.squares = [], [], []
         self.conditions = np.ones(known.margins.shape[1], dtype=bool)
@@ -91,8 +97,8 @@ class _Descent:
                 self.conditions[part.column - goals] = False
             elif part.squares:
                 self.squares += [part] if self.plain[part.column] > 0 else []
-            elif objective.factors[part.column] * part.sign > 0 and np.isfinite(known.rows[row, part.place]).all():
-                self.edged.append((part, abs(objective.factors[part.column])))
+            elif objective[part.column] * part.sign > 0 and np.isfinite(known.rows[row, part.place]).all():
+                self.edged.append((part, abs(objective[part.column])))
                 self.plain[part.column] = 0.0
         # A root mean square that is the only goal is made small by its square, which is smoother.
         self.curvature = 0.0
@@ -100,16 +106,18 @@ class _Descent:
         self._in_vain = 0
         # Whether slopes were asked for at the last point.
         self._taken = True
-        self.squared = len(self.squares) == np.count_nonzero(objective.factors) == 1
+        self.squared = len(self.squares) == np.count_nonzero(objective) == 1
 
     def run(self, ask: Ask) -> None:
+        """Descend by points that `ask` evaluates."""
+        self._evaluate = ask
         if not self.explorer.known.valid[self.best]:
             return
         if self.squared:
             # `trf` is quicker far from the optimum, `dogbox` along a narrow valley that ends on bounds.
-            self._stage(self._least_squares, ask, "dogbox" if self.final else "trf")
+            self._stage(self._least_squares, "dogbox" if self.final else "trf")
         for step, width in self.ladder:
-            self._stage(self._programming, ask, step, width)
+            self._stage(self._programming, step, width)
 
     def _stage(self, optimiser: Callable[..., None], *arguments: Any) -> None:
         """Let an optimiser go on until it ends, or comes no further; its best point is kept."""
@@ -117,11 +125,11 @@ class _Descent:
         with suppress(_InVain):
             optimiser(*arguments)
 
-    def ask(self, ask: Ask, points: Floats) -> Ints:
+    def ask(self, points: Floats) -> Ints:
         """Rows of points; the best of them, or of those before, is where the next stage begins."""
         if self._in_vain > (ROUGH_MOST_IN_VAIN if self.explorer.rough else MOST_IN_VAIN):
             raise _InVain
-        rows = ask(points)
+        rows = self._evaluate(points)
         known = self.explorer.known
         among = np.concatenate([[self.best], rows])
         merit = known.merit(self.objective)[among]
@@ -140,17 +148,17 @@ class _Descent:
         plain = plain**2 if self.squared else plain
         return plain[:, None], np.concatenate([none, *pieces], axis=1), np.concatenate(limits, axis=1)
 
-    def _least_squares(self, ask: Ask, method: Literal["trf", "dogbox"]) -> None:
+    def _least_squares(self, method: Literal["trf", "dogbox"]) -> None:
         from scipy.optimize import least_squares
 
         (part,) = self.squares
 
         def residuals(u: Floats) -> Floats:
-            row = self.at(ask, u, SQUARES_STEP)[0]
+            row = self.at(u, SQUARES_STEP)[0]
             return np.asarray(self.explorer.known.rows[row, part.place])
 
         def slopes(u: Floats) -> Floats:
-            points, rows = self._stencil(ask, u, SQUARES_STEP)
+            points, rows = self._stencil(u, SQUARES_STEP)
             return np.nan_to_num(_differences(points, u, self.explorer.known.rows[rows][:, part.place]))
 
         begin = self.explorer.known.u[self.best]
@@ -161,28 +169,28 @@ class _Descent:
                 xtol=1e-14, ftol=1e-14, gtol=None,
             )  # fmt: skip
 
-    def at(self, ask: Ask, u: Floats, step: float) -> Ints:
+    def at(self, u: Floats, step: float) -> Ints:
         """Rows of a point, and of those for its slopes where they cost little more and are likely to be asked for next.
 
         They are not where the point before was not taken.
         """
         if self.explorer.slow or not self._taken:
-            return self.ask(ask, u[None])
-        rows = self._stencil(ask, u, step)[1]
+            return self.ask(u[None])
+        rows = self._stencil(u, step)[1]
         self._taken = False
         return rows
 
-    def _stencil(self, ask: Ask, u: Floats, step: float) -> tuple[Floats, Ints]:
+    def _stencil(self, u: Floats, step: float) -> tuple[Floats, Ints]:
         """A point, and those a step from it along each variable, inside the cube."""
         sides = [np.clip(u + sign * step * np.eye(len(u)), 0.0, 1.0) for sign in (-1, 1)]
         points = np.concatenate([u[None], *sides])
         if not np.array_equal(points, self._last[0]):
             # Asked for again, they would wait for the other descents.
-            self._last = points, self.ask(ask, points)
+            self._last = points, self.ask(points)
         self._taken = True
         return self._last
 
-    def _programming(self, ask: Ask, step: float, width: float) -> None:
+    def _programming(self, step: float, width: float) -> None:
         """Sequential quadratic programming in a box about the best point."""
         from scipy.optimize import minimize as scipy_minimize
 
@@ -192,7 +200,7 @@ class _Descent:
         n, more = len(begin), len(self.edged)
         lines = self.explorer.known.rows[[self.best]]
         owner = np.repeat(np.arange(more), [part.pieces(lines).shape[1] for part, _ in self.edged])
-        program = _Program(self, ask, begin, step)
+        program = _Program(self, begin, step)
         raised, free = np.eye(more)[owner], np.zeros((len(program.lengths), more))
 
         def cost(y: Floats) -> float:
@@ -216,12 +224,12 @@ class _Descent:
             cost, np.concatenate([begin, tops]), jac=cost_slope, method="SLSQP",
             bounds=[*zip(low, high, strict=True), *[(None, None)] * more],
             constraints=[{"type": "ineq", "fun": room, "jac": room_slope}] if len(owner) + len(free) else (),
-            options={"maxiter": MOST_STEPS, "ftol": ROUGH_ENOUGH if self.explorer.rough else ENOUGH},
+            options={"maxiter": MOST_STEPS, "ftol": ROUGH_SMALLEST_GAIN if self.explorer.rough else SMALLEST_GAIN},
         )  # fmt: skip
 
-    def linear(self, ask: Ask, u: Floats, step: float) -> tuple[list[Floats], list[Floats]]:
+    def linear(self, u: Floats, step: float) -> tuple[list[Floats], list[Floats]]:
         """The terms at a point, and their slopes, each of shape (columns, n)."""
-        points, rows = self._stencil(ask, u, step)
+        points, rows = self._stencil(u, step)
         found = self.terms(rows)
         if self.squared:
             # Slopes vanish at the bottom of a valley; there the curvature tells how much a range changes.
@@ -239,9 +247,9 @@ class _Program:
     condition or a clearance tells that nothing is to be had there; else they are too high for a step to be taken.
     """
 
-    def __init__(self, descent: _Descent, ask: Ask, begin: Floats, step: float) -> None:
-        self._descent, self._ask, self._step = descent, ask, step
-        values, slopes = descent.linear(ask, begin, step)
+    def __init__(self, descent: _Descent, begin: Floats, step: float) -> None:
+        self._descent, self._step = descent, step
+        values, slopes = descent.linear(begin, step)
         scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), descent.curvature, TINY)
         steepest = np.abs(slopes[2]).max(axis=1, initial=0.0)
         self.lengths = np.maximum(steepest, np.maximum(FLAT * np.abs(np.nan_to_num(values[2])), TINY))
@@ -255,7 +263,7 @@ class _Program:
         """The smooth sum, the rows that bound each worst, and what may not be positive."""
         key = u.tobytes()
         if key not in self._known:
-            rows = self._descent.at(self._ask, u, self._step)[:1]
+            rows = self._descent.at(u, self._step)[:1]
             found = [part[0] / scale for part, scale in zip(self._descent.terms(rows), self._scales, strict=True)]
             straight = [a + b @ (u - self._at) for a, b in zip(self._values, self._slopes, strict=True)]
             impossible = np.isnan(found[0]).any() or np.isnan(found[1]).any()
@@ -270,7 +278,7 @@ class _Program:
         """Slopes of the terms, each of shape (columns, n)."""
         key = u.tobytes()
         if key not in self._known_slopes:
-            values, slopes = self._descent.linear(self._ask, u, self._step)
+            values, slopes = self._descent.linear(u, self._step)
             values = [a / b for a, b in zip(values, self._scales, strict=True)]
             slopes = [a / b[:, None] for a, b in zip(slopes, self._scales, strict=True)]
             known = [np.isfinite(part) for part in values]

@@ -22,23 +22,6 @@ class Spent(Exception):
     """The evaluations that were allowed are used up."""
 
 
-@dataclass(frozen=True, eq=False)
-class Objective:
-    """What is made small: a weighted sum of the goals.
-
-    Parameters
-    ----------
-    factors : ndarray, shape (goals,)
-        Negative where a goal is made large.
-    """
-
-    factors: Floats
-
-    def __call__(self, values: Floats) -> Floats:
-        """From the values of the goals, shape (points, goals), to shape (points,)."""
-        return np.asarray(values @ self.factors)
-
-
 @dataclass(frozen=True)
 class Part:
     """Rows that a goal or a condition is the worst of, or the root mean square.
@@ -77,7 +60,7 @@ class Part:
         return np.asarray(found - self.sign * self.bound)
 
 
-class Outcome(NamedTuple):
+class Scores(NamedTuple):
     """What an evaluation of points gives; see `Known`. Without shortfalls, points without a value are all alike."""
 
     values: Floats
@@ -120,15 +103,17 @@ class Known:
         """Points that have values and meet every condition."""
         return np.asarray(self.valid & (self.margins >= 0).all(axis=1))
 
-    def merit(self, objective: Objective) -> Floats:
+    def merit(self, objective: Floats) -> Floats:
         """What is made small, shape (points,): the objective where it is feasible, always less than elsewhere.
+
+        The objective is the sum of the goals times its factors, negative where a goal is made large.
 
         Points that miss a condition follow by how much they miss, then those without a value by their shortfall
         [Deb, An efficient constraint handling method for genetic algorithms, 2000]; inf where that is not known.
         """
         valid, feasible = self.valid, self.feasible
         merit = np.where(np.isnan(self.shortfall), np.inf, OPEN * (1.0 + self.shortfall))
-        merit[feasible] = objective(self.values[feasible])
+        merit[feasible] = self.values[feasible] @ objective
         missing = valid & ~feasible
         if missing.any():
             scale = np.abs(self.margins[valid]).max(axis=0)
@@ -160,29 +145,21 @@ class Explorer:
     """
 
     def __init__(
-        self, evaluate: Callable[[Floats], Outcome], dimensions: int, budget: int, parts: Sequence[Part] = (),
+        self, evaluate: Callable[[Floats], Scores], dimensions: int, budget: int, parts: Sequence[Part] = (),
         *, rough: bool = False, slow: bool = False,
     ) -> None:  # fmt: skip
-        self._evaluate = evaluate
-        self.dimensions = dimensions
-        self.left = budget
-        self.reserve = 0
-        self.parts = tuple(parts)
+        self._evaluate, self.dimensions, self.parts = evaluate, dimensions, tuple(parts)
+        self.left, self.reserve = budget, 0
         self.rough, self.slow = rough, slow
         self._rows: dict[bytes, int] = {}
         # Columns of points, values, margins, rows and shortfall; more lines than are filled.
-        self._table = np.empty((0, 0))
-        self._ends = [0, dimensions, dimensions, dimensions, dimensions, dimensions]
+        self._table, self._ends = np.empty((0, dimensions + 1)), [dimensions] * 4
 
     @property
     def known(self) -> Known:
         """Everything evaluated so far."""
-        filled = self._table[: len(self._rows)]
-        if not self._rows:
-            none = np.empty((0, 0))
-            return Known(np.empty((0, self.dimensions)), none, none, none, np.empty(0))
-        u, values, margins, rows = (filled[:, a:b] for a, b in zip(self._ends[:4], self._ends[1:5], strict=True))
-        return Known(u, values, margins, rows, filled[:, -1])
+        u, values, margins, rows, shortfall = np.split(self._table[: len(self._rows)], self._ends, axis=1)
+        return Known(u, values, margins, rows, shortfall[:, 0])
 
     def __call__(self, u: Floats) -> Ints:
         """Rows of `known` that hold these points, shape (m, dimensions).
@@ -196,19 +173,20 @@ class Explorer:
         keys = [point.tobytes() for point in u]
         new = {key: k for k, key in reversed(list(enumerate(keys))) if key not in self._rows}
         if new:
-            order = sorted(new.values())
+            order, begun = sorted(new.values()), len(self._rows)
             if len(order) > self.left - self.reserve:
                 raise Spent
             self.left -= len(order)
-            found, begun = self._evaluate(u[order]), len(self._rows)
-            short = np.where(np.isnan(found.values).any(axis=1), 1.0, 0.0)
-            short = short if found.shortfall is None else found.shortfall
-            parts = [u[order], found.values, found.margins, found.rows, short[:, None]]
-            if begun + len(order) > len(self._table):
-                self._ends = np.cumsum([0, *(part.shape[1] for part in parts)]).tolist()
-                grown = np.empty((max(FIRST_ROWS, 2 * (begun + len(order))), self._ends[-1]))
+            found = self._evaluate(u[order])
+            none = np.where(np.isnan(found.values).any(axis=1), 1.0, 0.0)
+            shortfall = none if found.shortfall is None else found.shortfall
+            parts = (u[order], found.values, found.margins, found.rows, shortfall[:, None])
+            end = begun + len(order)
+            if end > len(self._table):
+                *self._ends, width = np.cumsum([part.shape[1] for part in parts]).tolist()
+                grown = np.empty((max(FIRST_ROWS, 2 * end), width))
                 grown[:begun] = self._table[:begun] if begun else 0.0
                 self._table = grown
-            self._table[begun : begun + len(order)] = np.concatenate(parts, axis=1)
+            self._table[begun:end] = np.concatenate(parts, axis=1)
             self._rows |= {keys[k]: begun + row for row, k in enumerate(order)}
         return np.array([self._rows[key] for key in keys], dtype=np.intp)

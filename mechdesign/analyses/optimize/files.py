@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from mechdesign.analyses.optimize.designs import in_words
 from mechdesign.analyses.optimize.tables import Comparison
+from mechdesign.analyses.optimize.variables import in_words
 from mechdesign.errors import MechdesignError
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
-from threading import Thread
 
 import numpy as np
 
@@ -25,12 +25,13 @@ def side_by_side(explorer: Explorer, tasks: Sequence[Callable[[Ask], None]]) -> 
     Spent
         If the evaluations are used up; all tasks have ended then.
     """
-    asked: SimpleQueue[tuple[int, Floats | None, BaseException | None]] = SimpleQueue()
+    # Points that a task asks for, None at its end; and their rows, None where there are no more.
+    asked: SimpleQueue[tuple[int, Floats | None]] = SimpleQueue()
     answers: list[SimpleQueue[Ints | None]] = [SimpleQueue() for _ in tasks]
 
     def run(k: int) -> None:
         def ask(points: Floats) -> Ints:
-            asked.put((k, points, None))
+            asked.put((k, points))
             rows = answers[k].get()
             if rows is None:
                 raise Spent
@@ -40,38 +41,26 @@ def side_by_side(explorer: Explorer, tasks: Sequence[Callable[[Ask], None]]) -> 
             # The state of warnings is a thread's own.
             with np.errstate(all="ignore"):
                 tasks[k](ask)
-        except Spent:
-            asked.put((k, None, None))
-        except BaseException as error:
-            asked.put((k, None, error))
-        else:
-            asked.put((k, None, None))
+        finally:
+            asked.put((k, None))
 
-    threads = [Thread(target=run, args=(k,), daemon=True) for k in range(len(tasks))]
-    for thread in threads:
-        thread.start()
-    running, wrong = set(range(len(tasks))), None
-    waiting: dict[int, Floats] = {}
-    try:
-        while running:
-            while len(waiting) < len(running):
-                k, points, error = asked.get()
-                if points is None:
-                    running.discard(k)
-                    wrong = wrong or error
-                else:
-                    waiting[k] = points
-            if wrong is not None:
-                raise wrong
-            order = sorted(waiting)
-            if order:
-                rows = explorer(np.concatenate([waiting[k] for k in order]))
-                ends = np.cumsum([len(waiting[k]) for k in order])[:-1]
-                waiting = {}
-                for k, mine in zip(order, np.split(rows, ends), strict=True):
-                    answers[k].put(mine)
-    finally:
-        for answer in answers:
-            answer.put(None)
-        for thread in threads:
-            thread.join()
+    with ThreadPoolExecutor(max(len(tasks), 1)) as pool:
+        running = {k: pool.submit(run, k) for k in range(len(tasks))}
+        waiting: dict[int, Floats] = {}
+        try:
+            while running:
+                while len(waiting) < len(running):
+                    k, points = asked.get()
+                    if points is None:
+                        running.pop(k).result()
+                    else:
+                        waiting[k] = points
+                order = sorted(waiting)
+                if order:
+                    rows = explorer(np.concatenate([waiting[k] for k in order]))
+                    ends = np.cumsum([len(waiting.pop(k)) for k in order])
+                    for k, mine in zip(order, np.split(rows, ends[:-1]), strict=True):
+                        answers[k].put(mine)
+        finally:
+            for answer in answers:
+                answer.put(None)

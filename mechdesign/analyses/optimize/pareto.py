@@ -4,24 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechdesign.analyses.optimize.explorer import Explorer, Known, Spent
+from mechdesign.analyses.optimize.explorer import Explorer, Spent
+from mechdesign.analyses.optimize.search import sample
+from mechdesign.analyses.optimize.tables import Comparison
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.results import Column, Table
 
-# Evaluations where the study says none, a goal; and how many generations a population is given of them.
-ALLOWANCE, GENERATIONS = 1200, 25
+# Evaluations for each goal where the study says none.
+DEFAULT_EVALUATIONS = 1200
+# Generations that a population is given of those that are left.
+GENERATIONS = 25
+SMALLEST_POPULATION = 8
+LARGEST_POPULATION = 200
 # Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ.
-CLOSE = 1e-4
-SMALLEST_POPULATION, LARGEST_POPULATION = 8, 200
+SAME_DESIGN = 1e-4
 
 
-def allowance(goals: int) -> int:
-    """Evaluations of a front where the study says none."""
-    return ALLOWANCE * goals
+def spread(explorer: Explorer, signs: Floats, seed: int) -> None:
+    """Use the evaluations that are left to spread a population along the front, from its widest gaps so far.
 
-
-def population(budget: int) -> int:
-    """Size of the population for a number of evaluations."""
-    return int(np.clip(budget // GENERATIONS, SMALLEST_POPULATION, LARGEST_POPULATION))
+    Parameters
+    ----------
+    signs : ndarray, shape (goals,)
+        1 where a goal is minimised, -1 where it is maximised.
+    """
+    size, known = int(np.clip(explorer.left // GENERATIONS, SMALLEST_POPULATION, LARGEST_POPULATION)), explorer.known
+    begun = np.flatnonzero(known.feasible)
+    if len(begun):
+        rows = begun[front(known.values[begun] * signs)]
+        begun = rows[np.argsort(-crowding(known.values[rows] * signs), kind="stable")[: size // 2]]
+    others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
+    evolve(explorer, signs, np.concatenate([known.u[begun], others]), seed)
 
 
 def evolve(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
@@ -30,7 +43,7 @@ def evolve(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
     Parameters
     ----------
     signs : ndarray, shape (goals,)
-        1 where a goal is minimised, -1 where it is maximised.
+        As `spread` takes them.
     first : ndarray, shape (points, dimensions)
         Points of the unit cube to begin with.
     """
@@ -82,23 +95,6 @@ def front(values: Floats) -> Ints:
     return np.sort(first[rows])
 
 
-def promising(known: Known, signs: Floats, count: int) -> Ints:
-    """Rows to spread a population from: of the front so far those with the widest gaps about them.
-
-    Parameters
-    ----------
-    signs : ndarray, shape (goals,)
-        As `evolve` takes them.
-    """
-    feasible = np.flatnonzero(known.feasible)
-    if not len(feasible):
-        return feasible
-    values = known.values[feasible] * signs
-    rows = front(values)
-    widest = np.argsort(-crowding(values[rows]), kind="stable")[:count]
-    return np.asarray(feasible[rows[widest]])
-
-
 def normalised(values: Floats) -> Floats:
     """Values of a front as fractions of the way from each goal's best value on it to its worst."""
     low, span = values.min(axis=0), np.ptp(values, axis=0)
@@ -106,14 +102,18 @@ def normalised(values: Floats) -> Floats:
 
 
 def distinct(values: Floats) -> Ints:
-    """Rows of a front, its ends among them, of which no two are closer than `CLOSE` in every goal."""
+    """Rows of a front, its ends among them, of which no two are closer than `SAME_DESIGN` in every goal."""
     share = normalised(values)
-    ends = [int(np.lexsort((share.sum(axis=1), column))[0]) for column in share.T]
     kept: list[int] = []
-    for k in (*ends, *range(len(share))):
-        if not kept or (np.abs(share[kept] - share[k]).max(axis=1) > CLOSE).all():
+    for k in (*_ends(share), *range(len(share))):
+        if (np.abs(share[kept] - share[k]).max(axis=1, initial=0.0) > SAME_DESIGN).all():
             kept.append(k)
     return np.sort(np.array(kept, dtype=np.intp))
+
+
+def _ends(share: Floats) -> list[int]:
+    """The best row in each goal; of rows equally good in it the one that is best in the others."""
+    return [int(np.lexsort((share.sum(axis=1), column))[0]) for column in share.T]
 
 
 def knee(values: Floats) -> int:
@@ -127,11 +127,9 @@ def knee(values: Floats) -> int:
         Of a front; less is better.
     """
     share = normalised(values)
-    # Of designs equally good in a goal the extreme is the one that is best in the others.
-    extremes = share[[int(np.lexsort((share.sum(axis=1), column))[0]) for column in share.T]]
     ones = np.ones(share.shape[1])
     try:
-        normal = np.linalg.solve(extremes, ones)
+        normal = np.linalg.solve(share[_ends(share)], ones)
     except np.linalg.LinAlgError:
         normal = ones
     if not np.isfinite(normal).all() or (normal <= 0).any():
@@ -144,10 +142,25 @@ def crowding(values: Floats) -> Floats:
 
     Infinite at the ends [Deb et al., 2002].
     """
-    share = normalised(values)
-    distance = np.zeros(len(share))
-    for column in share.T:
-        order = np.argsort(column, kind="stable")
-        distance[order[[0, -1]]] = np.inf
-        distance[order[1:-1]] += column[order[2:]] - column[order[:-2]]
-    return distance
+    from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
+
+    return np.asarray(calc_crowding_distance(values) * values.shape[1])
+
+
+def pareto_table(compared: Comparison) -> tuple[Table, int]:
+    """The front over all feasible designs that were evaluated, the best of the first goal first, and its knee's row."""
+    designs = compared.designs
+    feasible = np.flatnonzero(designs.feasible)
+    values = compared.values[feasible] * [1 if each.smallest else -1 for each in designs.goals]
+    on_front = front(values)
+    on_front = on_front[np.lexsort(values[on_front].T[::-1])]
+    on_front = on_front[distinct(values[on_front])]
+    rows, values = feasible[on_front], values[on_front]
+    marked = np.arange(len(rows)) == knee(values)
+    columns = (
+        *compared.columns(rows),
+        Column("knee", marked, "", "1 at the design farthest from the plane through the extremes of the front"),
+        Column("crowding", crowding(values), "", "gap between the neighbours on the front; inf at its ends"),
+    )
+    table = Table("pareto", columns, "designs none of which is surpassed in every goal at once")
+    return table, int(rows[marked][0])

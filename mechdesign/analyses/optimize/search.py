@@ -14,38 +14,50 @@ from typing import Any
 import numpy as np
 
 from mechdesign.analyses.optimize.descent import LADDER, ROUGH, descend
-from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Objective, Spent
+from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Spent
 from mechdesign.numerics.arrays import Floats
 
 # Evaluations per row of weights and per (variables + 1): the fewest of a start, and the default of a search.
-START, USUAL = 500, 1800
+START_EVALUATIONS = 500
+DEFAULT_EVALUATIONS = 1800
 # That default where designs are evaluated one by one, per (variables + 1) and per row of weights and end of a goal.
-SLOW_USUAL = 20
+SLOW_DEFAULT_EVALUATIONS = 20
 MOST_STARTS = 12
-# Points of a start's sample per (variables + 1); with no more variables than these the cube's vertices join it.
-SAMPLE, MOST_VERTICES = 16, 4
-# A start's sample takes one in so many of its evaluations, at least.
-SAMPLED = 6
-# Differential evolution: population per variable, smallest population, generations without gain that end it.
-POPULATION, SMALLEST_POPULATION, PATIENCE, ROUGH_PATIENCE = 8, 24, 8, 3
-# The part of a start's evaluations that differential evolution may take.
-EVOLUTION = 0.5
-# An improvement below this fraction of the objective's range is left to the descents.
-ENOUGH = 1e-3
-# Descents at once, and how far apart they begin, in parts of the ranges.
-ABREAST, APART = 6, 0.05
+# Points of a start's sample per (variables + 1); it takes one in so many of the start's evaluations, at least.
+SAMPLE_POINTS = 16
+SAMPLE_SHARE = 6
+# With no more variables than these the cube's vertices join the sample.
+MOST_VERTICES = 4
+# Differential evolution: population per variable, smallest population, the part of a start's evaluations that it takes.
+POPULATION = 8
+SMALLEST_POPULATION = 24
+EVOLUTION_PART = 0.5
+# Generations that improve the objective by less than this part of its range end it; fewer of values with noise.
+STALLED_GAIN = 1e-3
+STALLED_GENERATIONS = 8
+ROUGH_STALLED_GENERATIONS = 3
+# Most descents at once, and the smallest distance between their beginnings, in parts of the ranges.
+MOST_DESCENTS = 6
+APART = 0.05
 # Evaluations that a descent takes as a rule, in those of its slopes (2 n + 1).
-DESCENT = 40
+DESCENT_EVALUATIONS = 40
 # Rounds of descents in a start: where the search may end early, and where it uses all its evaluations.
-ROUNDS, MOST_ROUNDS = 2, 1000
-# Steps that may not improve the optimum, in parts of the ranges; evaluations kept for that, in those of slopes.
-CHECKED, MOST_CHECKS, CHECKS, SQUARES_CHECKS = 1e-4, 12, 40, 200
-# Improvements below these parts of the objective, and of all its values, are rounding; of values known to a tolerance.
-ROUNDING, OF_ALL, NOISE = 1e-9, 1e-10, 1e-5
+FEWEST_ROUNDS = 2
+MOST_ROUNDS = 1000
+# Length of the steps that may not improve the optimum, in parts of the ranges, and rounds of such steps.
+CHECK_STEP = 1e-4
+MOST_CHECKS = 12
+# Evaluations kept for these rounds, in those of slopes; those of a root mean square have the narrowest valleys.
+CHECK_EVALUATIONS = 40
+SQUARES_CHECK_EVALUATIONS = 200
+# Improvements below these parts of the objective, and of its range, are rounding; of values known to a tolerance.
+ROUNDING = 1e-9
+RANGE_ROUNDING = 1e-10
+NOISE = 1e-5
 # A descent that gains more than this part of the objective has not come to its end.
-STILL = 1e-6
+ENDED_GAIN = 1e-6
 # Starts that end within this part of the best agree.
-AGREE = 0.01
+AGREEMENT = 0.01
 
 
 @dataclass(frozen=True)
@@ -71,12 +83,12 @@ class Ending:
 def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
     """Evaluations of a search where the study says none."""
     if slow:
-        return SLOW_USUAL * (dimensions + 1) * (rows + 2 * goals)
-    return USUAL * (dimensions + 1) * rows
+        return SLOW_DEFAULT_EVALUATIONS * (dimensions + 1) * (rows + 2 * goals)
+    return DEFAULT_EVALUATIONS * (dimensions + 1) * rows
 
 
 def search(
-    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int, *, patient: bool = True
+    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int, *, use_all: bool = True
 ) -> Ending:
     """Fill an explorer's memory with what the goals' extremes and the best weighted sums need, while evaluations last.
 
@@ -86,25 +98,24 @@ def search(
         Which goals are minimised.
     rows : sequence of sequence of float
         Weights, in the order of the goals.
-    patient : bool
+    use_all : bool
         Whether all evaluations are used; else it ends when two starts have found the same.
     """
     rng = np.random.default_rng(seed)
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
-    starts = int(np.clip(budget // (START * (explorer.dimensions + 1) * len(rows)), 1, MOST_STARTS))
-    # The valleys of a root mean square are the narrowest.
-    checks = SQUARES_CHECKS if any(part.squares for part in explorer.parts) else CHECKS
+    starts = int(np.clip(budget // (START_EVALUATIONS * (explorer.dimensions + 1) * len(rows)), 1, MOST_STARTS))
+    checks = SQUARES_CHECK_EVALUATIONS if any(part.squares for part in explorer.parts) else CHECK_EVALUATIONS
     last = min(budget // 4, checks * slope * len(rows))
     begins = []
     for k, own in enumerate(rng.spawn(starts)):
         begins.append(budget - explorer.left)
         explorer.reserve = last + (budget - last) * (starts - 1 - k) // starts
-        _start(explorer, smallest, rows, own, begins[-1], patient)
+        _start(explorer, smallest, rows, own, begins[-1], use_all)
         known, done = explorer.known, [*begins, budget - explorer.left]
         if not known.feasible.any():
             # Too few for anything but to look around.
             explorer(own.random((explorer.left - explorer.reserve, explorer.dimensions)))
-        elif not patient:
+        elif not use_all:
             objectives = [_weighted(known, smallest, row) for row in rows]
             if all(_agree(known, objective, _ends(known, objective, done)) for objective in objectives):
                 break
@@ -127,11 +138,11 @@ def _start(
     rows: Sequence[Sequence[float]],
     rng: np.random.Generator,
     begin: int,
-    patient: bool,
+    use_all: bool,
 ) -> None:
     """Search from points of its own until the evaluations of this start are used up.
 
-    Where not all need be used it ends after `ROUNDS` of descents, or one in which two came to the same.
+    Where not all need be used it ends after `FEWEST_ROUNDS` of descents, or one in which two came to the same.
 
     Parameters
     ----------
@@ -142,17 +153,17 @@ def _start(
     ladder = ROUGH if explorer.rough else LADDER
     tried: list[list[int]] = [[] for _ in rows]
     try:
-        explorer(sample(n, rng, max(SAMPLE * (n + 1), allowed // SAMPLED), allowed // 3))
-        if begin == 0 and len(smallest) > 1 and allowed > 4 * len(smallest) * DESCENT * (2 * n + 1):
+        explorer(sample(n, rng, max(SAMPLE_POINTS * (n + 1), allowed // SAMPLE_SHARE), allowed // 3))
+        if begin == 0 and len(smallest) > 1 and allowed > 4 * len(smallest) * DESCENT_EVALUATIONS * (2 * n + 1):
             _extremes(explorer, smallest, rng, allowed)
         for row in rows:
-            most = int(EVOLUTION * allowed) // len(rows)
+            most = int(EVOLUTION_PART * allowed) // len(rows)
             evolve(explorer, _weighted(explorer.known, smallest, row), rng, begin, most)
-        for _ in range(MOST_ROUNDS if patient else ROUNDS):
-            room = (explorer.left - explorer.reserve) // (DESCENT * (2 * n + 1) * len(rows))
+        for _ in range(MOST_ROUNDS if use_all else FEWEST_ROUNDS):
+            room = (explorer.left - explorer.reserve) // (DESCENT_EVALUATIONS * (2 * n + 1) * len(rows))
             objectives = [_weighted(explorer.known, smallest, row) for row in rows]
             promising = [
-                _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, ABREAST)))
+                _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, MOST_DESCENTS)))
                 for objective, done in zip(objectives, tried, strict=True)
             ]
             found = [(each, k) for each, points in zip(objectives, promising, strict=True) for k in points]
@@ -162,10 +173,10 @@ def _start(
                 own, ends = ends[: len(points)], ends[len(points) :]
                 done += [*points, *own]
                 agreed &= _agree(explorer.known, objective, explorer.known.merit(objective)[own])
-            if agreed and not patient:
+            if agreed and not use_all:
                 break
-            if len(found) < len(rows) * ABREAST:
-                explorer(rng.random((SAMPLE, n)))
+            if len(found) < len(rows) * MOST_DESCENTS:
+                explorer(rng.random((SAMPLE_POINTS, n)))
     except Spent:
         pass
 
@@ -173,13 +184,13 @@ def _start(
 def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Generator, allowed: int) -> None:
     """Both ends of every goal, to normalise by; they need not be known to the last digit."""
     goals = len(smallest)
+    ends = [sign * line for line in np.eye(goals) for sign in (1.0, -1.0)]
     for goal, down in enumerate(smallest):
-        evolve(explorer, _single(goal, 1.0 if down else -1.0, goals), rng, 0, int(EVOLUTION * allowed) // (4 * goals))
-    ends = [_single(goal, sign, goals) for goal in range(goals) for sign in (1.0, -1.0)]
+        evolve(explorer, ends[2 * goal + (not down)], rng, 0, int(EVOLUTION_PART * allowed) // (4 * goals))
     descend(explorer, [(end, k) for end in ends for k in _apart(explorer.known, end, [], 0, 1)], ROUGH[1:])
 
 
-def _apart(known: Known, objective: Objective, tried: Sequence[int], begin: int, most: int) -> list[int]:
+def _apart(known: Known, objective: Floats, tried: Sequence[int], begin: int, most: int) -> list[int]:
     """Rows of the best points with a value that lie apart from each other and from those that were tried."""
     merit = known.merit(objective)[begin:]
     found: list[int] = []
@@ -193,7 +204,7 @@ def _apart(known: Known, objective: Objective, tried: Sequence[int], begin: int,
     return found
 
 
-def _confirmed(explorer: Explorer, objectives: Sequence[Objective], rng: np.random.Generator) -> bool:
+def _confirmed(explorer: Explorer, objectives: Sequence[Floats], rng: np.random.Generator) -> bool:
     """Whether no small step improves the best point of any objective; descends from where one does."""
     n, open_ = explorer.dimensions, list(objectives)
     ladder: Sequence[tuple[float, float]] = ROUGH[-1:] if explorer.rough else LADDER
@@ -206,13 +217,13 @@ def _confirmed(explorer: Explorer, objectives: Sequence[Objective], rng: np.rand
         descend(explorer, list(zip(open_, starts, strict=True)), ladder, final=True)
         bests = [_best(explorer.known, each) for each in open_]
         steps = [np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (4 * n, n))]) for _ in open_]
-        points = [explorer.known.u[best] + CHECKED * around for best, around in zip(bests, steps, strict=True)]
+        points = [explorer.known.u[best] + CHECK_STEP * around for best, around in zip(bests, steps, strict=True)]
         explorer(np.concatenate(points))
         moving = []
         for each, best, begun in zip(open_, bests, before, strict=True):
             merit = explorer.known.merit(each)
             little = _rounding(explorer.known, merit, merit[best], NOISE if explorer.rough else ROUNDING)
-            still = begun - merit[best] > max(STILL * abs(merit[best]), little)
+            still = begun - merit[best] > max(ENDED_GAIN * abs(merit[best]), little)
             if still or merit[best] - merit.min() > little:
                 moving.append(each)
         if not moving:
@@ -221,24 +232,24 @@ def _confirmed(explorer: Explorer, objectives: Sequence[Objective], rng: np.rand
     return False
 
 
-def _best(known: Known, objective: Objective) -> int:
+def _best(known: Known, objective: Floats) -> int:
     return int(np.argmin(known.merit(objective)))
 
 
 def _rounding(known: Known, merit: Floats, value: float, part: float = ROUNDING) -> float:
     """How far values of an objective may differ and still count as the same."""
     inside = merit[known.feasible]
-    return part * abs(value) + OF_ALL * float(np.ptp(inside) if inside.size else 0.0)
+    return part * abs(value) + RANGE_ROUNDING * float(np.ptp(inside) if inside.size else 0.0)
 
 
-def _ends(known: Known, objective: Objective, begins: Sequence[int]) -> Floats:
+def _ends(known: Known, objective: Floats, begins: Sequence[int]) -> Floats:
     """The best that each start found, nan where that is not feasible."""
     merit = np.where(known.feasible, known.merit(objective), np.nan)
     parts = [merit[a:b] for a, b in pairwise(begins)]
     return np.array([np.nan if np.isnan(part).all() else np.nanmin(part) for part in parts])
 
 
-def _agree(known: Known, objective: Objective, found: Floats) -> bool:
+def _agree(known: Known, objective: Floats, found: Floats) -> bool:
     """Whether the two smallest of some values of an objective are feasible and the same."""
     two = np.sort(found[found < MISSES])[:2]
     return len(two) == 2 and bool(np.ptp(two) <= _rounding(known, known.merit(objective), two[0]))
@@ -255,23 +266,17 @@ def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> 
     return np.concatenate([vertices, u])
 
 
-def _single(goal: int, sign: float, goals: int) -> Objective:
-    return Objective(sign * (np.arange(goals) == goal))
-
-
-def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> Objective:
+def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> Floats:
     """The weighted sum of normalised goals [S1, eq. 28], turned round so that less is better; a goal alone as it is."""
     signs = np.where(smallest, 1.0, -1.0)
     if np.count_nonzero(row) == 1:
-        return Objective(signs * np.sign(row))
+        return np.asarray(signs * np.sign(row))
     values = known.values[known.feasible if known.feasible.any() else known.valid]
     span = np.ptp(values, axis=0) if len(values) else np.ones(len(row))
-    return Objective(np.asarray(row) * signs / np.where(span > 0, span, np.inf))
+    return np.asarray(np.asarray(row) * signs / np.where(span > 0, span, np.inf))
 
 
-def evolve(
-    explorer: Explorer, objective: Objective, rng: np.random.Generator, begin: int = 0, most: int = 1000
-) -> None:
+def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, begin: int = 0, most: int = 1000) -> None:
     """Differential evolution, a generation a batch, begun with the best known points and some others.
 
     [Storn & Price, Differential evolution, 1997; scipy.optimize.differential_evolution.]
@@ -298,7 +303,7 @@ def evolve(
     if len(first) < size:
         first = np.concatenate([first, rng.random((size - len(first), explorer.dimensions))])
     merits: list[float] = []
-    patience = ROUGH_PATIENCE if explorer.rough else PATIENCE
+    most_stalled = ROUGH_STALLED_GENERATIONS if explorer.rough else STALLED_GENERATIONS
 
     def energies(u: Floats) -> Floats:
         rows = explorer(u.T)
@@ -308,11 +313,11 @@ def evolve(
     def stalls(x: Floats, convergence: float) -> bool:
         merit = explorer.known.merit(objective)[begin:]
         merits.append(float(merit.min()))
-        if len(merits) <= patience:
+        if len(merits) <= most_stalled:
             return False
         inside = merit[merit < MISSES]
-        gained = merits[-1 - patience] - merits[-1]
-        return bool(gained <= ENOUGH * (float(np.ptp(inside)) if inside.size else abs(merits[-1])))
+        gained = merits[-1 - most_stalled] - merits[-1]
+        return bool(gained <= STALLED_GAIN * (float(np.ptp(inside)) if inside.size else abs(merits[-1])))
 
     begin_evolution(
         energies, [(0.0, 1.0)] * explorer.dimensions, init=first, vectorized=True, updating="deferred",

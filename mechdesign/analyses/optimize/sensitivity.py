@@ -2,66 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from mechdesign.analyses.optimize.cube import bounds
-from mechdesign.analyses.optimize.designs import ROUNDING
-from mechdesign.analyses.optimize.judging import met
-from mechdesign.analyses.optimize.tables import Comparison, steps
-from mechdesign.numerics.arrays import Floats
+from mechdesign.analyses.optimize.judge import Judge
+from mechdesign.analyses.optimize.tables import Comparison
+from mechdesign.analyses.optimize.variables import ROUNDING, Batch, bounds, steps
+from mechdesign.numerics.arrays import Flags
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
 # How near a bound is at it, as a fraction of the variable's range, or of a condition's bound.
-AT = 1e-4
-
-
-@dataclass(frozen=True, eq=False)
-class Neighbours:
-    """Designs a step from each optimum.
-
-    Parameters
-    ----------
-    designs : dict of str to ndarray
-        Values of the variables.
-    places : dict of (int, str, int) to int
-        By row of weights, variable and direction (-1 or 1): which of `designs`; absent beyond the bounds.
-    """
-
-    designs: dict[str, Floats]
-    places: dict[tuple[int, str, int], int]
-
-    def __len__(self) -> int:
-        return len(next(iter(self.designs.values())))
-
-
-def neighbours(study: Study, compared: Comparison) -> Neighbours:
-    """Designs a step from each optimum along each variable, the others held, as far as they lie inside all bounds."""
-    names = list(compared.designs.variables)
-    step = steps(study, compared)
-    found: dict[tuple[float, ...], int] = {}
-    places: dict[tuple[int, str, int], int] = {}
-    for row, winner in enumerate(compared.winners.tolist()):
-        at = {name: float(column[winner]) for name, column in compared.designs.variables.items()}
-        for name in names:
-            for direction in (-1, 1):
-                moved = at | {name: at[name] + direction * float(step[name][row])}
-                if moved != at and _inside(study, moved):
-                    places[row, name, direction] = found.setdefault(tuple(moved.values()), len(found))
-    values = np.array(list(found), dtype=float).reshape(-1, len(names))
-    return Neighbours({name: values[:, k] for k, name in enumerate(names)}, places)
-
-
-def _inside(study: Study, design: dict[str, float]) -> bool:
-    columns = {name: np.array([value]) for name, value in design.items()}
-    for name, value in design.items():
-        low, high = (float(bound[0]) for bound in bounds(study, columns, name, 1))
-        slack = ROUNDING * max(abs(low), abs(high))
-        if not low - slack <= value <= high + slack:
-            return False
-    return True
+AT_BOUND = 1e-4
 
 
 def active_bounds(study: Study, compared: Comparison) -> list[str]:
@@ -70,60 +21,66 @@ def active_bounds(study: Study, compared: Comparison) -> list[str]:
     On a grid an upper bound holds a design that it leaves no further step.
     """
     assert study.optimize is not None
-    section, rows = study.optimize, compared.winners
-    at = {name: column[rows] for name, column in compared.designs.variables.items()}
-    step = steps(study, compared)
+    designs, rows = compared.designs, compared.winners
+    at = {name: column[rows] for name, column in designs.variables.items()}
+    step = steps(study, at)
     held: list[list[str]] = [[] for _ in rows]
     for name in at:
         low, high = bounds(study, at, name, len(rows))
-        near = AT * (high - low) + ROUNDING * np.maximum(np.abs(low), np.abs(high))
-        above = np.maximum(near, step[name] * (1 - 1e-6)) if section.method == "grid" else near
-        for k in range(len(rows)):
-            sides = [*(["from"] if at[name][k] - low[k] <= near[k] else []),
-                     *(["to"] if high[k] - at[name][k] <= above[k] else [])]  # fmt: skip
-            held[k] += [f"{name} {' and '.join(sides)}"] if sides else []
-    for judged, bound, _ in compared.designs.conditions:
-        inside = compared.designs.values[judged][compared.designs.feasible]
-        near_bound = np.abs(compared.designs.values[judged][rows] - bound) <= AT * max(abs(bound), np.ptp(inside))
-        for k in np.flatnonzero(near_bound).tolist():
-            held[k].append(judged.name)
+        near = AT_BOUND * (high - low) + ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        above = np.maximum(near, step[name] * (1 - 1e-6)) if study.optimize.method == "grid" else near
+        for k, words in enumerate(held):
+            sides = ["from"] * bool(at[name][k] - low[k] <= near[k]) + ["to"] * bool(high[k] - at[name][k] <= above[k])
+            words += [f"{name} {' and '.join(sides)}"] if sides else []
+    for each in designs.conditions:
+        values = designs.values[each]
+        far = AT_BOUND * max(abs(each.bound), np.ptp(values[designs.feasible]))
+        for words, value in zip(held, values[rows].tolist(), strict=True):
+            words += [each.name] if abs(value - each.bound) <= far else []
     return [", ".join(words) for words in held]
 
 
-def sensitivity_table(study: Study, compared: Comparison, near: Neighbours, found: Floats) -> Table:
-    """How the score changes a step down and a step up each variable.
-
-    Parameters
-    ----------
-    found : ndarray, shape (neighbours, goals and conditions + 1)
-        As `Judge.evaluate` gives it for `near`.
-    """
-    designs, step = compared.designs, steps(study, compared)
-    wanted = list(designs.values)
-    feasible = found[:, len(wanted)] == 0
-    for judged, bound, upper in designs.conditions:
-        feasible &= met(found[:, wanted.index(judged)], bound, upper)
-    optimum, variables, values, widths, changes = [], [], [], [], []
-    for row, winner in enumerate(compared.winners):
-        weights = compared.weights[row]
-        own = np.array([[designs.values[each][winner] for each in designs.goals]])
-        score = np.where(feasible, compared.score_of(found[:, : len(designs.goals)], weights), np.nan)
-        score -= compared.score_of(own, weights)
-        for name, column in designs.variables.items():
-            sides = [near.places.get((row, name, direction)) for direction in (-1, 1)]
-            optimum.append(row + 1)
-            variables.append(name)
-            values.append(column[winner])
-            widths.append(step[name][row])
-            changes.append([np.nan if k is None else score[k] for k in sides])
-    down, up = np.array(changes).T
+def sensitivity_table(study: Study, compared: Comparison, judge: Judge) -> Table:
+    """How the score changes a step down and a step up each variable, the others held."""
+    names = list(compared.designs.variables)
+    at = {name: column[compared.winners] for name, column in compared.designs.variables.items()}
+    step = np.stack([*steps(study, at).values()], axis=1)
+    optima = np.stack([*at.values()], axis=1)
+    # By optimum, variable and direction.
+    moves = np.array([-1.0, 1.0])[:, None] * np.eye(len(names))[:, None]
+    moved = optima[:, None, None] + moves * step[:, None, None]
+    inside = _inside(study, dict(zip(names, moved.reshape(-1, len(names)).T, strict=True))).reshape(moved.shape[:-1])
+    inside &= (moved != optima[:, None, None]).any(axis=-1)
+    asked, back = np.unique(moved[inside], axis=0, return_inverse=True)
+    judge.progress.start(len(asked), "neighbours of the optimum")
+    found, layout = judge.evaluate(dict(zip(names, asked.T, strict=True))), judge.layout
+    values, feasible = found[:, layout.values], found[:, layout.code] == 0
+    for each in judge.conditions:
+        feasible &= each.met(values[:, layout.column[each]])
+    which = np.full(inside.shape, len(asked))
+    which[inside] = back.ravel()
+    changes = np.empty(inside.shape)
+    for row, (weights, winner) in enumerate(zip(compared.weights, compared.winners, strict=True)):
+        gained = compared.score_of(values, weights) - compared.score_of(compared.values[[winner]], weights)
+        changes[row] = np.append(np.where(feasible, gained, np.nan), np.nan)[which[row]]
+    down, up = changes.reshape(-1, 2).T
     meaning = "change of the score one step {}, nan where that leaves the bounds or is infeasible"
     columns = (
-        Column("optimum", np.array(optimum), "", "row of optimum.csv"),
-        Column("variable", np.array(variables), "", "design variable; the others are held"),
-        Column("value", np.array(values), "", "at the optimum"),
-        Column("step", np.array(widths), "", "the grid's, else a hundredth of the range"),
+        Column("optimum", np.repeat(np.arange(len(optima)) + 1, len(names)), "", "row of optimum.csv"),
+        Column("variable", np.array(names * len(optima)), "", "design variable; the others are held"),
+        Column("value", optima.ravel(), "", "at the optimum"),
+        Column("step", step.ravel(), "", "the grid's, else a hundredth of the range"),
         Column("score_down", down, "", meaning.format("down")),
         Column("score_up", up, "", meaning.format("up")),
     )
     return Table("sensitivity", columns, "how the score changes a step from each optimum")
+
+
+def _inside(study: Study, designs: Batch) -> Flags:
+    """Which designs lie inside all bounds."""
+    found = np.ones(len(next(iter(designs.values()))), dtype=bool)
+    for name, values in designs.items():
+        low, high = bounds(study, designs, name, len(values))
+        slack = ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        found &= (low - slack <= values) & (values <= high + slack)
+    return found

@@ -161,7 +161,7 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
         # What is not quadratic has no roots here.
         a, b, c = np.where(quadratic, a, 1.0), np.where(quadratic, b, 0.0), np.where(quadratic, c, 0.0)
     margin, ray, turn, x, start = _quadratic_roots(a, b, c)
-    found = _intervals(margin, ray, turn, x * reach[ray], start, reach, slack)
+    found = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
     if not (quadratic.all() and not designs.field.same_assembly):
         found = _others(designs, places, direction, found, quadratic, samples, slack * reach, reach)
     return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
@@ -246,7 +246,7 @@ def _others(
     tolerance = ROUNDING * found.outer[cut_of[lane[asked]]]
     radius[asked] = bracketed_roots(evaluate, a, fa, b, fb, c, fc, tolerance)
     start = (~positive[:, 0]).sum(axis=0)
-    part = _intervals(rows[margin], lane, np.where(f[1] > 0, 1, -1), radius, start, found.outer[cut_of], 0.0)
+    part = intervals_between(rows[margin], lane, np.where(f[1] > 0, 1, -1), radius, start, found.outer[cut_of], 0.0)
     return _replace(found, cut_of, part, NARROWEST * reach)
 
 
@@ -326,7 +326,7 @@ def _replace(found: Intervals, lanes: Ints, part: Intervals, tie: Floats) -> Int
     )  # fmt: skip
 
 
-def _intervals(
+def intervals_between(
     margin: Ints, ray: Ints, turn: Ints, radius: Floats, start: Ints, reach: Floats, slack: float
 ) -> Intervals:
     """Put the roots of each ray in order and keep the stretches where no margin is negative."""

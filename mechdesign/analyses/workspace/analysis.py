@@ -10,9 +10,9 @@ import numpy as np
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.panels import SINGLE
 from mechdesign.analyses.region.regions import RAYS
-from mechdesign.analyses.workspace.indices import INDICES, Local, prepare
-from mechdesign.analyses.workspace.indices.index import determinant_power, power_of_length
+from mechdesign.analyses.workspace.index import determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
 from mechdesign.analyses.workspace.question import (
@@ -37,6 +37,7 @@ from mechdesign.analyses.workspace.tables import (
     where,
 )
 from mechdesign.errors import AssemblyError
+from mechdesign.indices import index
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -186,14 +187,15 @@ def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str
     area = study.units.label("area")
     found = {
         "GII": ("", "mean of the inverse condition number over the region"),
-        "GRI": (INDICES["resistivity"].unit(study, question.field), "mean of 1/abs(det J) over the region"),
+        "GRI": (index("resistivity").unit(study, question.field), "mean of 1/abs(det J) over the region"),
         "SUI": ("", "area of the region over that of the rectangle around it"),
         "area": (area, "area of the region"),
         "box_area": (area, "area of the rectangle around the region"),
     }
     for name in (name for name in question.wanted if name not in COLUMNS):
-        index, kind = INDICES[split(name)[0]], split(name)[1]
-        found[name] = (index.unit(study, question.field), f"{_STATISTICS[kind]} over the region: {index.meaning}")
+        declared, kind = index(split(name)[0]), split(name)[1]
+        unit = declared.unit(study, question.field)
+        found[name] = (unit, f"{_STATISTICS[kind]} over the region: {declared.meaning}")
     return found
 
 
@@ -204,7 +206,7 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     grids = [patch.grid(question.about) for patch in found]
     z = np.concatenate([grid.ravel() for grid in grids])
     local = Local.at(question.field, z, {})
-    names = dict.fromkeys(("inverse_condition", "resistivity", *(index.name for index in question.indices)))
+    names = dict.fromkeys(("inverse_condition", "resistivity", *(each.name for each in question.indices)))
     node = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)) for grid in grids])
     ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
     patch = np.repeat(np.arange(len(grids)), [grid.size for grid in grids])
@@ -215,9 +217,9 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
         middle = Local.at(question.field, np.array([patch.middle(question.about) for patch in found]), {}).determinant
         determinant = np.copysign(determinant, np.broadcast_to(middle, len(found))[patch])
     columns = [
-        Column(index.name, np.broadcast_to(index.values(local), z.shape), index.index.unit(study, question.field),
-               index.index.meaning)
-        for index in prepare(study, list(names))
+        Column(each.name, np.broadcast_to(each.values(local), z.shape), each.index.unit(study, question.field),
+               each.index.meaning)
+        for each in prepare(study, list(names))
     ]  # fmt: skip
     return [
         *held_columns(study, question, len(z)),

@@ -15,7 +15,7 @@ from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.workspace.bounding import bounding_box
 from mechdesign.analyses.workspace.quadrature import FINEST_AREA, Integral, integrate
 from mechdesign.analyses.workspace.question import Question, questions
-from mechdesign.analyses.workspace.ranged import Endings, RangedDesigns
+from mechdesign.analyses.workspace.ranged import Every, Ranged, Some, SomeDesigns
 from mechdesign.analyses.workspace.singularities import causes
 from mechdesign.analyses.workspace.tables import PIECE, held_columns, left_out, piece_columns, stacked
 from mechdesign.errors import AssemblyError, Problem, StudyError
@@ -50,7 +50,7 @@ def reachable(study: Study, progress: Progress) -> Result:
     warnings: list[str] = []
     several = False
     for question in asked:
-        whole = RangedDesigns(question.field, {}, 1, question.about)
+        whole = (Designs if over.all else SomeDesigns)(question.field, {}, 1, question.about)
         panels = find_panels(whole, question.scan, EFFORT)
         found = Pieces.of(whole, panels, question.scan, EFFORT.samples)
         area = error = box = 0.0
@@ -66,7 +66,7 @@ def reachable(study: Study, progress: Progress) -> Result:
                 # Of all pieces together; where every value is to be reached single values show too much.
                 error = max(error, float(panels.seen[0]) - sum(areas))
             shown = patches_of_pieces(found, question.rays or RAYS, EFFORT.samples)
-            outlines.append(_outline(study, question, name, whole, shown, float(panels.reach[0])))
+            outlines.append(_outline(study, question, name, shown))
             drawn = bool(found.drawn[0])
             pieces.append(piece_columns(study, question, shown, areas, drawn))
             several |= len(areas) > 1
@@ -129,19 +129,15 @@ def _questions(study: Study, name: str, over: Over) -> Iterator[Question]:
                 f"ask for single values: at: {{{name}: [...]}}"
             )
             raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
-        field = Endings(
-            base.mechanism, base.plan, base.held, base.same_assembly, base.length,
-            list(study.workspace.at).index(name), low, high, over.all,
-        )  # fmt: skip
+        common = base.mechanism, base.plan, base.held, base.same_assembly, base.length
+        field = (Every if over.all else Some)(*common, list(study.workspace.at).index(name), low, high)
         yield replace(question, field=field, held={k: v for k, v in question.held.items() if k != name})
 
 
-def _outline(
-    study: Study, question: Question, name: str, designs: RangedDesigns, found: Sequence[Patch], reach: float
-) -> list[Column]:
+def _outline(study: Study, question: Question, name: str, found: Sequence[Patch]) -> list[Column]:
     """Points of the boundary, the value of the range at which each is reached, and what ends the region there."""
-    field = question.field
-    assert isinstance(field, Endings)
+    over = question.field
+    assert isinstance(over, Ranged)
     curves = [
         (patch.theta, radius, side, margin, patch.piece)
         for side, names in (("inner", ("inner", "enters")), ("outer", ("outer", "leaves")))
@@ -150,13 +146,13 @@ def _outline(
         if margin >= 0
     ]
     lengths = [len(curve[0]) for curve in curves]
-    theta, radius = (np.concatenate([curve[k] for curve in curves]) for k in range(2))
-    z = designs.about + radius * np.exp(1j * theta)
-    value = designs.deciding(theta, radius, reach, EFFORT.samples)
-    single = causes(field.sliced)
-    told = [*single, *single, *single, *((a, f"{at} and {by}") for a, at in single for _, by in single)]
+    z = np.concatenate([question.about + curve[1] * np.exp(1j * curve[0]) for curve in curves])
+    row = np.repeat([over.extreme(curve[3]) for curve in curves], lengths)
+    value = np.take_along_axis(over.deciding(z)[1], row[None], axis=0)[0]
+    single = [words for _, words in causes(over.sliced)]
+    told = [*single * 3, *(f"{a} and {b}" for a in single for b in single)]
     which = [curve[3] for curve in curves]
-    kinds = ["limit" if field.labels[k][0] == "limit" else "singularity" for k in which]
+    kinds = ["limit" if question.field.labels[k][0] == "limit" else "singularity" for k in which]
     length, coordinate = study.units.label("length"), study.mechanism.coordinate(name)
     shown = np.asarray(in_study_units(study, coordinate, value))
     return [
@@ -165,7 +161,7 @@ def _outline(
         Column("y", z.imag, length, "place of the point"),
         Column("kind", np.repeat(kinds, lengths), "", "what ends the region: limit or singularity"),
         Column(name, shown, study.units.label(coordinate.quantity), "value of the range that decides there"),
-        Column("at", np.repeat([told[k][1] for k in which], lengths), "", "which limit or singularity"),
+        Column("at", np.repeat([told[k] for k in which], lengths), "", "which limit or singularity"),
         Column(
             "side", np.repeat([side for _, _, side, _, _ in curves], lengths), "", "which end of the ray's interval"
         ),

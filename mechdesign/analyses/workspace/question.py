@@ -13,9 +13,10 @@ from mechdesign.analyses.region.pieces import Pieces
 from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.bounding import bounding_box
-from mechdesign.analyses.workspace.indices import INDICES, OF_JACOBIAN, Prepared, prepare
+from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
+from mechdesign.indices import INDEX_NAMES, USUAL, needed_section
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
@@ -85,12 +86,13 @@ def split(column: str) -> tuple[str, str]:
     if column in MEANS:
         return MEANS[column], "mean"
     name, _, kind = column.rpartition("_")
-    return (name, kind) if name in INDICES and kind in STATISTICS else ("", "")
+    return (name, kind) if kind in STATISTICS and name in INDEX_NAMES else ("", "")
 
 
 def batched(column: str) -> bool:
     """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
-    return column in COLUMNS or split(column)[0] in OF_JACOBIAN
+    name = split(column)[0]
+    return column in COLUMNS or bool(name and needed_section(name) is None)
 
 
 def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:
@@ -116,7 +118,7 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     integrate_by = section.integrate
     if "tolerance" in integrate_by.model_fields_set:
         tolerance = integrate_by.tolerance
-    wanted = columns(OF_JACOBIAN if section.indices is None else section.indices) if wanted is None else tuple(wanted)
+    wanted = columns(USUAL if section.indices is None else section.indices) if wanted is None else tuple(wanted)
     indices = prepare(study, list(dict.fromkeys(filter(None, (split(column)[0] for column in wanted)))))
     counted = (start + margin, stop - margin)
     return [

@@ -1,82 +1,210 @@
-"""Rays through the region of a point over a range of a held coordinate: where some value of it, or every one, serves.
+"""The region of a point over a range of a held coordinate: where some value of it serves, or where every one does.
 
-Along a ray the region at each single value is intervals. Over the range these are put together, or what lies between
-them is. An end of what results is extreme over the range: at an end of the range, where the radius at which one margin
-vanishes has no slope (the boundary is an envelope there), or where two margins vanish. Within each of these the
-boundary is smooth. After C. M. Gosselin and M. Jean, Determination of the workspace of planar parallel manipulators
-with joint limits, Robotics and Autonomous Systems 17 (1996).
+A place is reached at every value of the range where the smallest of each margin over the range is positive, and at some
+value where the largest over the range of the smallest margin is. Both are found from samples of the range. Between them
+margins are parabolas, first through neighbouring samples, then through three values close to the extreme. After
+C. M. Gosselin and M. Jean, Determination of the workspace of planar parallel manipulators with joint limits, Robotics
+and Autonomous Systems 17 (1996).
 """
 
 from __future__ import annotations
 
+import copy
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from mechdesign.analyses.region.curves import SLACK
 from mechdesign.analyses.region.field import Field, Places
-from mechdesign.analyses.region.rays import Designs, Intervals, trace
-from mechdesign.analyses.workspace.across import Across
-from mechdesign.analyses.workspace.extremes import Starts, extended
-from mechdesign.analyses.workspace.slices import VALUE, Lanes, Misses, Sliced, Stretches, as_intervals, merged
+from mechdesign.analyses.region.rays import NOTHING, Designs, Intervals, intervals_between, trace
+from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.roots import bracketed_roots
 
-# Values of the range that are looked at everywhere, and rounds in which others are put between.
-VALUES, ROUNDS = 25, 6
-# Rays are told apart to this angle (radians).
-QUANTUM = 2.0**-28
+# Samples of the range, and places looked at at once, so that their samples fit into the processor's cache.
+SAMPLES, BLOCK = 25, 2048
+# Distance of the values close to an extreme, as a part of the distance between samples.
+CLOSE = 0.03
+# Distances of the values close to where a leg is stretched or folded, step by step.
+WIDTHS = (1.0, 0.1, 0.01)
+# An extreme farther from zero than so many times the difference to the neighbouring samples keeps its sign. Where every
+# value is to be reached curves are followed from farther away.
+FAR = (2.0, 100.0)
+# So many margins at most can be the smallest near one extreme.
+RIVALS = 4
+# Places looked at between stretches of a ray that samples of the range reach, as parts of the distance.
+BETWEEN = np.array([0.03, 0.3, 0.7, 0.97])
+# Between samples a gap closes that a parabola leaves this part of itself.
+GAP = 0.02
+# In place of a margin that does not count.
+HIGH = 1e30
+# Accuracy of radii, as a part of the reach.
+ROUNDING = 1e-11
+# The name among the dimensions by which a value of the range is given.
+VALUE = "value of the range"
 
 
 @dataclass(frozen=True, eq=False)
-class Endings(Field):
-    """A field over a range of a held coordinate, with a label for all that can end its region.
-
-    First each of its margins inside the range, then at the lower end, then at the upper one; then pairs of margins.
-
-    Parameters
-    ----------
-    which : int
-        The held coordinate that ranges, from `low` to `high` (radians or length).
-    every : bool
-        Whether every value is to be reached, not only one.
-    """
+class Ranged(Field):
+    """A field over the range of the held coordinate `which`, from `low` to `high` (radians or length)."""
 
     which: int = 0
     low: float = 0.0
     high: float = 0.0
-    every: bool = False
     # A kink so little inside a panel costs no more than its square; nearer to where labels change, rounding chooses.
-    accuracy: ClassVar[float] = 1e-7
+    accuracy: ClassVar[float] = 1e-6
+
+    @property
+    def values(self) -> Floats:
+        """Samples of the range."""
+        return np.linspace(self.low, self.high, SAMPLES)
 
     @cached_property
     def sliced(self) -> Sliced:
         """The field at single values of the range."""
-        return Sliced(self.mechanism, self.plan, self.held, self.same_assembly, self.length, self.which)
+        common = self.mechanism, self.plan, self.held, self.same_assembly, self.length
+        return Sliced(*common, self.which)
 
-    @cached_property
-    def labels(self) -> tuple[tuple[str, str], ...]:
-        """Kind and name of the margins; of a pair, a limit only where both are."""
-        single = self.sliced.labels
-        pairs = [
-            ("limit" if one[0] == other[0] == "limit" else "singularity", f"{one[1]} and {other[1]}")
-            for one in single
-            for other in single
-        ]
-        return (*single, *single, *single, *pairs)
-
-    def label(self, one: Ints, two: Ints) -> Ints:
-        """Labels of pairs of margins of which the two after the last are the ends of the range."""
-        count = len(self.sliced.labels)
-        low, high = np.minimum(one, two), np.maximum(one, two)
-        single = np.where(high == low, low, low + (1 + high - count) * count)
-        return np.asarray(np.where((high < count) & (high > low), (3 + low) * count + high, single))
+    @property
+    def single(self) -> tuple[tuple[str, str], ...]:
+        """Kind and name of the margins at single values."""
+        return self.sliced.labels
 
     @property
     def singular(self) -> Flags:
         """No square roots are looked for."""
         return np.zeros(len(self.labels), dtype=bool)
+
+    @property
+    def rounding(self) -> Floats:
+        """Nothing touches zero along a curve at all values of the range."""
+        return np.zeros(len(self.labels))
+
+    def at(self, z: Complexes, value: Value, assembly: bool = True) -> Floats:
+        """Margins at single values of the range, shape (margins, *z.shape)."""
+        return self.sliced.margins(z, {VALUE: value}, assembly=assembly)
+
+    def extreme(self, label: int) -> int:
+        """Which of the extremes over the range is zero where a label ends the region."""
+        return label % len(self.single) if isinstance(self, Every) else 0
+
+    def deciding(self, z: Complexes) -> tuple[Floats, Floats, Ints]:
+        """Extremes over the range, the value that decides on each, and the two margins that do (or one, twice).
+
+        Of shapes (extremes, *z.shape) and (2, extremes, *z.shape). Where every value is to be reached there is an
+        extreme of each margin; else one.
+        """
+        blocks = np.array_split(z.ravel(), max(1, -(-z.size // BLOCK)))
+        found, value, pair = (np.concatenate(part, axis=-1) for part in zip(*map(self._extremes, blocks), strict=True))
+        shape = (len(found), *z.shape)
+        return found.reshape(shape), value.reshape(shape), pair.reshape(2, *shape)
+
+    def _extremes(self, z: Complexes) -> tuple[Floats, Floats, Ints]:
+        every = isinstance(self, Every)
+        margins = self.at(np.broadcast_to(z, (SAMPLES, len(z))), self.values[:, None])
+        height = _known(-margins) if every else _smallest(margins)[None]
+        node = height.argmax(axis=1)
+        found, value = height.max(axis=1), self.values[node]
+        lowest = np.where(np.isnan(margins), np.inf, margins)[:, node[0], np.arange(len(z))].argmin(axis=0)
+        pair = np.array(np.broadcast_to(lowest, (2, *found.shape)))
+        candidates = [self._refined(z, margins, height)]
+        if not every and self.same_assembly:
+            candidates.append(self._at_closures(z, margins))
+        for row, lane, top, at, names in candidates:
+            better = np.flatnonzero(top > found[row, lane])
+            better = better[np.argsort(top[better], kind="stable")]
+            # Of several extremes of one place the last assigned is the highest.
+            where = row[better], lane[better]
+            found[where], value[where] = top[better], at[better]
+            pair[:, where[0], where[1]] = names[:, better]
+        return np.where(np.isinf(found), np.nan, -found if every else found), value, pair
+
+    def _refined(self, z: Complexes, margins: Floats, height: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
+        """Row, place, height, value of the range, and margins of the extremes near the highest samples."""
+        every, values = isinstance(self, Every), self.values
+        step, close = values[1] - values[0], CLOSE * (values[1] - values[0])
+        row, node, lane = _peaks(height, FAR[every])
+        each = np.arange(len(row))
+
+        def highest(near: Floats, low: Floats | float, high: Floats | float) -> tuple[Floats, Floats, Ints]:
+            return _highest(-near[row, :, each].T[None] if every else near, low, high)
+
+        middle = np.clip(node, 1, SAMPLES - 2)
+        place = highest(np.stack([margins[:, middle + k, lane] for k in (-1, 0, 1)], axis=1), -1.0, 1.0)[0]
+        centre = np.clip(values[middle] + step * place, self.low + close, self.high - close)
+        near = self.at(np.broadcast_to(z[lane], (3, len(lane))), centre + close * np.array([[-1], [0], [1]]))
+        first, last = (self.low - centre) / close, (self.high - centre) / close
+        place, _, names = highest(near, np.maximum(first, -2), np.minimum(last, 2))
+        at = np.where(place <= first, self.low, np.where(place >= last, self.high, centre + close * place))
+        there = self.at(z[lane], at)
+        top = _known(-there[row, each]) if every else _smallest(there)
+        return row, lane, top, at, names
+
+    def _at_closures(self, z: Complexes, margins: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
+        """As `_refined`, where a leg is stretched or folded: there margins of the assembly end with a square root."""
+        closures = np.flatnonzero(self.sliced.singular)
+        positive = margins[closures] > 0
+        which, cell, lane = np.nonzero(positive[:, 1:] != positive[:, :-1])
+        closure, each = closures[which], np.arange(len(which))
+        low, high = self.values[cell], self.values[cell + 1]
+        ends, none = (margins[closure, cell + k, lane] for k in range(2)), np.full(len(which), np.nan)
+        at_low, at_high = ends
+        root = bracketed_roots(
+            lambda k, value: self.at(z[lane[k]], value, False)[closure[k], np.arange(len(k))],
+            low, at_low, high, at_high, none, none, np.full(len(which), 1e-13),
+        )  # fmt: skip
+        # Margins are smooth in the root of the distance: closer and closer to the extreme, up to the end of the range.
+        way = np.where(at_high > at_low, 1.0, -1.0) * (high - low) / 9
+        last = np.sqrt((np.where(way > 0, self.high, self.low) - root) / way)
+        t = np.full(len(root), 2.0)
+        for width in WIDTHS:
+            centre = np.clip(t, 2 * width, np.maximum(last - width, 2 * width))
+            place = centre + width * np.array([[-1.0], [0.0], [1.0]])
+            near = self.at(np.broadcast_to(z[lane], (3, len(lane))), root + way * place**2)
+            known = ~np.isnan(near).any(axis=(0, 1))
+            near[closure, :, each] = np.inf
+            place, top, names = _highest(near, np.maximum(-centre / width, -3), np.minimum((last - centre) / width, 3))
+            t = centre + width * place
+        # What lies behind the end of the range does not count, and then the leg alone ends the region.
+        near_end = last < top
+        top, other = np.where(known, np.minimum(top, last), -np.inf), np.where(near_end, closure, names[0])
+        at = np.where(near_end, np.where(way > 0, self.high, self.low), root + way * t**2)
+        return 0 * lane, lane, top, at, np.sort([closure, other], axis=0)
+
+
+class Every(Ranged):
+    """A field where every value of the range is to be reached.
+
+    Its margins are those at both ends of the range, and the smallest of each over the range.
+    """
+
+    @property
+    def labels(self) -> tuple[tuple[str, str], ...]:
+        """Kind and name of the margins."""
+        return self.single * 3
+
+    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
+        """As `Field.margins`; the same for all designs, as `places` is empty."""
+        return np.concatenate([self.at(z, self.low), self.at(z, self.high), self.deciding(z)[0]])
+
+
+class Some(Ranged):
+    """A field where some value of the range is to be reached.
+
+    A label is of a margin, inside the range or at its low or high end, or of two that leave no value between them.
+    """
+
+    @cached_property
+    def labels(self) -> tuple[tuple[str, str], ...]:
+        """Kind and name of what ends the region: of a pair, a limit only where both are."""
+        pairs = [
+            ("limit" if one[0] == other[0] == "limit" else "singularity", f"{one[1]} and {other[1]}")
+            for one in self.single
+            for other in self.single
+        ]
+        return (*self.single * 3, *pairs)
 
     def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
         """Unknown, shape (labels, *z.shape): nothing but rays tells where labels change."""
@@ -84,82 +212,171 @@ class Endings(Field):
 
 
 @dataclass(frozen=True, eq=False)
-class RangedDesigns(Designs):
-    """Rays through a region over a range: `field` is of `Endings`, and so are the labels of what rays meet."""
+class Sliced(Field):
+    """A field whose value of the held coordinate `which` is given among the places."""
+
+    which: int = 0
+
+    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
+        """All margins at points `z`, shape (margins, *z.shape); nan where unknown."""
+        sizes, held = dict(places), list[Value](self.held)
+        held[self.which] = sizes.pop(VALUE)
+        assert self.labels is not None
+        # What is known of the sketch is copied, too.
+        field = copy.copy(self)
+        object.__setattr__(field, "held", tuple(held))
+        return Field.margins(field, z, sizes, assembly=assembly)
+
+
+def _known(values: Floats) -> Floats:
+    """Values, and -inf where they are unknown."""
+    return np.where(np.isnan(values), -np.inf, values)
+
+
+def _smallest(margins: Floats) -> Floats:
+    """The smallest margin, never positive where one is unknown."""
+    least: Floats = np.fmin.reduce(margins)
+    return _known(np.where(np.isnan(margins).any(axis=0), np.minimum(least, 0.0), least))
+
+
+def _peaks(height: Floats, far: float) -> tuple[Ints, Ints, Ints]:
+    """Row, sample and lane of the local maxima of (rows, samples, lanes) not so far from zero for their slopes."""
+    with np.errstate(invalid="ignore"):
+        rise = np.nan_to_num(np.diff(height, axis=1), nan=0.0, posinf=HIGH, neginf=-HIGH)
+    steep = np.abs(rise)
+    # At an end of the range the rise to the peak is not seen: the next one tells.
+    steep = np.maximum(np.insert(steep, 0, steep[:, 1], axis=1), np.append(steep, steep[:, -2:-1], axis=1))
+    peak = (np.insert(rise, 0, 0.0, axis=1) >= 0) & (np.append(rise, 0 * rise[:, :1], axis=1) <= 0)
+    peak &= (np.abs(height) <= far * steep) & np.isfinite(height)
+    row, node, lane = np.nonzero(peak)
+    return row, node, lane
+
+
+def _highest(y: Floats, low: Floats | float, high: Floats | float) -> tuple[Floats, Floats, Ints]:
+    """Where the smallest of parabolas is largest between `low` and `high`, and the two that meet there (or one, twice).
+
+    Parameters
+    ----------
+    y : ndarray, shape (parabolas, 3, n)
+        The parabolas at -1, 0 and 1; one that is unknown there does not count.
+    """
+    known = np.isfinite(y).all(axis=1)
+    before, a, after = (np.where(known, y[:, k], HIGH) for k in range(3))
+    b, c = 0.5 * (after - before), 0.5 * (after + before) - a
+    least = np.minimum(np.minimum(before, a), after)
+    rival = np.argsort(least, axis=0)[:RIVALS]
+    first, second, bend = (np.take_along_axis(v, rival, axis=0) for v in (a, b, c))
+    meets = list(itertools.combinations(range(len(rival)), 2))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        places = [*(-0.5 * second / bend), np.broadcast_to(low, y.shape[2:]), np.broadcast_to(high, y.shape[2:])]
+        for i, j in meets:
+            d, e, f = first[i] - first[j], second[i] - second[j], bend[i] - bend[j]
+            half = -0.5 * (e + np.copysign(np.sqrt(e * e - 4 * d * f), e))
+            places += [half / f, d / half]
+        place = np.stack(places)
+        place = np.clip(np.where(np.isfinite(place), place, 0.0), low, high)
+        value = (a[:, None] + place * (b[:, None] + place * c[:, None])).min(axis=0)
+    best, lane = value.argmax(axis=0), np.arange(y.shape[2])
+    place, top = place[best, lane], value[best, lane]
+    lowest = np.argsort(a + place * (b + place * c), axis=0)[0]
+    count = len(rival)
+    crossing = best >= count + 2
+    names = np.array([(0, 0)] * (count + 2) + [pair for pair in meets for _ in range(2)]).T[:, best]
+    pair = np.where(crossing, np.sort(rival[names, lane], axis=0), lowest)
+    return place, top, pair
+
+
+@dataclass(frozen=True, eq=False)
+class SomeDesigns(Designs):
+    """Rays through a region where some value of a range serves; `field` is of `Some`."""
+
+    @property
+    def _over(self) -> Some:
+        assert isinstance(self.field, Some)
+        return self.field
 
     def inside(self, z: Complexes, design: Ints) -> Flags:
-        """As `Designs.inside`, by single values of the range."""
-        field = self.field
-        assert isinstance(field, Endings)
-        found = np.full(z.shape, field.every)
-        for value in np.linspace(field.low, field.high, VALUES):
-            at = Designs(field.sliced, {VALUE: np.full(self.count, value)}, self.count, self.about).inside(z, design)
-            found = found & at if field.every else found | at
-        return found
+        """As `Designs.inside`."""
+        return np.asarray(self._over.deciding(z)[0][0] > 0)
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
-        """As `Designs.traced`."""
-        # Nearer to where labels change, rounding chooses them.
-        return self.decided(QUANTUM * np.round(theta / QUANTUM), reach, samples, slack)[0]
+        """As `Designs.traced`: between places of each ray of which some samples of the range tell that they matter."""
+        over, rays = self._over, np.arange(len(theta))
+        direction = np.exp(1j * theta)
 
-    def decided(self, theta: Floats, reach: Floats, samples: int, slack: float) -> tuple[Intervals, Floats]:
-        """As `traced`, and the values of the range that decide at both ends of each interval, shape (2, intervals)."""
-        field = self.field
-        assert isinstance(field, Endings)
-        rays, values = len(theta), np.linspace(field.low, field.high, VALUES)
+        def height(ray: Ints, radius: Floats) -> Floats:
+            found: Floats = over.deciding(self.about + radius * direction[ray])[0][0]
+            return found
 
-        def slices(lanes: Lanes) -> tuple[Stretches, Misses]:
-            """What the rays meet at single values."""
-            at = np.arange(len(lanes.ray))
-            sliced = Designs(field.sliced, {VALUE: lanes.value}, len(at), self.about)
-            found = trace(sliced, at, theta[lanes.ray], reach[lanes.ray], samples, slack)
-            parts = Stretches.outside(found, reach[lanes.ray]) if field.every else Stretches.inside(found)
-            return parts, Misses.of(found, len(field.sliced.labels))
+        x = self._places(theta, reach, samples)
+        values = height(np.broadcast_to(rays, x.shape), x)
+        positive = values > 0
+        cell, ray = np.nonzero(positive[1:] != positive[:-1])
+        (a, b), (fa, fb), none = x[[cell, cell + 1], ray], values[[cell, cell + 1], ray], np.full(len(ray), np.nan)
+        radius = bracketed_roots(
+            lambda which, radius: height(ray[which], radius), a, fa, b, fb, none, none, ROUNDING * reach[ray]
+        )
+        turn = np.where(fb > 0, 1, -1)
+        _, value, pair = over.deciding(self.about + radius * direction[ray])
+        (one, other), count = pair[:, 0], len(over.single)
+        # Beside where a leg is stretched or folded it is for rounding to say whether that decides, too.
+        one = np.where(over.sliced.singular[one], np.where(over.sliced.singular[other], one, other), one)
+        end = (value[0] <= over.low) + 2 * (value[0] >= over.high)
+        label = np.where(one == other, one + count * end, (3 + one) * count + other)
+        found = intervals_between(label, ray, turn, radius, (~positive[0]).astype(np.intp), reach, slack)
+        return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
 
-        lanes = Lanes(np.repeat(np.arange(rays), VALUES), np.tile(values, rays))
-        parts, misses = slices(lanes)
-        for _ in range(0 if field.every else ROUNDS):
-            # Between values where nothing is quite met.
-            ray, value = misses.hidden(lanes)
-            if not len(ray):
-                break
-            count = len(lanes.ray)
-            fresh = Lanes(ray, value)
-            lanes = Lanes(np.concatenate([lanes.ray, ray]), np.concatenate([lanes.value, value]))
-            more = slices(fresh)
-            parts, misses = parts.joined(more[0], count), misses.joined(more[1], count)
-        ray, ends, source = merged(lanes.ray[parts.lane], parts.ends)
-        sides = np.array([[0], [1]])
-        labels, value = parts.labels[sides, source], lanes.value[parts.lane[source]]
-        # Each end may go on as far as the next stretch.
-        same = ray[1:] == ray[:-1]
-        limit = np.stack([np.zeros(len(ray)), reach[ray]])
-        limit[0, 1:][same], limit[1, :-1][same] = ends[1, :-1][same], ends[0, 1:][same]
-        side, which = np.nonzero(labels >= 0)
-        owner, count = ray[which], len(field.sliced.labels)
-        at_end = np.where(value == field.low, count, np.where(value == field.high, count + 1, -1))
-        start = Starts(
-            ends[side, which], value[side, which], (ends[1] - ends[0])[which],
-            np.stack([labels, at_end])[:, side, which], limit[side, which],
-            np.where(side, 1.0, -1.0), reach[owner], (field.high - field.low) / (VALUES - 1),
-            np.append(field.sliced.singular, [False, False]),
-        )  # fmt: skip
-        across = Across(field.sliced, theta[owner], self.about, field.low, field.high, field.every, labels[side, which])
-        radius, at, pair = extended(across.margins, across.cut, start, field.every)
-        ends[side, which], value[side, which] = radius, at
-        known = (pair >= 0).all(axis=0)
-        labels[side[known], which[known]] = field.label(*pair[:, known])
-        labels[side[~known & (radius == 0)], which[~known & (radius == 0)]] = -1
-        ray, ends, source = merged(ray, ends)
-        return as_intervals(ray, ends, labels[sides, source], value[sides, source], reach, field.every)
+    def _places(self, theta: Floats, reach: Floats, samples: int) -> Floats:
+        """Radii of each ray, ascending, shape (places, rays), of which two neighbours hold at most one end."""
+        over, rays = self._over, len(theta)
+        lanes = np.arange(rays * SAMPLES)
+        slices = Designs(over.sliced, {VALUE: np.tile(over.values, rays)}, len(lanes), self.about)
+        found = trace(slices, lanes, np.repeat(theta, SAMPLES), np.repeat(reach, SAMPLES), samples)
+        # Stretches that some sample of the range reaches, by how many do.
+        ray, radius = np.tile(found.ray // SAMPLES, 2), np.concatenate([found.inner, found.outer])
+        turn = np.repeat([1, -1], len(found.ray))
+        order = np.lexsort((-turn, radius, ray))
+        ray, radius, turn = ray[order], radius[order], turn[order]
+        cover = np.cumsum(turn)
+        begins, ends = (turn > 0) & (cover == 1), cover == 0
+        owner, inner, outer = ray[begins], radius[begins], radius[ends]
+        every = np.arange(rays)
+        # Gaps before, between and behind them.
+        low_of, low = np.concatenate([every, owner]), np.concatenate([np.zeros(rays), outer])
+        high_of, high = np.concatenate([owner, every]), np.concatenate([inner, reach])
+        one, two = np.lexsort((low, low_of)), np.lexsort((high, high_of))
+        between = low[one] + BETWEEN[:, None] * (high[two] - low[one])
+        hidden_ray, hidden = _hidden(found, len(over.single))
+        ray = np.concatenate([every, every, owner, owner, owner, *[low_of[one]] * len(BETWEEN), hidden_ray])
+        radius = np.concatenate([0 * reach, reach, inner, 0.5 * (inner + outer), outer, between.ravel(), hidden])
+        order = np.lexsort((radius, ray))
+        ray, radius = ray[order], radius[order]
+        slot = np.arange(len(ray)) - np.searchsorted(ray, ray)
+        x = np.tile(reach, (int(slot.max()) + 1, 1))
+        x[slot, ray] = radius
+        return x
 
-    def deciding(self, theta: Floats, radius: Floats, reach: float, samples: int) -> Floats:
-        """The value of the range that decides at points of the boundary, shape (n,)."""
-        found, values = self.decided(theta, np.full(len(theta), reach), samples, SLACK)
-        ray = np.tile(found.ray, 2)
-        gap = np.abs(np.concatenate([found.inner, found.outer]) - radius[ray])
-        order = np.lexsort((gap, ray))
-        owner, first = np.unique(ray[order], return_index=True)
-        value = np.full(len(theta), np.nan)
-        value[owner] = values.ravel()[order[first]]
-        return value
+
+def _hidden(found: Intervals, margins: int) -> tuple[Ints, Floats]:
+    """Rays and radii where something may be reached between two samples of the range.
+
+    At a sample one margin becomes negative just before another becomes positive; the gap between both radii is a
+    parabola over the range, and so is its middle.
+    """
+    lane, radius, margin, turn = found.crossings
+    miss = np.flatnonzero((lane[1:] == lane[:-1]) & (turn[:-1] < 0) & (turn[1:] > 0) & (margin[1:] != margin[:-1]))
+    # The same two margins at neighbouring samples have neighbouring keys.
+    key = ((lane[miss] // SAMPLES * margins + margin[miss]) * margins + margin[miss + 1]) * (SAMPLES + 1)
+    key, first = np.unique(key + lane[miss] % SAMPLES, return_index=True)
+    miss = miss[first]
+    gap, middle = radius[miss + 1] - radius[miss], 0.5 * (radius[miss + 1] + radius[miss])
+    at = 1 + np.flatnonzero((key[1:-1] - key[:-2] == 1) & (key[2:] - key[1:-1] == 1))
+    before, here, after = gap[at - 1], gap[at], gap[at + 1]
+    lowest = (here < before) & (here <= after)
+    at, before, here, after = at[lowest], before[lowest], here[lowest], after[lowest]
+    bend, slope = 0.5 * (before + after) - here, 0.5 * (after - before)
+    place = -0.5 * slope / bend
+    hidden = here - 2 * 0.25 * slope**2 / bend <= GAP * (np.maximum(before, after) - here)
+    at, place = at[hidden], place[hidden]
+    slope, bend = 0.5 * (middle[at + 1] - middle[at - 1]), 0.5 * (middle[at + 1] + middle[at - 1]) - middle[at]
+    return lane[miss[at]] // SAMPLES, middle[at] + place * (slope + bend * place)

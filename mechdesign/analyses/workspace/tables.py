@@ -79,14 +79,14 @@ def boundary_columns(study: Study, question: Question, found: Sequence[Patch]) -
         *held_columns(study, question, len(z)),
         Column("x", z.real, length, "place of the point"),
         Column("y", z.imag, length, "place of the point"),
-        Column("kind", np.repeat(kinds, lengths), "", "what ends the region, as in the limits of a motion"),
+        Column("kind", np.repeat(kinds, lengths), "", "what ends the region: limit or singularity"),
     ]
     for drive, value in zip(field.mechanism.forward.structure.given, drives, strict=True):
         shown = np.asarray(in_study_units(study, drive, value))
         columns.append(Column(drive.name, shown, study.units.label(drive.quantity), "drive's value there"))
     return [
         *columns,
-        Column("at", np.repeat([told[curve[2]][1] for curve in curves], lengths), "", "which limit, or which links"),
+        Column("at", np.repeat([told[curve[2]][1] for curve in curves], lengths), "", "which limit or singularity"),
         Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
         Column("side", np.repeat([curve[3] for curve in curves], lengths), "", "which end of the ray's interval"),
         Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth part of the boundary"),

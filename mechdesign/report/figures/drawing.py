@@ -130,9 +130,7 @@ def _area(corners: list[complex]) -> float:
     return abs(sum((a.conjugate() * b).imag for a, b in turned)) / 2 if len(corners) > 2 else 0.0
 
 
-def _draw_guides(
-    pen: Pen, scene: Scene, colors: Mapping[str, str], travel: Travel
-) -> None:  # fmt: skip
+def _draw_guides(pen: Pen, scene: Scene, colors: Mapping[str, str], travel: Travel) -> None:
     for guide in scene.guides:
         start, end = guide.ends(travel, scene.span)
         if guide.owner == GROUND:

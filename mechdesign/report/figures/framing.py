@@ -50,9 +50,7 @@ def scale_of(wide: float, tall: float, width: float, height: float, pad: float =
     return min((width - 2 * pad) / wide, (height - 2 * pad) / tall)
 
 
-def fit(
-    places: Complexes | Iterable[complex], width: float, height: float, pad: float = PAD
-) -> Window:  # fmt: skip
+def fit(places: Complexes | Iterable[complex], width: float, height: float, pad: float = PAD) -> Window:
     """A window `width` inches wide and at most `height` inches high that shows all of the places."""
     middle, wide, tall = extent(places)
     scale = scale_of(wide, tall, width, height, pad)

@@ -70,7 +70,7 @@ def sketch_figure(study: Study) -> Figure:
     crosses = rough[:, 0]
     axes.plot(
         crosses.real, crosses.imag, "x", color=style.INK, alpha=0.5, markersize=7, markeredgewidth=1.6, zorder=4.5
-    )  # fmt: skip
+    )
     axes.set_title("the sketch, assembled" + ("; crosses: where it is drawn" if len(rough) else ""), loc="left")
     draw_beams(axes, study, mechanism.sketch_configuration)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=crosses)

@@ -55,7 +55,7 @@ def coordinate_label(study: Study, name: str) -> str:
 
 def framed(
     height: float, *, left: float, right: float, top: float, bottom: float, apart: tuple[float, float] = (0.0, 0.0)
-) -> Figure:  # fmt: skip
+) -> Figure:
     """A figure with fixed margins (inches) and gaps down and across (parts of a panel)."""
     figure = style.new_figure(style.WIDTH, height, layout=None)
     figure.subplots_adjust(

@@ -87,9 +87,7 @@ def map_sheet(
         left = _LEFT + (k % columns) * (wide + _LEFT + _BAR)
         low = height - _TOP - tall - (k // columns) * (tall + _BELOW + _GAP)
         axes = figure.add_axes((left / style.WIDTH, low / height, wide / style.WIDTH, tall / height))
-        bar = figure.add_axes(
-            ((left + wide + 0.12) / style.WIDTH, low / height, 0.14 / style.WIDTH, tall / height)
-        )  # fmt: skip
+        bar = figure.add_axes(((left + wide + 0.12) / style.WIDTH, low / height, 0.14 / style.WIDTH, tall / height))
         _map(axes, bar, over, values, logarithmic)
         axes.set_title(name, loc="left", fontsize=9.5)
         axes.set_xlabel(coordinate_label(study, over.names[0]))

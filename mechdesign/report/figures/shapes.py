@@ -176,9 +176,7 @@ class Pen:
         stem = np.array([-length / 2, length / 2 - 4]) + 1j * away
         self._arrow(stem, complex(length / 2, away), 1.0, 7.0, where, color)
 
-    def _arrow(
-        self, stem: np.ndarray, tip: complex, along: complex, head: float, where: Transform, color: str
-    ) -> None:  # fmt: skip
+    def _arrow(self, stem: np.ndarray, tip: complex, along: complex, head: float, where: Transform, color: str) -> None:
         if len(stem) > 1:
             vertices = np.column_stack([stem.real, stem.imag])
             self._symbol(Path(vertices), where, 0.6, facecolor="none", edgecolor=color, lw=1.7, capstyle="butt")

@@ -9,15 +9,16 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, mod
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
+from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.workspace import INDEX_NAMES, NEEDED
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.numbers import failure
 
 # Results of a workspace that a goal or condition may name without its command.
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
-_STATISTICS = tuple(f"{name}_{kind}" for name in INDEX_NAMES for kind in ("mean", "min", "max", "std"))
+# Those of a local index follow its name.
+_STATISTICS = ("mean", "min", "max", "std")
 # Commands whose section no default can replace.
 _UNASSUMED = ("reliability", "stiffness")
 
@@ -166,12 +167,12 @@ def check(checker: Checker, section: OptimizeSection) -> None:
 def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:
     """Check the name of a result: a statistic of the workspace, or ``command.column``, as it must be if `required`."""
     command, _, rest = name.partition(".")
+    known = (*INDICES, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in _STATISTICS))
     if rest:
         checker.known(command, COMMANDS, "command", path)
-    elif required or name not in (*INDICES, *_STATISTICS):
-        hint = suggestion(name, (*INDICES, *_STATISTICS))
-        hint = hint or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
-        checker.reporter.report(path, f"there is no result {name!r}{hint}")
+    elif required or name not in known:
+        hint = suggestion(name, known) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+        checker.report(path, f"there is no result {name!r}{hint}")
     if not required:
         column = name.rpartition(".")[2]
-        checker.needs(command if command in _UNASSUMED else NEEDED.get(column.rpartition("_")[0]), repr(name), path)
+        checker.needs(command if command in _UNASSUMED else needed_section(column.rpartition("_")[0]), repr(name), path)

@@ -7,21 +7,11 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
+from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.numbers import failure
-
-INDEX_NAMES = (
-    "inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max", "k_min", "k_direction",
-    "deflection", "sigma_position", "reliability",
-)  # fmt: skip
-# The section of the study that an index needs beside the workspace.
-NEEDED = {
-    "k_min": "stiffness", "k_direction": "stiffness", "deflection": "stiffness", "sigma_position": "reliability",
-    "reliability": "reliability",
-}  # fmt: skip
-
 
 # A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
 WHOLE = 3e-6
@@ -107,7 +97,7 @@ def check(checker: Checker, section: WorkspaceSection) -> None:
         elif not values:
             checker.report((*root, "at", name), "an empty list of values")
     for index, name in enumerate(section.indices or ()):
-        checker.needs(NEEDED.get(name), f"the index {name!r}", (*root, "indices", index))
+        checker.needs(needed_section(name), f"the index {name!r}", (*root, "indices", index))
     scan = section.scan
     if (scan.from_ is None) != (scan.to is None):
         checker.report((*root, "scan"), "'from' and 'to' belong together")

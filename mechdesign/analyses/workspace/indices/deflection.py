@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechdesign.analyses.workspace.indices.compliance import of_compliance
-from mechdesign.analyses.workspace.indices.index import Evaluate, Index
+from mechdesign.analyses.workspace.index import Evaluate, Index, of_compliance
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
 
@@ -37,6 +36,6 @@ def prepare(study: Study) -> Evaluate:
 
 
 INDEX = Index(
-    "deflection", "largest displacement of the stiffness section's point under its loads", prepare,
+    "largest displacement of the stiffness section's point under its loads", prepare,
     lambda study, field: study.units.label("length"), crossing=float("inf"), section="stiffness",
 )  # fmt: skip

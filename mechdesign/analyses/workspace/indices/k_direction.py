@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mechdesign.analyses.stiffness.compliance import directional
-from mechdesign.analyses.workspace.indices.compliance import of_compliance
-from mechdesign.analyses.workspace.indices.index import Evaluate, Index
+from mechdesign.analyses.workspace.index import Evaluate, Index, of_compliance
 from mechdesign.errors import StudyError
 
 if TYPE_CHECKING:
@@ -31,6 +30,6 @@ def prepare(study: Study) -> Evaluate:
 
 
 INDEX = Index(
-    "k_direction", "stiffness to a force in the stiffness section's direction, at its point", prepare,
+    "stiffness to a force in the stiffness section's direction, at its point", prepare,
     lambda study, field: study.units.label("stiffness"), crossing=0.0, section="stiffness",
 )  # fmt: skip

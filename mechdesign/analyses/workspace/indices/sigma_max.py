@@ -1,18 +1,8 @@
 """Largest singular value of the Jacobian: the output's rate per unit of drive rates in the fastest direction."""
 
-from __future__ import annotations
-
-from mechdesign.analyses.workspace.indices.index import Index, of_jacobian, singular_value_unit
-from mechdesign.analyses.workspace.indices.local import Local
-from mechdesign.mechanism.algebra import Value
-
-
-def evaluate(local: Local) -> Value:
-    """sigma_max."""
-    return local.singular_values[1]
-
+from mechdesign.analyses.workspace.index import Index, of_jacobian, singular_value_unit
 
 INDEX = Index(
-    "sigma_max", "largest singular value of the Jacobian", of_jacobian(evaluate), singular_value_unit,
-    crossing=float("inf")
+    "largest singular value of the Jacobian", of_jacobian(lambda local: local.singular_values[1]),
+    singular_value_unit, crossing=float("inf"),
 )  # fmt: skip

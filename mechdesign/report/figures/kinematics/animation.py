@@ -76,7 +76,7 @@ def _frames(figure: Figure, axes: Axes, sweep: Sweep, indices: np.ndarray) -> li
     for index in indices.tolist():
         draw_mechanism(
             axes, sweep.mechanism, sweep.configuration, index, labels=False, drives=False, travel=sweep.travel
-        )  # fmt: skip
+        )
         axes.text(0.0, 1.02, sweep.words(index) + note, transform=axes.transAxes, fontsize=10.5, color=style.INK)
         moving = [artist for artist in axes.get_children() if artist not in standing]
         canvas.restore_region(still)

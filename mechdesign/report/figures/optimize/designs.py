@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.optimize.designs import normalised
+from mechdesign.analyses.optimize.tables import normalised
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.results import Result, Table
@@ -44,7 +44,10 @@ class Designs:
 
     def share(self, goal: str) -> Floats:
         """A goal as a fraction of its range over the feasible designs, 1 the best; nan for the others."""
-        return normalised(self[goal], self.feasible, smallest=self.goals[goal])
+        values = self[goal]
+        inside = values[self.feasible]
+        low, high = inside.min(initial=np.inf), inside.max(initial=-np.inf)
+        return np.where(self.feasible, normalised(values, low, high, smallest=self.goals[goal]), np.nan)
 
     def score(self, row: int) -> Floats:
         """Weighted sum of the goals' shares, with the weights of a row of the table of optima."""

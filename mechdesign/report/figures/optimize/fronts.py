@@ -32,7 +32,7 @@ def front_figure(designs: Designs, front: Table) -> Figure:
 
 def _panel(
     axes: Axes, designs: Designs, front: Table, pair: tuple[str, str], knee: np.ndarray, *, joined: bool
-) -> None:  # fmt: skip
+) -> None:
     x, y = (designs[goal][designs.feasible] for goal in pair)
     axes.plot(x, y, ".", color=style.FAINT, markersize=3, alpha=0.5, markeredgewidth=0, label="feasible designs")
     along, up = (np.asarray(front[goal], dtype=float) for goal in pair)

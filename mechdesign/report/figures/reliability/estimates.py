@@ -120,9 +120,7 @@ def _unseen(table: Table) -> Flags:
     return np.asarray((table["failure_low"] == 0) & (table["failure_high"] > 0) & (table["samples"] > 0))
 
 
-def _dots(
-    axes: Axes, table: Table, rows: Ints, at: Floats, look: Look, floor: float, entries: Legend
-) -> None:  # fmt: skip
+def _dots(axes: Axes, table: Table, rows: Ints, at: Floats, look: Look, floor: float, entries: Legend) -> None:
     """Values with intervals, one marker for each method that they come from."""
     used = table["used"][rows]
     unseen = _unseen(table)[rows]

@@ -67,7 +67,7 @@ def _map(study: Study, found: Sequence[Region], column: str) -> Figure:
 
 def contours(
     axes: Axes, grids: Sequence[Grid], levels: Floats, norm: BoundaryNorm, extend: Extend, *, labels: bool
-) -> None:  # fmt: skip
+) -> None:
     """Filled contours over the patches of a region, each level named once, where its line is longest."""
     drawn = []
     for x, y, z in grids:
@@ -83,7 +83,7 @@ def contours(
 
 def label_levels(
     axes: Axes, drawn: Sequence[QuadContourSet], levels: Floats, norm: BoundaryNorm, blocked: Complexes
-) -> None:  # fmt: skip
+) -> None:
     """Name each level once on one of its lines, far from other lines and names; or not at all."""
     lines = [[part for contour in drawn for part in _parts(axes, contour, k)] for k in range(len(levels) - 1)]
     every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]

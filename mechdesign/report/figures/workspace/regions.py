@@ -231,9 +231,7 @@ class Sheet:
         bar.outline.set_visible(False)
 
 
-def sheet(
-    study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD
-) -> Sheet:  # fmt: skip
+def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD) -> Sheet:
     """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all."""
     number = len(titles)
     x, y = places.real, places.imag
@@ -271,7 +269,5 @@ def sheet(
         edge = (_LEFT + (columns - 1) * step + width if number == 1 else room) + 0.15
         long = min(rows * (height + above + 0.28) - above - 0.28, 4.0)
         middle = _LEGEND + _BELOW + (rows * (height + above + 0.28) - above - 0.28) / 2
-        colors = figure.add_axes(
-            (edge / style.WIDTH, (middle - long / 2) / outer, 0.16 / style.WIDTH, long / outer)
-        )  # fmt: skip
+        colors = figure.add_axes((edge / style.WIDTH, (middle - long / 2) / outer, 0.16 / style.WIDTH, long / outer))
     return Sheet(figure, tuple(panels), colors)

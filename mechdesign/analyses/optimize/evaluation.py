@@ -1,0 +1,353 @@
+"""Goals of many designs at once: every question's tables together, or design by design where that is not possible."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.look import ask, look
+from mechdesign.analyses.optimize import stacked
+from mechdesign.analyses.optimize.assembling import assembly_margins, shortfall
+from mechdesign.analyses.optimize.goals import Goal, bounds_of, goals_of
+from mechdesign.analyses.poses import solve_poses, study_poses
+from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, questions, split
+from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
+from mechdesign.expressions import Number
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.results import Result
+from mechdesign.rows import Chosen, UnknownColumnError, choose
+from mechdesign.study import Study
+from mechdesign.study.variants import faults, follows, variant
+
+# Poses of all designs that are solved together: their arrays fit the cache.
+BLOCK = 65536
+NO_REGION = "nothing of the workspace can be reached"
+# Tables that may be of some of the poses only.
+OF_SOME_POSES = ("extremes",)
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
+# Why a pose fails, by `mechdesign.mechanism.Reason`.
+FAILED = np.array([
+    "",
+    "a pose cannot be assembled",
+    "a pose is reached in another assembly only",
+    "a pose is outside the limits",
+    "a pose does not hold its load",
+], dtype=object)  # fmt: skip
+
+
+class Layout:
+    """Columns of what is found of designs.
+
+    Values of the goals and their estimated errors (nan where there is none); how far the poses are from assembling
+    (`mechdesign.analyses.optimize.assembling.shortfall`, nan where there is no such design); a code that is 0 where the
+    design can be built; then `rows` that goals are made of, and `assembly` margins of commands.
+    """
+
+    def __init__(self, goals: Sequence[Goal], rows: Mapping[Goal, int], assembly: Mapping[str, int]) -> None:
+        count = len(goals)
+        self.column = {each: k for k, each in enumerate(goals)}
+        self.values, self.errors = slice(0, count), slice(count, 2 * count)
+        self.shortfall, self.code, self.head = 2 * count, 2 * count + 1, 2 * count + 2
+        ends = np.cumsum([self.head, *rows.values(), *assembly.values()]).tolist()
+        places = [slice(begin, end) for begin, end in pairwise(ends)]
+        self.rows = dict(zip(rows, places, strict=False))
+        self.assembly = dict(zip(assembly, places[len(rows) :], strict=True))
+        self.margins = slice(ends[len(rows)], ends[-1])
+        self.width = ends[-1]
+
+
+class Evaluated(NamedTuple):
+    """A row of a `Layout` for each design, and why it cannot be built (empty where it can); its code is still nan."""
+
+    table: Floats
+    reasons: list[str]
+
+
+class Evaluator:
+    """Evaluates goals for designs of one study, which differ in parameters or single places.
+
+    Parameters
+    ----------
+    graded : bool
+        Whether the rows are given, too, that goals are the worst of or the root mean square (in `squares`), and how far
+        poses are from assembling.
+
+    Raises
+    ------
+    StudyError
+        If a goal names what no result has, or the study lacks what it needs.
+    """
+
+    def __init__(self, study: Study, goals: Sequence[Goal], *, graded: bool = False) -> None:
+        assert study.optimize is not None
+        self.study, self.goals, self._graded = study, tuple(dict.fromkeys(goals)), graded
+        self.squares: set[Goal] = set()
+        self._rows: dict[Goal, int] = {}
+        # Goals of commands and tables whose answers are found for all designs at once; those asked of each design.
+        self._together: dict[str, dict[str, list[Goal]]] = {}
+        self._alone: dict[str, list[Goal]] = {}
+        # Outputs whose extremes are asked.
+        self._outputs: set[str] = set()
+        self._regional = [each for each in self.goals if each.regional]
+        self._columns = tuple(dict.fromkeys(("area", *(each.column for each in self._regional))))
+        self.question: Question | None = None
+        self._regions_together = True
+        if self._regional:
+            asked = questions(study, GRID_TOLERANCE, self._columns)
+            if len(asked) > 1:
+                message = "an optimisation compares one workspace a design: hold one value of each coordinate"
+                raise StudyError([study.problem(message, "workspace", "at")])
+            self.question = asked[0]
+            self._regions_together = all(each.batched for each in self._regional) and not follows(
+                study, study.optimize.variables, ("workspace",)
+            )
+        commands = dict.fromkeys(each.command for each in self.goals if not each.regional)
+        problems = [problem for command in commands for problem in self._look(command)]
+        if problems:
+            raise StudyError(problems)
+        self._poses = {command: stacked.poses_of(study, command) for command in self._together}
+        # By command of which every pose must be valid: the number of its assembly margins.
+        clear: dict[str, int] = {}
+        for command, tables in self._together.items() if graded else ():
+            poses = self._poses[command](1, {}, {})
+            if poses.listed or any(table not in OF_SOME_POSES for table in tables):
+                clear[command] = assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
+        self.layout = Layout(self.goals, self._rows, clear)
+        if not graded:
+            self.limit_rows(0)
+
+    @property
+    def slow(self) -> bool:
+        """Whether a design costs as much alone as among others: not where all goals are tables found at once."""
+        return bool(self._alone) or bool(self._regional)
+
+    def limit_rows(self, most: int) -> None:
+        """Leave out the rows of goals and the assembly margins where a design has more than so many."""
+        if self.layout.width - self.layout.head > most:
+            self.squares.clear()
+            self.layout = Layout(self.goals, {}, {})
+
+    def _look(self, command: str) -> Iterator[Problem]:
+        """Find the tables of a command's goals, before anything is computed but the study's own design."""
+        goals = [each for each in self.goals if each.command == command and not each.regional]
+        if command == "optimize":
+            yield self.study.problem("an optimisation cannot judge itself", *self._key(goals[0]))
+            return
+        assert self.study.optimize is not None
+        together = command in stacked.TABLES and stacked.possible(self.study, command, self.study.optimize.variables)
+        if command in stacked.TABLES:
+            poses = stacked.poses_of(self.study, command)(1, {}, {})
+            result = stacked.tables(self.study, command, stacked.TABLES[command], poses).result
+            for each in list(goals):
+                with suppress(UnknownColumnError):
+                    chosen = self._count(each, result)
+                    goals.remove(each)
+                    if chosen.table.name == "extremes":
+                        self._outputs.update(chosen.table["output"][chosen.counts].tolist())
+                    if together:
+                        self._together.setdefault(command, {}).setdefault(chosen.table.name, []).append(each)
+                    else:
+                        self._alone.setdefault(command, []).append(each)
+        if not goals:
+            return
+        self._alone.setdefault(command, []).extend(goals)
+        # Where the study's own design has no such result, others tell.
+        with suppress(AssemblyError):
+            result = look(self.study, command)
+            for each in goals:
+                try:
+                    self._count(each, result)
+                except UnknownColumnError as error:
+                    yield self.study.problem(str(error), *self._key(each))
+
+    def _count(self, each: Goal, result: Result) -> Chosen:
+        """Note how many rows a goal is the worst of, or the root mean square, by the study's own design."""
+        chosen = choose(result, each.column, dict(each.where))
+        if chosen.missing:
+            raise UnknownColumnError(chosen.missing)
+        _, rows, squares = each.judge(result)
+        if squares:
+            self.squares.add(each)
+        if rows is not None and (squares or rows.size > 1):
+            self._rows[each] = rows.size
+        return chosen
+
+    def _key(self, wanted: Goal) -> tuple[str | int, ...]:
+        """Where the study names a goal."""
+        section = self.study.optimize
+        assert section is not None
+        named = [*(("maximize", k) for k in range(len(section.maximize))),
+                 *(("minimize", k) for k in range(len(section.minimize)))]  # fmt: skip
+        judged = [*zip(goals_of(section), named, strict=True)]
+        judged += [(each, ("subject_to", k)) for k, given in enumerate(section.subject_to) for each in bounds_of(given)]
+        return ("optimize", *dict(judged).get(wanted, ()))
+
+    def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
+        """Evaluate a batch of designs, given by the values of the variables in the study's units."""
+        batch = _Batch(self, designs)
+        if self.question is not None and self._regions_together:
+            self._regions(batch, batch.feasible, self.question, batch.places)
+        for command, tables in self._together.items():
+            rows, size = batch.feasible, max(1, BLOCK // self._poses[command](1, {}, {}).count)
+            for begin in range(0, len(rows), size):
+                self._tables(batch, command, tables, rows[begin : begin + size])
+        alone = bool(self._alone) or not self._regions_together
+        for k in batch.feasible.tolist():
+            if alone or k in batch.left:
+                batch.reasons[k] = self._one(batch, k)
+        for each, values in zip(self.goals, batch.table[:, self.layout.values].T, strict=True):
+            batch.note(slice(None), np.isnan(values), f"{each.name} has no value")
+        return Evaluated(batch.table, [str(reason) for reason in batch.reasons])
+
+    def _regions(self, batch: _Batch, rows: Ints, question: Question, places: Mapping[str, Number]) -> None:
+        """Numbers of the workspaces of some designs."""
+        if not len(rows):
+            return
+        try:
+            given = answer(question, batch.take(places, rows), len(rows), BATCH)
+        except AssemblyError as error:
+            # One design's workspace has no end; the others are still to be told.
+            if len(rows) == 1:
+                batch.reasons[rows] = _plainly(error)
+                return
+            for half in np.array_split(rows, 2):
+                self._regions(batch, half, question, places)
+            return
+        for each in self._regional:
+            column = self.layout.column[each]
+            batch.table[rows, column] = given.values[each.column]
+            if split(each.column)[1] == "mean":
+                batch.table[rows, len(self.goals) + column] = given.errors[each.column]
+        batch.note(rows, ~(given.panels.closes & (given.values["area"] > 0)), NO_REGION)
+
+    def _tables(self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints) -> None:
+        poses = self._poses[command](len(rows), batch.take(batch.places, rows), batch.take(batch.parameters, rows))
+        wanted = {*tables, "motion"} if self.squares.intersection(*tables.values()) else set(tables)
+        stack = stacked.tables(self.study, command, wanted, poses, self._outputs)
+        failed = FAILED[_first(stack.reason)]
+        wrong = stack.reason != 0
+        # The errors of the poses that are left would be the smaller the more of them are lost.
+        whole = poses.listed or "targets" in tables
+        batch.note(rows, wrong.any(axis=1) if whole else wrong.all(axis=1), failed)
+        clear = self.layout.assembly.get(command)
+        if self._graded and (clear is not None or (batch.reasons[rows] != "").any()):
+            margins = assembly_margins(self.study, poses, stack.solved or solve_poses(self.study, poses))
+            batch.table[rows, self.layout.shortfall] = shortfall(margins)
+            if clear is not None:
+                batch.table[rows, clear] = margins
+        for table, goals in tables.items():
+            left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
+            for each in goals:
+                lost = np.isnan(batch.judge(each, stack.result, rows)) & ~left
+                batch.note(rows, lost & (failed != ""), failed)
+            for k in rows[left].tolist():
+                batch.left.setdefault(k, {}).setdefault(command, []).extend(goals)
+
+    def _needed(self, study: Study) -> Study:
+        """The study without what no goal asks and costs much more than the goals: tolerances, Sobol' indices."""
+        section, columns = study.reliability, [each.column for each in self.goals]
+        if section is None:
+            return study
+        if "cost_allocated" not in columns:
+            section = section.model_copy(update={"allocate": None})
+        if not any(column.startswith("sobol_") for column in columns):
+            section = section.model_copy(update={"sobol": 0})
+        return replace(study, reliability=section)
+
+    def _one(self, batch: _Batch, k: int) -> str:
+        """Ask what is left of one design; returns why it is infeasible."""
+        row, left = np.array([k]), batch.left.get(k, {})
+        command = ""
+        try:
+            other = variant(self.study, {name: float(column[k]) for name, column in batch.designs.items()})
+            if not self._regions_together:
+                self._regions(batch, row, questions(other, GRID_TOLERANCE, self._columns)[0], {})
+                if batch.reasons[k]:
+                    return str(batch.reasons[k])
+            other = self._needed(other)
+            for command in dict.fromkeys((*self._alone, *left)):
+                result, asked = ask(other, command), (*self._alone.get(command, ()), *left.get(command, ()))
+                whole = any(choose(result, each.column, dict(each.where)).table.name == "targets" for each in asked)
+                if result.failed or (whole and self._pose_reason(batch, k, other, command)):
+                    return self._pose_reason(batch, k, other, command)
+                if any(np.isnan(batch.judge(each, result, row)).any() for each in asked):
+                    return self._pose_reason(batch, k, other, command)
+        except UnknownColumnError as error:
+            return str(error)
+        except AssemblyError as error:
+            return (self._pose_reason(batch, k, other, command) if command else "") or _plainly(error)
+        except MechdesignError as error:
+            return _plainly(error)
+        return ""
+
+    def _pose_reason(self, batch: _Batch, k: int, study: Study, command: str) -> str:
+        """Why poses of one design fail, empty where none does; notes how far they are from assembling."""
+        if command == "workspace":
+            return NO_REGION
+        poses = study_poses(study, command)
+        solved = list(solve_poses(study, poses))
+        if self._graded:
+            batch.table[k, self.layout.shortfall] = shortfall(assembly_margins(study, poses, solved))[0]
+        return str(FAILED[_first(np.concatenate([each.configuration.reason for each in solved])[None])[0]])
+
+
+class _Batch:
+    """Designs of one call, and what is found of them."""
+
+    def __init__(self, evaluator: Evaluator, designs: Mapping[str, Floats]) -> None:
+        count = len(next(iter(designs.values())))
+        parameters = evaluator.study.parameters
+        self.designs, self._layout = designs, evaluator.layout
+        self.parameters = {name: value for name, value in parameters.values(designs).items() if np.ndim(value)}
+        self.places = parameters.places(designs)
+        self.reasons = np.array(faults(evaluator.study, self.parameters, self.places, count), dtype=object)
+        self.table = np.full((count, self._layout.width), np.nan)
+        self.table[self.feasible, self._layout.shortfall] = 1.0
+        # What is still to be asked of single designs, by their row and by command.
+        self.left: dict[int, dict[str, list[Goal]]] = {}
+
+    @property
+    def feasible(self) -> Ints:
+        """Rows of the designs that nothing is said against."""
+        return np.flatnonzero(self.reasons == "")
+
+    def take(self, values: Mapping[str, Number], rows: Ints) -> dict[str, Floats]:
+        """Values of some designs."""
+        count = len(self.reasons)
+        return {name: np.broadcast_to(np.asarray(v, dtype=float), count)[rows] for name, v in values.items()}
+
+    def judge(self, each: Goal, result: Result, rows: Ints) -> Floats:
+        """Note the values of a goal by a result of some designs; returns them."""
+        values, listed, _ = each.judge(result, len(rows))
+        self.table[rows, self._layout.column[each]] = values
+        place = self._layout.rows.get(each, slice(0))
+        if listed is not None and listed.shape[1] == place.stop - (place.start or 0):
+            self.table[rows, place] = listed
+        return values
+
+    def note(self, rows: Ints | slice, wrong: Flags, reasons: NDArray[np.object_] | str) -> None:
+        """Say what is wrong with some of the rows, where nothing has been said yet."""
+        self.reasons[rows] = np.where(wrong & (self.reasons[rows] == ""), reasons, self.reasons[rows])
+
+
+def _first(reason: NDArray[np.int8]) -> Ints:
+    """The first reason of each design's poses, shape (designs,); 0 where none fails."""
+    worst = np.where(reason == 0, len(FAILED), reason).min(axis=1, initial=len(FAILED))
+    return np.where(worst == len(FAILED), 0, worst).astype(np.intp)
+
+
+def _plainly(error: MechdesignError) -> str:
+    """An error without its numbers and the file's name, so that designs with one mistake count together."""
+    text = str(error).splitlines()[0]
+    if isinstance(error, StudyError):
+        first = error.problems[0]
+        text = ": ".join(part for part in (first.key, first.message) if part)
+    return NUMBER.sub("...", text)

@@ -1,0 +1,180 @@
+"""Designs evaluated and judged: values of goals, conditions, reasons; all that is asked for, in the order of asking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
+from mechdesign.analyses.optimize.explorer import ASSEMBLY, Part, Scores
+from mechdesign.analyses.optimize.goals import Goal, bounds_of, goals_of
+from mechdesign.analyses.optimize.variables import Batch, from_cube
+from mechdesign.journal import Journal, digest
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.progress import Progress
+from mechdesign.study import Study
+
+# Designs evaluated together: enough that arrays are long, few enough that the workers end together.
+CHUNK = 384
+# The same where designs cost much and a search asks for few at once.
+SMALL_CHUNK = 16
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedDesigns:
+    """Designs and what was found of them.
+
+    Parameters
+    ----------
+    variables : dict of str to ndarray, shape (designs,)
+        Values of the design variables.
+    goals, conditions : tuple of Goal
+    values : dict of Goal to ndarray, shape (designs,)
+        Values of the goals and of what the conditions bound; nan where there is none.
+    errors : dict of Goal to ndarray, shape (designs,)
+        Estimated errors, of goals that have any.
+    codes, words : ndarray of int, list of str
+        Why a design cannot be built: ``words[code]``, empty where it can.
+    """
+
+    variables: dict[str, Floats]
+    goals: tuple[Goal, ...]
+    conditions: tuple[Goal, ...]
+    values: dict[Goal, Floats]
+    errors: dict[Goal, Floats]
+    codes: NDArray[np.int32]
+    words: list[str]
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    @cached_property
+    def failures(self) -> dict[str, Flags]:
+        """Designs by why they are infeasible: that they cannot be built, else every condition that they miss."""
+        found = {word: self.codes == code for code, word in enumerate(self.words) if word}
+        built = self.codes == 0
+        return found | {f"not {each.name}": built & ~each.met(self.values[each]) for each in self.conditions}
+
+    @cached_property
+    def reasons(self) -> NDArray[np.object_]:
+        """The first reason of each design, empty where it is feasible."""
+        column = np.full(len(self), "", dtype=object)
+        for word, rows in reversed(self.failures.items()):
+            column[rows] = word
+        return column
+
+    @cached_property
+    def feasible(self) -> Flags:
+        """Which can be built and meet every condition."""
+        return np.asarray(self.reasons == "", dtype=bool)
+
+    def counted(self) -> list[tuple[str, int, int]]:
+        """Why designs are infeasible, the most frequent first: reason, how many designs, and the first."""
+        found = [(word, int(rows.sum()), int(rows.argmax())) for word, rows in self.failures.items() if rows.any()]
+        return sorted(found, key=lambda each: (-each[1], each[0]))
+
+
+class Judge:
+    """Evaluates designs in chunks and keeps what is found; what a journal holds is not computed again.
+
+    Parameters
+    ----------
+    compute
+        Evaluates chunks, in their order: ``map(evaluator, chunks)``, or workers that do so.
+    """
+
+    def __init__(
+        self, study: Study, evaluator: Evaluator, compute: Callable[[Iterable[Batch]], Iterator[Evaluated]],
+        progress: Progress, journal: Journal | None,
+    ) -> None:  # fmt: skip
+        assert study.optimize is not None
+        self.study, self.progress, self.layout = study, progress, evaluator.layout
+        self.goals, self.conditions = judged_of(study)
+        self._names = tuple(study.optimize.variables)
+        self._squares, self._compute, self._journal = evaluator.squares, compute, journal
+        self._chunk = SMALL_CHUNK if evaluator.slow and study.optimize.method != "grid" else CHUNK
+        # Words of an earlier run keep their numbers: this one meets them in the same order.
+        self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
+        self._asked: list[Floats] = []
+        self._found: list[Floats] = []
+
+    def parts(self) -> list[Part]:
+        """Which rows of an outcome belong to which goal or condition; those of assembly come last."""
+        head, margins = self.layout.head, self.layout.margins
+        places = {each: slice(at.start - head, at.stop - head) for each, at in self.layout.rows.items()}
+        found = [
+            Part(column, 1.0 if each.smallest else -1.0, each.absolute, places[each], each.bound, each in self._squares)
+            for column, each in enumerate((*self.goals, *self.conditions))
+            if each in places and (column < len(self.goals) or each not in self._squares)
+        ]
+        if margins.start < margins.stop:
+            found.append(Part(ASSEMBLY, -1.0, False, slice(margins.start - head, margins.stop - head)))
+        return found
+
+    def scores(self, u: Floats) -> Scores:
+        """Evaluate points of the unit cube."""
+        designs, given = from_cube(self.study, u)
+        found = np.full((len(u), self.layout.width), np.nan)
+        if given.any():
+            found[given] = self.evaluate({name: column[given] for name, column in designs.items()})
+        values = np.where(found[:, [self.layout.code]] > 0, np.nan, found[:, self.layout.values])
+        margins = [each.margin(values[:, self.layout.column[each]]) for each in self.conditions]
+        return Scores(
+            values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
+            found[:, self.layout.head :], found[:, self.layout.shortfall],
+        )  # fmt: skip
+
+    def evaluate(self, designs: Batch) -> Floats:
+        """Evaluate designs chunk by chunk; in rows of `layout`, whatever the workers and the journal."""
+        count, begun = len(designs[self._names[0]]), len(self._found)
+        chunks = [
+            {name: column[k : k + self._chunk] for name, column in designs.items()}
+            for k in range(0, count, self._chunk)
+        ]
+        keys = [digest([chunk[name] for name in self._names]) for chunk in chunks]
+        known: list[Floats] = []
+        while self._journal is not None and len(known) < len(keys):
+            rows = self._journal.recall(keys[len(known)])
+            if rows is None:
+                break
+            known.append(rows)
+        new = map(self._coded, self._compute(chunks[len(known) :]))
+        for chunk, key, rows in zip(chunks, keys, chain(known, new), strict=True):
+            self._asked.append(np.column_stack([chunk[name] for name in self._names]))
+            self._found.append(rows)
+            if self._journal is not None:
+                self._journal.add(key, rows, [*self._words])
+            self.progress.update(len(rows))
+        found = self._found[begun:]
+        # Only who asked needs the rows behind the values.
+        self._found[begun:] = [rows[:, : self.layout.head].copy() for rows in found]
+        return np.concatenate(found) if found else np.empty((0, self.layout.width))
+
+    def _coded(self, found: Evaluated) -> Floats:
+        codes = [self._words.setdefault(reason, len(self._words)) for reason in found.reasons]
+        found.table[:, self.layout.code] = codes
+        return found.table
+
+    def designs(self) -> JudgedDesigns:
+        """Everything evaluated so far."""
+        head = self.layout.head
+        found = np.concatenate([np.empty((0, head)), *(rows[:, :head] for rows in self._found)])
+        asked = np.concatenate([np.empty((0, len(self._names))), *self._asked])
+        errors = zip(self.layout.column, found[:, self.layout.errors].T, strict=True)
+        return JudgedDesigns(
+            dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
+            dict(zip(self.layout.column, found[:, self.layout.values].T, strict=True)),
+            {each: column for each, column in errors if not np.isnan(column).all()},
+            found[:, self.layout.code].astype(np.int32), [*self._words],
+        )  # fmt: skip
+
+
+def judged_of(study: Study) -> tuple[tuple[Goal, ...], tuple[Goal, ...]]:
+    """The goals and the conditions of a study."""
+    assert study.optimize is not None
+    return goals_of(study.optimize), tuple(each for given in study.optimize.subject_to for each in bounds_of(given))

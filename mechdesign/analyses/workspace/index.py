@@ -1,0 +1,160 @@
+"""What an index is: value, unit, what it needs of the study, and how it behaves where the mechanism is singular."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechdesign import indices
+from mechdesign.analyses.workspace.local import Local
+from mechdesign.errors import StudyError
+from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.numerics.arrays import Floats
+
+if TYPE_CHECKING:
+    from mechdesign.analyses.region.field import Field
+    from mechdesign.study import Study
+
+Evaluate = Callable[[Local], Value]
+# Configurations that an index is computed from at once.
+BLOCK = 4096
+
+
+@dataclass(frozen=True)
+class Index:
+    """A local performance index.
+
+    Its file is read with the study's schema: what only its computation needs is imported where it is prepared.
+
+    Parameters
+    ----------
+    meaning : str
+    prepare : function of a study
+        Makes what evaluates it; raises `StudyError` where the study lacks what it needs.
+    unit : function of a study and a field
+    crossing : float or None
+        What it tends to where a forward determinant vanishes inside the region (``assembly: any``); infinite if it
+        grows as 1/distance; None where it stays finite.
+    bounds : (float, float)
+        What it can never be below or above.
+    section : str
+        Section of the study that it needs beside the workspace; empty where the Jacobian is enough.
+    """
+
+    meaning: str
+    prepare: Callable[[Study], Evaluate]
+    unit: Callable[[Study, Field], str]
+    crossing: float | None = None
+    bounds: tuple[float, float] = (0.0, float("inf"))
+    section: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """An index made ready for one study."""
+
+    name: str
+    index: Index
+    evaluate: Evaluate = field(repr=False)
+
+    @quiet
+    def values(self, local: Local) -> Value:
+        """Values at points, computed once."""
+        if self.name not in local.found:
+            local.found[self.name] = self.evaluate(local)
+        return local.found[self.name]
+
+
+def prepare(study: Study, names: Sequence[str]) -> tuple[Prepared, ...]:
+    """Indices made ready for a study.
+
+    Raises
+    ------
+    StudyError
+        If the study lacks what one of them needs.
+    """
+    return tuple(Prepared(name, each, each.prepare(study)) for name in names for each in (indices.index(name),))
+
+
+def of_jacobian(evaluate: Evaluate) -> Callable[[Study], Evaluate]:
+    """The `prepare` of an index that the Jacobian alone gives."""
+    return lambda study: evaluate
+
+
+def of_configurations(evaluate: Callable[[Configuration], Floats]) -> Evaluate:
+    """An index from what evaluates flat batches of assembled configurations, in blocks; nan where there is none."""
+
+    def everywhere(local: Local) -> Floats:
+        whole = local.configuration
+        configuration = replace(whole, reason=np.broadcast_to(whole.reason, whole.shape))
+        finite = np.ones(configuration.shape, dtype=bool)
+        for node in configuration.nodes:
+            finite &= np.isfinite(node)
+        found = np.full(configuration.shape, np.nan)
+        rows = np.nonzero(finite)
+        for k in range(0, len(rows[0]), BLOCK):
+            block = tuple(row[k : k + BLOCK] for row in rows)
+            found[block] = evaluate(configuration.take(block))
+        return found
+
+    return everywhere
+
+
+def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) -> Evaluate:
+    """An index from compliances at the stiffness section's point, shape (n, size, size), to values, shape (n,).
+
+    Parameters
+    ----------
+    free : float
+        Its value where a twist is free.
+
+    Raises
+    ------
+    StudyError
+        If nothing gives: every stiffness would be infinite.
+    """
+    from mechdesign.analyses.stiffness.analysis import ask, hold
+
+    section = study.stiffness
+    assert section is not None
+    if not (section.elastic or section.actuators or section.bearings):
+        message = "indices of stiffness need something that gives: elastic links, actuators or bearings"
+        raise StudyError((study.problem(message, "stiffness"),))
+    asked = ask(study)
+
+    def evaluate(configuration: Configuration) -> Floats:
+        soft = hold(asked, configuration)[0].compliance
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = value(soft)
+        return np.where(np.isnan(soft).any(axis=(1, 2)), free, found)
+
+    return of_configurations(evaluate)
+
+
+def number(study: Study, where: Field) -> str:
+    """The unit of pure numbers."""
+    return ""
+
+
+def power_of_length(study: Study, power: int) -> str:
+    """The study's unit of length to a power."""
+    name = "" if study.units.length == "dimensionless" else study.units.length
+    text = name if abs(power) == 1 else f"{name}^{abs(power)}"
+    return "" if power == 0 or not name else text if power > 0 else f"1/{text}"
+
+
+def determinant_power(where: Field) -> int:
+    """Power of length in the determinant of a Jacobian, per radian."""
+    lengths = sum(c.quantity == "length" for c in where.outputs)
+    return lengths - sum(c.quantity == "length" for c in where.mechanism.forward.structure.given)
+
+
+def singular_value_unit(study: Study, where: Field) -> str:
+    """Unit of a singular value: outputs by drives, or none where a characteristic length makes both lengths."""
+    driven = where.mechanism.forward.structure.given[0].quantity
+    power = int(where.outputs[0].quantity == "length") - int(driven == "length")
+    return "" if where.length is not None else power_of_length(study, power)

@@ -1,0 +1,39 @@
+"""Local indices of the workspace by name: each is declared by a file of its own, and listed nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+FOLDER = "mechdesign.analyses.workspace.indices"
+# Those that are evaluated where a study names none.
+USUAL = ("inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max")
+
+
+class _Names(Collection[str]):
+    """Names of the folder's files when they are asked for, the usual ones first; nothing is imported for them."""
+
+    def __iter__(self) -> Iterator[str]:
+        files = sorted(module.name for module in iter_modules(import_module(FOLDER).__path__))
+        return iter(dict.fromkeys((*USUAL, *files)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in USUAL or any(name == each for each in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+INDEX_NAMES = _Names()
+
+
+def index(name: str) -> Any:
+    """The `mechdesign.analyses.workspace.index.Index` of a name."""
+    return import_module(f"{FOLDER}.{name}").INDEX
+
+
+def needed_section(name: str) -> str | None:
+    """The section of the study that an index needs beside the workspace; None where none, or no index has the name."""
+    return (index(name).section or None) if name in INDEX_NAMES else None

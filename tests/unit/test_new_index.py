@@ -1,0 +1,75 @@
+"""A new local index is one file: schema, checks, tables and pictures follow from it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.analyses.workspace import indices
+from mechdesign.errors import StudyError
+from mechdesign.report.figures.workspace import figures
+from mechdesign.report.tables import to_csv
+from mechdesign.study import schema
+
+FILE = '''
+"""Reach: distance of the point from the place where its leg begins."""
+
+import numpy as np
+
+from mechdesign.analyses.workspace.index import Index, of_jacobian
+
+INDEX = Index(
+    "distance from the origin", of_jacobian(lambda local: np.abs(local.configuration.point("P"))),
+    lambda study, field: study.units.label("length"), section="stiffness",
+)
+'''
+ARM = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 50], lower: [E, P, 30]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
+  sketch: {E: [30, 40], P: [60, 40]}
+stiffness: {at: P, actuators: {q1: 1e4, q2: 1e4}, poses: workspace}
+workspace: {point: P, indices: [reach], scan: {about: [0, 0]}}
+"""
+
+
+@pytest.fixture
+def reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "reach.py").write_text(FILE)
+    monkeypatch.setattr(indices, "__path__", [*indices.__path__, str(tmp_path)])
+
+
+@pytest.mark.usefixtures("reach")
+def test_a_new_index_is_found_in_schema_csv_and_picture() -> None:
+    assert "'reach'" in str(schema())
+    study = study_of(ARM)
+    result = mechdesign.workspace(study)
+    (row,) = result.main.rows()
+    assert (row["reach_min"], row["reach_max"]) == pytest.approx((20, 80), rel=1e-4)
+    # The mean of r over a ring.
+    assert row["reach_mean"] == pytest.approx(2 / 3 * (80**3 - 20**3) / (80**2 - 20**2), rel=1e-4)
+    told = {column.name: (column.unit, column.meaning) for column in result.main.columns}
+    assert told["reach_mean"] == ("mm", "mean over the region: distance from the origin")
+    table = result.tables["local"]
+    assert table["reach"] == pytest.approx(np.hypot(table["x"], table["y"]))
+    assert "reach" in to_csv(table).splitlines()[0]
+    page = figures(study, result)["reach"]
+    assert any("Reach at point P: distance from the origin" in text.get_text() for text in page.texts)
+    best = "optimize={variables: {lower.length: {from: 20, to: 40, number: 3}}, maximize: reach_mean}"
+    optimum = mechdesign.optimize(study_of(ARM, best)).main
+    assert optimum["lower.length"][0] == 40
+
+
+@pytest.mark.usefixtures("reach")
+def test_what_a_new_index_needs_is_checked() -> None:
+    with pytest.raises(StudyError, match="the index 'reach' needs the stiffness section"):
+        study_of(ARM.replace("stiffness:", "#"))
+    with pytest.raises(StudyError, match="did you mean 'reach'"):
+        study_of(ARM, "workspace.indices=[reahc]")
+
+
+def test_without_its_file_there_is_none() -> None:
+    with pytest.raises(StudyError, match="expected one of inverse_condition, "):
+        study_of(ARM)
