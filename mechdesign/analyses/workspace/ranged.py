@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from mechdesign.analyses.region.field import Field, Places
-from mechdesign.analyses.region.rays import NOTHING, Designs, Intervals, intervals_between, trace
+from mechdesign.analyses.region.rays import NARROWEST, Designs, Intervals, intervals_between, trace
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
@@ -324,7 +324,7 @@ class SomeDesigns(Designs):
         end = (value[0] <= over.low) + 2 * (value[0] >= over.high)
         label = np.where(one == other, one + count * end, (3 + one) * count + other)
         found = intervals_between(label, ray, turn, radius, (~positive[0]).astype(np.intp), reach, slack)
-        return found if slack else found.kept(found.outer - found.inner > NOTHING * reach[found.ray])
+        return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
 
     def _places(self, theta: Floats, reach: Floats, samples: int) -> Floats:
         """Radii of each ray, ascending, shape (places, rays), of which two neighbours hold at most one end."""
