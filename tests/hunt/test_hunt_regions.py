@@ -455,5 +455,8 @@ def test_over_a_range_only_the_sketchs_piece_counts() -> None:
     assert abs(result.main["area"][0] - one[0]) <= 1.5 * one[1]
     assert result.main["area"][0] == pytest.approx(pieces["area"][0], rel=1e-5)
     assert pieces["sketch"].tolist() == [1] + [0] * (len(pieces["piece"]) - 1)
-    assert set(result.tables["boundary"]["piece"]) == set(pieces["piece"])
+    edge = result.tables["boundary"]
+    assert set(edge["piece"]) == set(pieces["piece"])
+    x, y = (edge[axis][edge["piece"] == 1] for axis in "xy")
+    assert result.main["box_area"][0] == pytest.approx(np.ptp(x) * np.ptp(y), rel=1e-3)
     assert any("do not hang together" in warning for warning in result.warnings)

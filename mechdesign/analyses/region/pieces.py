@@ -224,13 +224,10 @@ class Pieces:
             left = np.intersect1d(left, found.ray[piece == UNKNOWN])
             if not left.size:
                 break
-            low, high = self.panels.low[panel[left]], self.panels.high[panel[left]]
-            inset = np.minimum(step, PART * (high - low))
-            turned = np.clip(theta[left], low + inset, high - inset)
-            beside = trace(self.designs, design[left], turned, self.panels.reach[design[left]], samples)
-            names = self._of_counted(panel[left], beside)
-            ends = np.full((3, len(left), int(beside.counts.max(initial=1))), np.nan)
-            ends[:, beside.ray, beside.slot] = beside.inner, beside.outer, names
+            turned = theta[left] + step * np.array([[0], [-1], [1]])
+            if _is_turn(self.scan):
+                turned = self.scan[0] + (turned - self.scan[0]) % (2 * np.pi)
+            ends = np.concatenate([self._beside(design[left], there, step, samples) for there in turned], axis=2)
             some = np.flatnonzero(np.isin(found.ray, left))
             inner, outer, names = ends[:, np.searchsorted(left, found.ray[some])]
             overlap = np.minimum(found.outer[some, None], outer) - np.maximum(found.inner[some, None], inner)
@@ -238,6 +235,20 @@ class Pieces:
             told = names[np.arange(len(some)), best]
             piece[some] = np.where(np.isnan(told), UNKNOWN, told)
         return piece
+
+    def _beside(self, design: Ints, theta: Floats, step: float, samples: int) -> Floats:
+        """Radii and piece of the intervals of rays near `theta`, not at a panel's end; (3, rays, most intervals)."""
+        panel = self._panel_at(design, theta)
+        known = np.flatnonzero(panel >= 0)
+        if not known.size:
+            return np.full((3, len(panel), 1), np.nan)
+        low, high = self.panels.low[panel[known]], self.panels.high[panel[known]]
+        inset = np.minimum(step, PART * (high - low))
+        turned = np.clip(theta[known], low + inset, high - inset)
+        beside = trace(self.designs, design[known], turned, self.panels.reach[design[known]], samples)
+        ends = np.full((3, len(panel), int(beside.counts.max(initial=1))), np.nan)
+        ends[:, known[beside.ray], beside.slot] = beside.inner, beside.outer, self._of_counted(panel[known], beside)
+        return ends
 
     def _of_counted(self, panel: Ints, found: Intervals) -> Ints:
         """The piece of each interval of rays within panels; unknown where a ray has more or fewer than its panel."""
