@@ -22,10 +22,10 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
 from mechdesign.study import overrides
-from mechdesign.study.build.builder import Builder
-from mechdesign.study.build.description import build
-from mechdesign.study.build.parameters import Parameters
-from mechdesign.study.build.section import MechanismSection, UnitsSection
+from mechdesign.study.building.builder import Builder
+from mechdesign.study.building.description import build
+from mechdesign.study.building.parameters import Parameters
+from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.optimize import Condition, OptimizeSection

@@ -19,9 +19,9 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.model import Fixed
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study.build.names import GROUND
-from mechdesign.study.build.parameters import Parameters
-from mechdesign.study.build.section import LINK_KEYS
+from mechdesign.study.building.names import GROUND
+from mechdesign.study.building.parameters import Parameters
+from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document
 from mechdesign.study.text.document import Document, Mark, leaves, plain
 

@@ -14,7 +14,7 @@ ORDER = (
     ("mechdesign",),  # the files beside the folders: results, errors, expressions, threads, ...
     ("mechdesign.mechanism",),
     ("mechdesign.study.text",),
-    ("mechdesign.study.build",),
+    ("mechdesign.study.building",),
     ("mechdesign.study.schema", "mechdesign.study.poses"),
     ("mechdesign.study",),
     ("mechdesign.analyses", "mechdesign.analyses.region"),

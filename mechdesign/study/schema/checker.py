@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.build.builder import Builder
-from mechdesign.study.build.parameters import Parameters
+from mechdesign.study.building.builder import Builder
+from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
 
 # Kinds of a coordinate, its rate and its acceleration.

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from mechdesign.mechanism.graph import Graph
-from mechdesign.study.build.names import Names
+from mechdesign.study.building.names import Names
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
 from mechdesign.study.schema.reliability import (
     LOADS,

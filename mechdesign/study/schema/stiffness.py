@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.build.names import GROUND
+from mechdesign.study.building.names import GROUND
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields

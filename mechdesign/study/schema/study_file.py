@@ -12,7 +12,7 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.study import poses
-from mechdesign.study.build.section import MechanismSection, UnitsSection
+from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import kinematics, optimize, reliability_checks, stiffness, targets, workspace
 from mechdesign.study.schema import poses as pose_checks
 from mechdesign.study.schema.checker import Checker

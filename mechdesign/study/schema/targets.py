@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.build.section import Wanted
+from mechdesign.study.building.section import Wanted
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import read_table

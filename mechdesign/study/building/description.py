@@ -9,10 +9,10 @@ import numpy as np
 
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.model import Description, Drive, Limit, Measure, Quantity, Term
-from mechdesign.study.build import joints as joint_rules
-from mechdesign.study.build import section as models
-from mechdesign.study.build.builder import ROOT, Builder
-from mechdesign.study.build.names import GROUND
+from mechdesign.study.building import joints as joint_rules
+from mechdesign.study.building import section as models
+from mechdesign.study.building.builder import ROOT, Builder
+from mechdesign.study.building.names import GROUND
 from mechdesign.study.text.document import KeyPath
 
 

@@ -6,14 +6,14 @@ import cmath
 import math
 from collections.abc import Iterable, Mapping
 
+from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.model import Link, Place, Quantity, Term
-from mechdesign.study.build import section as models
+from mechdesign.study.building import section as models
+from mechdesign.study.building.names import GROUND, Names
+from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.build.names import GROUND, Names
 from mechdesign.study.text.numbers import StudyNumber
-from mechdesign.errors import suggestion
-from mechdesign.study.build.parameters import Parameters
 from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Units
 
@@ -48,7 +48,9 @@ class Builder:
         """Note a problem at a path below ``mechanism``."""
         self.reporter.report((*ROOT, *path), message, at_key=at_key)
 
-    def place(self, name: str, value: StudyNumber | float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
+    def place(
+        self, name: str, value: StudyNumber | float, quantity: Quantity = "length", *, measured: bool = False
+    ) -> Term:
         """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
         factor = self.units.angle_factor if quantity == "angle" else 1.0
         nominal = value.nominal if isinstance(value, StudyNumber) else value
@@ -144,7 +146,7 @@ class Builder:
         local = self._measured(name, left_out, given, ends) if left_out else {}
         for point in own:
             at = local.get(point, 0j)
-            x, y = given[point] if point in given else (at.real, at.imag)
+            x, y = given.get(point, (at.real, at.imag))
             terms = [self.place(f"{name}.{point}.{axis}", value, measured=point not in given)
                      for axis, value in (("x", x), ("y", y))]  # fmt: skip
             points[point] = (terms[0], terms[1])

@@ -11,10 +11,10 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
 from mechdesign.study.text import fields
 from mechdesign.study.text.numbers import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
-from mechdesign.errors import suggestion
 from mechdesign.study.text.units import QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
@@ -43,7 +43,12 @@ class Link(fields.Model):
     """A link: binary, telescopic, or its points in its own frame; what is None is measured from the sketch."""
 
     short = (
-        {"type": "array", "prefixItems": [fields.NAME_FORM, fields.NAME_FORM, fields.NUMBER_FORM], "minItems": 2, "maxItems": 3},
+        {
+            "type": "array",
+            "prefixItems": [fields.NAME_FORM, fields.NAME_FORM, fields.NUMBER_FORM],
+            "minItems": 2,
+            "maxItems": 3,
+        },
         {
             "type": "object",
             "additionalProperties": {"anyOf": [fields.PAIR_FORM, {"type": "null"}]},
@@ -54,7 +59,9 @@ class Link(fields.Model):
     to: fields.PointName | None = None
     length: fields.PositiveLengthValue | None = None
     telescopic: bool = False
-    points: Annotated[dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))] = {}
+    points: Annotated[
+        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))
+    ] = Field(default_factory=dict)
 
     @model_validator(mode="before")
     @classmethod
@@ -111,7 +118,9 @@ class Joint(fields.Model):
     prismatic: TwoLinks | None = None
     slot: fields.LinkName | None = None
     fixed: TwoLinks | None = None
-    through: Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort((fields.NAME_FORM,))] | None = None
+    through: (
+        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort((fields.NAME_FORM,))] | None
+    ) = None
     direction: fields.AngleValue | None = None
     point: fields.PointName | None = None
     angle: fields.AngleValue | None = None
@@ -211,15 +220,17 @@ TargetValue = Annotated[
 class MechanismSection(fields.Model):
     """What the study says about the mechanism."""
 
-    parameters: dict[str, fields.AnyValue] = {}
+    parameters: dict[str, fields.AnyValue] = Field(default_factory=dict)
     links: dict[fields.LinkName, Link]
-    joints: dict[fields.JointName, Joint] = {}
-    drives: Annotated[dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))] = {}
+    joints: dict[fields.JointName, Joint] = Field(default_factory=dict)
+    drives: Annotated[
+        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))
+    ] = Field(default_factory=dict)
     branch: Annotated[str, fields.Choice(("side", "follow"))] = "side"
-    sketch: dict[fields.PointName, Point] = {}
-    measures: dict[fields.MeasureName, Measure] = {}
+    sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
+    measures: dict[fields.MeasureName, Measure] = Field(default_factory=dict)
     limits: tuple[Limit, ...] = ()
-    targets: dict[fields.CoordinateName, TargetValue] = {}
+    targets: dict[fields.CoordinateName, TargetValue] = Field(default_factory=dict)
 
 
 def _unit_of(kind: str) -> fields.Read:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.build.section import MechanismSection
+from mechdesign.study.building.section import MechanismSection
 
 GROUND = "ground"
 

@@ -6,14 +6,14 @@ import contextlib
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
+from mechdesign.errors import suggestion
 from mechdesign.mechanism.model import Fixed, Line, Prismatic, Slot
 from mechdesign.mechanism.model import Joint as JointModel
 from mechdesign.mechanism.model import Link as LinkModel
-from mechdesign.study.build import section as models
-from mechdesign.study.build.builder import Builder
+from mechdesign.study.building import section as models
+from mechdesign.study.building.builder import Builder
+from mechdesign.study.building.names import GROUND
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.build.names import GROUND
-from mechdesign.errors import suggestion
 
 
 class _WrongJoint(Exception):
