@@ -173,7 +173,7 @@ def tables_between(
     poses, swept, line = motion.question.poses, swept_of(motion.question.poses), None
     loops = four_bars(motion.question.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
     torn = np.zeros(poses.designs, dtype=bool)
-    if swept is not None:
+    if swept is not None and (loops or "extremes" in wanted):
         coordinates = needed(motion, names) if "extremes" in wanted else []
         line = PoseLine(motion, swept, coordinates, functions(loops, "toggles" in wanted), ends)
     tables = {}
