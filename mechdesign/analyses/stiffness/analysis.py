@@ -265,14 +265,11 @@ def hold(body: Body, configuration: Configuration) -> tuple[Held, list[Springs]]
 def evaluate(body: Body, configuration: Configuration) -> tuple[Held, list[Springs], Effects | None]:
     """As `hold`, and what the study's loads do."""
     section = body.section
-    held, springs = hold(body, configuration)
     if not section.loads:
-        return held, springs, None
-    return (
-        held,
-        springs,
-        effects_of(body.network, _loaded(body, configuration), section.at, configuration, section.loads),
-    )
+        return *hold(body, configuration), None
+    loaded = _loaded(body, configuration)
+    held, springs = (loaded.held, []) if body.legs is None else hold(body, configuration)
+    return held, springs, effects_of(body.network, loaded, section.at, configuration, section.loads)
 
 
 def _loaded(body: Body, configuration: Configuration) -> Loaded:
