@@ -86,8 +86,8 @@ _add(
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.ANIMATE, given.JUNIT, given.FAIL_FAST, given.RESUME,
     ),
-    "Outcome every question that each study asks.",
-    "Outcome every question that each study asks, each in a folder of its own; one summary for all.",
+    "Answer every question that each study asks.",
+    "Answer every question that each study asks, each in a folder of its own; one summary for all.",
 )  # fmt: skip
 _add(
     "check",

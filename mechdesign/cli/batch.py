@@ -39,7 +39,7 @@ def questions(study: Study) -> tuple[str, ...]:
 
 @one_thread()
 def run(paths: Sequence[Path], options: Options) -> int:
-    """Outcome every question of the studies; returns the exit code, the highest of them all.
+    """Answer every question of the studies; returns the exit code, the highest of them all.
 
     A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
     summary and the JUnit file then tell what was finished.
