@@ -82,7 +82,7 @@ def inscribed(
     met = (np.stack([every.real - corner.real, every.imag - corner.imag]) / cell[:, None]).astype(int)
     free[tuple(np.clip(met + 1, 1, CELLS - 2))] = False
     # What is negative nowhere (the length of a leg) is no border.
-    borders = ~inside.all(axis=1)
+    borders = np.array(~inside.all(axis=1), dtype=bool)
     borders[[*(margin for _, margin in ends), *range(len(field.labels), len(borders))]] = True
 
     def grown(border: Border, value: Size, start: Floats) -> Floats:
@@ -128,7 +128,7 @@ def _discs(free: Flags, cell: Floats) -> list[tuple[int, int, float]]:
 
     far = distance_transform_edt(np.pad(free, 1), sampling=tuple(cell))[1:-1, 1:-1]
     column, row = np.arange(CELLS)[:, None] * cell[0], np.arange(CELLS) * cell[1]
-    found = []
+    found: list[tuple[int, int, float]] = []
     while len(found) < TRIALS and far.any():
         i, j = (int(k) for k in np.unravel_index(int(np.argmax(far)), far.shape))
         found.append((i, j, float(far[i, j])))
@@ -194,7 +194,8 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
     def with_slopes(z: Complexes) -> tuple[Floats, Complexes]:
         """Margins, and their slopes along x and y as one number."""
         around = margins(z[:, None] + STEP * np.array([0, 1, -1, 1j, -1j]))
-        return around[..., 0], (around[..., 1] - around[..., 2] + 1j * (around[..., 3] - around[..., 4])) / (2 * STEP)
+        x, y = around[..., 1] - around[..., 2], around[..., 3] - around[..., 4]
+        return around[..., 0], np.asarray((x + 1j * y) / (2 * STEP))
 
     def constraints(places: Floats, which: Flags, steep: Floats) -> dict[str, Any]:
         """Margins at places of the border, each divided by its slope as it is now."""
