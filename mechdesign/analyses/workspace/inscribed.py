@@ -26,8 +26,9 @@ CELLS, TRIALS = 96, 4
 # Places of a border that are always looked at, those of rectangles at its corners, too; and those added beside each of
 # the lowest at which a margin is smallest.
 PLACES, CONTACTS, CLOSER = 64, 12, np.linspace(-1, 1, 9)
-# Rounds of growing, how far one may move (parts of the region's size), and how far a border may lie outside.
-ROUNDS, LEAP, DEPTH = 24, 0.06, 1e-9
+# Rounds of growing, how far one may move (parts of the region's size), and how far a border may lie outside: then nothing
+# is left to gain, and at the last.
+ROUNDS, LEAP, DEPTH, LATE = 24, 0.06, 1e-9, 1e-7
 # A curve shorter than this part of the longest is a point; a trial not nearly as good as the best so far is left.
 POINT, HOPEFUL = 1e-6, 0.8
 # Step of differences, as a part of the size; a margin whose slope is less than this part of it is far from zero.
@@ -214,14 +215,14 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
 
     uniform = np.arange(PLACES) / PLACES
     places, width, gain = uniform, 1 / PLACES, 1.0
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS + 1):
         value, slope = with_slopes(p @ border(places))
         steep = np.abs(slope)
         # Where a margin is unknown another is negative; one that does not change is no border.
         known = np.isfinite(steep) & (steep > FLAT * np.abs(value))
         distance = np.where(known, value / np.where(known, steep, 1.0), 1.0)
-        if max(gain, width**2, -distance.min()) < DEPTH:
-            return p
+        if max(gain, width**2, -distance.min()) < DEPTH or number == ROUNDS:
+            break
         which = distance < 3 * LEAP
         # In steps of some cells, since only what is near is looked at.
         found = minimize(
@@ -237,4 +238,4 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
         closer = places[lowest][:, None] + width * CLOSER
         width = min(1 / PLACES, max(width / 3, min(4 * move, width)))
         places = np.unique(np.concatenate([uniform, closer.ravel() % 1.0]))
-    return None
+    return p if distance.min() > -LATE else None
