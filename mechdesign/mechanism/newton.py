@@ -7,11 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, plus, rotation, vector
+from mechdesign.mechanism.algebra import Value, plus, rotation, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.state import State, columns, loop_gap, scalars
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
@@ -157,7 +156,7 @@ def _by_minors(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple
             k, m = (x for x in range(BY_MINORS) if x not in (i, j))
             sign, one = _signed(upper, order[i], order[j])
             other_sign, other = _signed(lower, order[k], order[m])
-            total = plus(total, sign * other_sign * (-1) ** (i + j + 1), _times(one, other))
+            total = plus(total, sign * other_sign * (-1) ** (i + j + 1), times(one, other))
         return total
 
     determinant = expand(range(BY_MINORS))
@@ -170,21 +169,11 @@ def _by_minors(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple
 
 
 def _minors(one: Sequence[Value], two: Sequence[Value]) -> dict[tuple[int, int], Value]:
-    return {
-        (i, j): plus(_times(one[i], two[j]), -1, _times(one[j], two[i])) for i, j in combinations(range(len(one)), 2)
-    }
+    return {(i, j): plus(times(one[i], two[j]), -1, times(one[j], two[i])) for i, j in combinations(range(len(one)), 2)}
 
 
 def _signed(minors: dict[tuple[int, int], Value], i: int, j: int) -> tuple[int, Value]:
     return (1, minors[i, j]) if i < j else (-1, minors[j, i])
-
-
-def _times(a: Value, b: Value) -> Value:
-    """Product without a pass over an array where one factor is plainly 0 or 1."""
-    for one, other in ((a, b), (b, a)):
-        if isinstance(one, float) and one in (0.0, 1.0):
-            return 0.0 if one == 0.0 else other
-    return a * b
 
 
 def _by_matrix(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple[list[Value], Value]:

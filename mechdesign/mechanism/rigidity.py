@@ -20,8 +20,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.sketch import Sketch
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 

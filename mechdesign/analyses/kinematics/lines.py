@@ -16,8 +16,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet, wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, regularity
-from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study

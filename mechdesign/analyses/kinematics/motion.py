@@ -180,7 +180,7 @@ class Motion:
         for output in found.values():
             for order, value in (
                 ("velocity", first(configuration, output, velocity)),
-                ("acceleration", second(configuration, output, velocity, acceleration)),
+                ("acceleration", second(configuration, output, velocity, velocity, acceleration)),
             ):
                 value = np.where(regular, in_study_units(self.question.study, output, value), np.nan)
                 self.put(f"{output.name}_{order}", solved.rows, value)
