@@ -151,3 +151,23 @@ def hide(value: Value, lost: Flags) -> Value:
         return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
     # Both parts of a position: (nan + 0i) would leave its y at zero.
     return np.where(lost, complex(np.nan, np.nan) if np.iscomplexobj(value) else np.nan, value)
+
+
+def joined(
+    parts: Sequence[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
+) -> Configuration:  # fmt: skip
+    """Flat batches of one mechanism put together to one of a shape; its angles are told in (-pi, pi]."""
+
+    def whole(values: Sequence[Value]) -> Value:
+        """What is the same for every pose stays a single number."""
+        if not any(np.ndim(value) for value in values):
+            return values[0]
+        full = [np.broadcast_to(value, part.shape) for value, part in zip(values, parts, strict=True)]
+        return np.concatenate(full).reshape(shape)
+
+    nodes, rotations, slides, closures = (
+        [whole(values) for values in zip(*(getattr(part, name) for part in parts), strict=True)]
+        for name in ("nodes", "rotations", "slides", "closures")
+    )
+    reason = whole([part.reason for part in parts])
+    return Configuration(parts[0].graph, vectors, shape, nodes, rotations, slides, closures, reason, places)

@@ -10,8 +10,8 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism import chunks
 from mechdesign.mechanism.assemblies import assemblies, in_words
+from mechdesign.mechanism.plan import CHUNK
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FOUR_BAR = """
@@ -118,11 +118,11 @@ def test_side_keeps_the_joint_on_its_side_instead() -> None:
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_large_batches_come_out_as_small_ones(jobs: int) -> None:
     mechanism = study_of(FOUR_BAR, "mechanism.links.rod.length=1.9").mechanism
-    angles = np.linspace(-2.0, 3.0, 3 * chunks.CHUNK + 17)
+    angles = np.linspace(-2.0, 3.0, 3 * CHUNK + 17)
     longer = np.linspace(1.85, 1.95, len(angles))
     whole = mechanism.forward.solve([angles], {"rod.length": longer}, jobs=jobs)
     assert 0 < whole.valid.sum() < len(angles)
-    for some in (slice(0, 100), slice(chunks.CHUNK - 50, chunks.CHUNK + 50), slice(len(angles) - 20, None)):
+    for some in (slice(0, 100), slice(CHUNK - 50, CHUNK + 50), slice(len(angles) - 20, None)):
         part = mechanism.forward.solve([angles[some]], {"rod.length": longer[some]})
         assert (part.reason == whole.reason[some]).all()
         for name in ("O", "B", "P"):
