@@ -49,12 +49,9 @@ class Keeper:
     @property
     def shown(self) -> Shown:
         """All that was kept."""
-        rows, first = _rows(self.poses, MOST_POSES), self._parts[0]
-        whole = (
-            first
-            if len(self._parts) == 1
-            else joined(self._parts, rows.shape, first.take(0).vectors, {}, {}, frozenset())
-        )
+        rows, whole = _rows(self.poses, MOST_POSES), self._parts[0]
+        if len(self._parts) > 1:
+            whole = joined(self._parts, rows.shape, whole.take(0).vectors, {})
         return Shown(self.study, self.poses, rows, whole)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from itertools import islice
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,20 +156,24 @@ def hide(value: Value, lost: Flags) -> Value:
 
 
 def joined(
-    parts: Sequence[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
-) -> Configuration:  # fmt: skip
+    parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
+) -> Configuration:
     """Flat batches of one mechanism put together to one of a shape; its angles are told in (-pi, pi]."""
-
-    def whole(values: Sequence[Value]) -> Value:
-        """What is the same for every pose stays a single number."""
-        if not any(np.ndim(value) for value in values):
-            return values[0]
-        full = [np.broadcast_to(value, part.shape) for value, part in zip(values, parts, strict=True)]
-        return np.concatenate(full).reshape(shape)
-
+    count, end, whole = int(np.prod(shape, dtype=np.int64)), 0, list[Any]()
+    reason = np.empty(count, dtype=np.int8)
+    for part in parts:
+        some = slice(end, end := end + len(part.reason))
+        reason[some] = part.reason
+        each = [*part.nodes, *part.rotations, *part.slides, *part.closures]
+        whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in each]
+        for k, value in enumerate(each):
+            if np.ndim(value) > np.ndim(whole[k]):
+                # What was the same for every pose so far is a single number.
+                whole[k] = np.full(count, whole[k], dtype=value.dtype)
+            if np.ndim(whole[k]):
+                whole[k][some] = value
+    full = iter([value.reshape(shape) if np.ndim(value) else value for value in whole])
     nodes, rotations, slides, closures = (
-        [whole(values) for values in zip(*(getattr(part, name) for part in parts), strict=True)]
-        for name in ("nodes", "rotations", "slides", "closures")
+        list(islice(full, len(values))) for values in (part.nodes, part.rotations, part.slides, part.closures)
     )
-    reason = whole([part.reason for part in parts])
-    return Configuration(parts[0].graph, vectors, shape, nodes, rotations, slides, closures, reason, places)
+    return Configuration(part.graph, vectors, shape, nodes, rotations, slides, closures, reason.reshape(shape), places)

@@ -174,7 +174,7 @@ class Plan:
             dimensions = {name: some(v) for name, v in places.items()}
             return self._at_once([some(v) for v in given], dimensions, (min(length, count - begin),), begun, limits)
 
-        parts = list(map_chunks(part, range(0, count, length), jobs))
+        parts = map_chunks(part, range(0, count, length), jobs)
         whole = joined(parts, shape, self.core.geometry.vectors(dims), dims)
         return replace(whole, near=self.turns(values, dims), counted=self.counted)
 
