@@ -48,10 +48,8 @@ class Assembly:
 
 def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
     """Names of the joints whose place the assembly mode of a group chooses; those of slides where it has no other."""
-    edges = [graph.edges[k] for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)]
-    ends = {node for loop in group.loops for node in (loop.start, loop.end)}
-    inner = [node for edge in edges for node in (edge.tail, edge.head) if node not in ends]
-    names = [graph.nodes[node] for node in dict.fromkeys(inner) if ":" not in graph.nodes[node]]
+    ends = {graph.nodes[node] for loop in group.loops for node in (loop.start, loop.end)}
+    names = [name for name in graph.joined(group.edges) if name not in ends]
     return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)
 
 
@@ -143,18 +141,3 @@ def _same(one: Configuration, other: Configuration, size: float) -> bool:
     turns = [wrap(np.angle(a) - np.angle(b)) for a, b in zip(one.rotations, other.rotations, strict=True)]
     shifts = [(a - b) / size for a, b in zip(one.slides, other.slides, strict=True)]
     return bool(np.all(np.abs([*turns, *shifts]) < SAME))
-
-
-def in_words(mechanism: Mechanism) -> list[str]:
-    """How many assembly modes the drives leave, and which joints choose them."""
-    plan = mechanism.forward
-    choosing = [group for group, mode in zip(plan.structure.groups, plan.modes, strict=True) if mode]
-    joints = [" or ".join(deciding_joints(mechanism.graph, group)[:1]) for group in choosing]
-    if not plan.iterative:
-        if not joints:
-            return ["assembly modes: 1"]
-        return [f"assembly modes: {2 ** len(joints)}, chosen by {', '.join(joints)} (2 each)"]
-    free = [j for g in plan.structure.groups if g.form == "newton" for j in deciding_joints(mechanism.graph, g)]
-    count = len(assemblies(mechanism, mechanism.drives))
-    also = f"; {', '.join(joints)} have 2 each" if joints else ""
-    return [f"assembly modes: {count} found at the sketch's drive values, for {', '.join(dict.fromkeys(free))}{also}"]

@@ -15,10 +15,10 @@ from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.independence import check_independent
 from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.rigidity import check_independent
 from mechdesign.mechanism.sketch import assembly_modes, drawn_value, roots_as_drawn
 from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Flags, Floats

@@ -66,6 +66,11 @@ class Group:
     conditions: tuple[int, ...] = ()
     bases: tuple[int, ...] = ()
 
+    @property
+    def edges(self) -> tuple[int, ...]:
+        """Edges round its loops, in their order."""
+        return tuple(k for loop in self.loops for k, _ in loop.edges)
+
 
 @dataclass(frozen=True)
 class Structure:

@@ -10,7 +10,8 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.assemblies import assemblies, in_words
+from mechdesign.mechanism.assemblies import assemblies
+from mechdesign.mechanism.describe import assemblies_in_words
 from mechdesign.mechanism.plan import CHUNK
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -49,7 +50,7 @@ def test_a_four_bar_has_two_assemblies_mirrored_about_the_line_of_its_outer_join
     mirrored = d + (a - d) * np.conj((one.configuration.point("B") - d) / (a - d))
     assert two.configuration.point("B") == pytest.approx(mirrored, abs=1e-12)
     assert one["rocker.angle"] == pytest.approx(mechanism.solve({"theta": angles})["rocker.angle"])
-    assert in_words(mechanism) == ["assembly modes: 2, chosen by B (2 each)"]
+    assert assemblies_in_words(mechanism) == ["assembly modes: 2, chosen by B (2 each)"]
 
 
 def test_working_modes_of_the_inverse_problem_are_listed_too() -> None:
@@ -78,7 +79,7 @@ def test_every_assembly_of_a_group_without_a_closed_form_solves_its_loops() -> N
         for name in mechanism.drives:
             assert float(again.value(mechanism.coordinate(name))) == pytest.approx(lengths[name], rel=1e-12)
     assert len(np.unique(np.round(places, 6), axis=0)) == len(found)
-    assert f"{len(found)} found" in in_words(mechanism)[0]
+    assert f"{len(found)} found" in assemblies_in_words(mechanism)[0]
 
 
 def test_too_many_assemblies_are_refused() -> None:
