@@ -11,6 +11,8 @@ from mechdesign.numerics.arrays import Floats
 # A scalar or an array that broadcasts against the batch; scalars stay scalars, which keeps constants cheap.
 Value = Any
 
+TURN = 2 * np.pi
+
 # Decorator: what is not a number at a singularity or in a pose that fails is told by its value, not by warnings.
 quiet = np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
@@ -79,3 +81,8 @@ def angle_of(z: Value) -> Floats:
 def wrap(angle: Value) -> Value:
     """Angle brought into (-pi, pi]."""
     return np.pi - np.mod(np.pi - angle, 2 * np.pi)
+
+
+def nearest(angle: Value, near: Value) -> Value:
+    """An angle in the turn in which it lies within half a turn of `near`."""
+    return angle + TURN * np.round((near - angle) / TURN)

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.algebra import Value, angle_of, nearest, norm2, quiet
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.turns import angles_of, nearest
 from mechdesign.numerics.arrays import Complexes, Flags, Ints
 
 
@@ -51,7 +50,8 @@ class Configuration:
     reason : int8 array of `shape`
         See `Reason`.
     near : mapping of str to arrays
-        Values that angles are told within half a turn of, by name; the others are told in (-pi, pi].
+        Values that angles are told within half a turn of, by name, where a motion, a given value or a nominal pose
+        says more than a rotation; the others are told in (-pi, pi].
     counted : frozenset of str
         Those of them whose turns count: given, or followed along a motion.
     """

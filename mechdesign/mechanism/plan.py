@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value, nearest, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start, follow, guess_of, unknowns_of
@@ -19,7 +19,6 @@ from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import Guess, State, start_state
 from mechdesign.mechanism.structure import Structure
-from mechdesign.mechanism.turns import nearest
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.parallel import map_chunks, worker_count
