@@ -10,12 +10,11 @@ from itertools import product
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import wrap
+from mechdesign.mechanism.algebra import Value, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.state import Guess
 from mechdesign.mechanism.structure import Group
 
 # Bound of the assemblies that are listed and followed.
@@ -114,14 +113,10 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
     given = [np.asarray(sketch.value(coordinate), dtype=float) for coordinate in plan.structure.given]
     random = np.random.default_rng(0)
     size = plan.core.size
-    guess: Guess = {
-        index: (
-            [random.uniform(-np.pi, np.pi, STARTS) for _ in group.angles],
-            [random.uniform(-2 * size, 2 * size, STARTS) for _ in (*group.slides, *group.bases, *group.bases)],
-        )
-        for index, group in enumerate(plan.structure.groups)
-        if group.form == "newton"
-    }
+    guess: list[Value] = []
+    for group in (plan.structure.groups[index] for index in plan.structure.unknowns):
+        guess += [random.uniform(-np.pi, np.pi, STARTS) for _ in group.angles]
+        guess += [random.uniform(-2 * size, 2 * size, STARTS) for _ in (*group.slides, *group.bases, *group.bases)]
     state = plan.run(given, vectors, guess, modes, STEPS)
     every = plan.configuration(state, (STARTS,), {}, vectors, state.solved((STARTS,)), limits=False)
     good = every.valid

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from mechdesign.mechanism.algebra import Value, nearest, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
-from mechdesign.mechanism.continuation import Start, follow, guess_of, unknowns_of
+from mechdesign.mechanism.continuation import Start, follow, unknowns_of
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
-from mechdesign.mechanism.state import Guess, State, start_state
+from mechdesign.mechanism.state import State, Unknowns, start_state
 from mechdesign.mechanism.structure import Structure
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -75,7 +75,7 @@ class Plan:
         self,
         given: Sequence[Value],
         vectors: Vectors,
-        guess: Guess | None,
+        guess: Unknowns | None,
         modes: Sequence[Value] | None = None,
         steps: int = STEPS,
         enough: float = CONVERGED,
@@ -188,7 +188,7 @@ class Plan:
         """`solve` without chunks, for arrays of floats that broadcast to `shape`."""
         vectors = self.core.geometry.vectors(dims)
         reached: Flags | None = None
-        guess: Guess | None = None
+        guess: Unknowns | None = None
         if self.iterative:
             begin = self.start(start)
             guess, reached = self._follow(values, dims, shape, begin)
@@ -222,7 +222,7 @@ class Plan:
         dims: Mapping[str, Value],
         shape: tuple[int, ...],
         begin: Start,
-    ) -> tuple[Guess, Flags]:
+    ) -> tuple[Floats, Flags]:
         geometry, count = self.core.geometry, int(np.prod(shape))
         begin = begin.map(lambda value: _flat(value, shape))
         places = {name: _flat(v, shape) for name, v in dims.items()}
@@ -256,7 +256,7 @@ class Plan:
         if len(rows):
             better, there = solve(turned, rows)
             found[:, rows[there]], reached[rows] = better[:, there], there
-        return guess_of(self.structure, found.reshape(len(found), *shape)), reached.reshape(shape)
+        return found.reshape(len(found), *shape), reached.reshape(shape)
 
     def configuration(
         self,
