@@ -13,11 +13,10 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.study import poses
 from mechdesign.study.building.section import MechanismSection, UnitsSection
-from mechdesign.study.schema import kinematics, optimize, reliability_checks, stiffness, targets, workspace
-from mechdesign.study.schema import poses as pose_checks
+from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.kinematics import KinematicsSection
-from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -52,22 +51,9 @@ def schema() -> dict[str, Any]:
 def check(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
     found = dict(checker.parts)
-    for command in COMMANDS:
-        section = found.get(command)
-        if isinstance(section, PoseSection):
-            pose_checks.check(checker, command, section)
-        if isinstance(section, KinematicsSection):
-            kinematics.check(checker, section)
-        elif isinstance(section, WorkspaceSection):
-            workspace.check(checker, section)
-        elif isinstance(section, OptimizeSection):
-            optimize.check(checker, section)
-        elif isinstance(section, ReliabilitySection):
-            found[command] = reliability_checks.check(checker, section)
-        elif isinstance(section, StiffnessSection):
-            found[command] = stiffness.check(checker, section)
+    found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
-        optimize.check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
+        check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
     found["targets"] = targets.check(checker, checker.names.section.targets, folder)
     return found
 

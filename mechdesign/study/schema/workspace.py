@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
@@ -82,23 +82,22 @@ class WorkspaceSection(fields.Model):
         Annotated[tuple[Annotated[str, fields.Choice(INDEX_NAMES)], ...], BeforeValidator(fields.as_list)] | None
     ) = None
 
-
-def check(checker: Checker, section: WorkspaceSection) -> None:
-    """Check the names, units and ranges of a workspace."""
-    root: KeyPath = ("workspace",)
-    checker.known(section.point, checker.names.owners, "point", (*root, "point"))
-    checker.coordinates(section.at, (*root, "at"))
-    ranges = [name for name, values in section.at.items() if isinstance(values, Over)]
-    if len(ranges) > 1:
-        checker.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
-    for name, values in section.at.items():
-        if isinstance(values, Over):
-            checker.range(values.from_, values.to, (*root, "at", name))
-        elif not values:
-            checker.report((*root, "at", name), "an empty list of values")
-    for index, name in enumerate(section.indices or ()):
-        checker.needs(needed_section(name), f"the index {name!r}", (*root, "indices", index))
-    scan = section.scan
-    if (scan.from_ is None) != (scan.to is None):
-        checker.report((*root, "scan"), "'from' and 'to' belong together")
-    checker.range(scan.from_, scan.to, (*root, "scan"))
+    def checked(self, checker: Checker) -> Self:
+        """Check names, units and ranges against the mechanism."""
+        root: KeyPath = ("workspace",)
+        checker.known(self.point, checker.names.owners, "point", (*root, "point"))
+        checker.coordinates(self.at, (*root, "at"))
+        ranges = [name for name, values in self.at.items() if isinstance(values, Over)]
+        if len(ranges) > 1:
+            checker.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
+        for name, values in self.at.items():
+            if isinstance(values, Over):
+                checker.range(values.from_, values.to, (*root, "at", name))
+            elif not values:
+                checker.report((*root, "at", name), "an empty list of values")
+        for index, name in enumerate(self.indices or ()):
+            checker.needs(needed_section(name), f"the index {name!r}", (*root, "indices", index))
+        if (self.scan.from_ is None) != (self.scan.to is None):
+            checker.report((*root, "scan"), "'from' and 'to' belong together")
+        checker.range(self.scan.from_, self.scan.to, (*root, "scan"))
+        return self

@@ -1,6 +1,7 @@
 """YAML text as plain data with the line and column of every key and value.
 
-Nesting is bounded before anything is built, the expanded size of aliases while it is. Scalars follow YAML 1.2: ``1e-3`` is a number, ``on`` and ``no`` are words.
+Nesting is bounded before anything is built, the expanded size of aliases while it is. Scalars follow YAML 1.2:
+``1e-3`` is a number, ``on`` and ``no`` are words.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -31,8 +32,7 @@ _WORDS = {
 }
 
 
-@dataclass(frozen=True)
-class Mark:
+class Mark(NamedTuple):
     """A place in a text, counted from 1; line 0 where there is no text (an override).
 
     `start` and `end` are those of the value there, in characters of the text from 0.
