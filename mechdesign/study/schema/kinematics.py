@@ -9,7 +9,7 @@ from pydantic import model_validator
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.numbers import failure
+from mechdesign.study.text.fields import failure
 
 
 class Load(fields.Model):

@@ -13,7 +13,7 @@ from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import failure
+from mechdesign.study.text.fields import failure
 
 # Results of a workspace that a goal or condition may name without its command.
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")

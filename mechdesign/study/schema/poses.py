@@ -11,7 +11,7 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import failure
+from mechdesign.study.text.fields import failure
 
 
 class Sweep(fields.Model):

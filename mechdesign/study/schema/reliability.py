@@ -19,7 +19,7 @@ from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import Context, failure, read_number, shown
+from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
 PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")

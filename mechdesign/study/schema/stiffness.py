@@ -13,7 +13,7 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import Context, failure, read_number
+from mechdesign.study.text.fields import Context, failure, read_number
 
 _ELASTIC = (
     "The section of each link that bends; links not named are rigid. A link given by its ends is a beam from the first "

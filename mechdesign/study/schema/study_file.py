@@ -58,23 +58,16 @@ def check(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
     return found
 
 
-def check_poses(
-    parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path, turn: float
-) -> None:
+def check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path) -> None:
     """Check that the coordinates that poses give determine the mechanism, that they are not too many, and that the
     targets fit those of kinematics.
-
-    Parameters
-    ----------
-    turn : float
-        A full turn in the study's unit.
     """
     for command in COMMANDS:
         section = parts.get(command)
         found: poses.Poses | None = None
         if isinstance(section, PoseSection) and (key := section.source) is not None:
             try:
-                found = poses.expand(section, folder, turn)
+                found = poses.expand(section, folder)
             except StudyError as error:
                 reporter.report((command, key), str(error))
                 continue
@@ -88,7 +81,7 @@ def check_poses(
                 reporter.report((command, "speed"), "the path's point does not move: it has no direction", at_key=True)
         if command == "kinematics" and parts["targets"]:
             try:
-                assumed = found or poses.default(mechanism.description, turn)
+                assumed = found or poses.default(mechanism.description)
             except StudyError:
                 continue
             targets.check_poses(parts["targets"], mechanism.drives, assumed, reporter)

@@ -11,7 +11,7 @@ from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import failure
+from mechdesign.study.text.fields import failure
 
 # A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
 WHOLE = 3e-6
