@@ -59,7 +59,7 @@ class Link(fields.Model):
     length: fields.PositiveLengthValue | None = None
     telescopic: bool = False
     points: Annotated[
-        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))
+        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
 
     @model_validator(mode="before")
@@ -118,7 +118,7 @@ class Joint(fields.Model):
     slot: fields.LinkName | None = None
     fixed: TwoLinks | None = None
     through: (
-        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort((fields.NAME_FORM,))] | None
+        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort(fields.NAME_FORM)] | None
     ) = None
     direction: fields.AngleValue | None = None
     point: fields.PointName | None = None
@@ -218,9 +218,9 @@ class MechanismSection(fields.Model):
     links: dict[fields.LinkName, Link]
     joints: dict[fields.JointName, Joint] = Field(default_factory=dict)
     drives: Annotated[
-        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))
+        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
-    branch: Annotated[str, fields.Choice(("side", "follow"))] = "side"
+    branch: Annotated[str, fields.choice(("side", "follow"))] = "side"
     sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
     measures: dict[fields.MeasureName, Measure] = Field(default_factory=dict)
     limits: tuple[Limit, ...] = ()

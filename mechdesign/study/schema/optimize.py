@@ -32,7 +32,7 @@ class Variable(fields.Model):
     from_: fields.Bound = Field(alias="from")
     to: fields.Bound
     step: fields.PositiveNumber | None = None
-    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
+    number: Annotated[int, fields.whole(1, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _spacing(self) -> Variable:
@@ -101,23 +101,23 @@ WeightRow = Annotated[
     tuple[fields.Pure, ...],
     BeforeValidator(_weight_row),
     AfterValidator(_weights_that_choose),
-    fields.OrShort(({"type": "object", "additionalProperties": fields.NUMBER_FORM},)),
+    fields.OrShort({"type": "object", "additionalProperties": fields.NUMBER_FORM}),
 ]
 
 
-Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.OrOne()]
+Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.OrShort()]
 
 
 class OptimizeSection(fields.Model):
     """Which dimensions are best?"""
 
-    method: Annotated[str, fields.Choice(("grid", "search", "pareto"))] = "grid"
+    method: Annotated[str, fields.choice(("grid", "search", "pareto"))] = "grid"
     variables: dict[fields.CoordinateName, Variable]
     maximize: Goals = ()
     minimize: Goals = ()
     weights: tuple[WeightRow, ...] | None = None
     subject_to: tuple[Condition, ...] = ()
-    evaluations: Annotated[int, fields.Whole(10, 10_000_000)] | None = None
+    evaluations: Annotated[int, fields.whole(10, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _goals(self) -> OptimizeSection:

@@ -28,7 +28,7 @@ _ROWS = {"type": ["array", "string", "number"]}
 
 Speed = Annotated[
     float,
-    fields.Reader("velocity", 0.0, True),
+    fields.number("velocity", 0.0, exclusive=True),
     Field(
         description="speed of the path's point along it, constant: velocities and accelerations of drives and outputs "
         "follow from the path's direction and curvature. On a polyline each segment is passed at this speed without "
@@ -43,7 +43,7 @@ def _radians(raw: Any, context: Context) -> float:
     return read_number(raw, context, "angle").nominal * context.units.angle_factor
 
 
-Radians = Annotated[float, fields.Read(_radians, fields.Reader().form())]
+Radians = Annotated[float, fields.Read(_radians, fields.NUMBER_READ)]
 
 
 class Circle(fields.Model):
@@ -94,7 +94,7 @@ class PathSection(fields.Model):
     line: (
         Annotated[tuple[Point, Point], fields.pair_of("a line from [x, y] to [x, y], as a list of the two")] | None
     ) = None
-    points: Annotated[int, fields.Whole(2, 10_000_000)] | None = Field(
+    points: Annotated[int, fields.whole(2, 10_000_000)] | None = Field(
         None, description=f"number of poses, evenly spaced: {ROUND} on a circle, else {STRAIGHT}, where left out"
     )
     spline: bool = Field(

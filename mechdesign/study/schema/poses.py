@@ -21,7 +21,7 @@ class Sweep(fields.Model):
     from_: fields.Number = Field(alias="from")
     to: fields.Number
     step: fields.Number | None = None
-    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
+    number: Annotated[int, fields.whole(1, 10_000_000)] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -55,7 +55,7 @@ class PoseSection(fields.Model):
     """
 
     command: ClassVar[str]
-    poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort(({"const": "workspace"},))] | None = None
+    poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort({"const": "workspace"})] | None = None
     sweep: dict[fields.CoordinateName, Sweep] | None = None
     path: dict[fields.CoordinateName, PathSection] | None = None
 

@@ -73,15 +73,15 @@ class Dimension(fields.Model):
     one_of = ("a dimension needs either 'tolerance' or 'sigma'", "tolerance", "sigma")
     tolerance: Tolerance | None = None
     sigma: fields.NonNegative | None = None
-    distribution: Annotated[str, fields.Choice(DISTRIBUTIONS)] = "normal"
+    distribution: Annotated[str, fields.choice(DISTRIBUTIONS)] = "normal"
 
 
 class PinModel(fields.Model):
     """How a pin lies in its hole, for each method."""
 
     short = ({"enum": list(PIN_MODELS)},)
-    analytic: Annotated[str, fields.Choice(PIN_MODELS)] = "normal"
-    monte_carlo: Annotated[str, fields.Choice(PIN_MODELS)] = "normal"
+    analytic: Annotated[str, fields.choice(PIN_MODELS)] = "normal"
+    monte_carlo: Annotated[str, fields.choice(PIN_MODELS)] = "normal"
 
     @model_validator(mode="before")
     @classmethod
@@ -100,10 +100,10 @@ class Clearance(fields.Model):
     radial: fields.NonNegativeLength | None = None
     diametral: fields.NonNegativeLength | None = None
     tolerance: Tolerance = (0.0, 0.0)
-    distribution: Annotated[str, fields.Choice(DISTRIBUTIONS)] = "normal"
+    distribution: Annotated[str, fields.choice(DISTRIBUTIONS)] = "normal"
     pin: PinModel = PinModel()
     link: fields.LinkName | None = None
-    effect: Annotated[str, fields.Choice(("offset", "length"))] = "offset"
+    effect: Annotated[str, fields.choice(("offset", "length"))] = "offset"
 
     @property
     def radius(self) -> float:
@@ -231,11 +231,11 @@ class ReliabilitySection(MotionSection):
     limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
     load: tuple[fields.Number, ...] | None = None
     methods: Annotated[
-        tuple[Annotated[str, fields.Choice(METHODS)], ...], BeforeValidator(fields.as_list), fields.OrOne()
+        tuple[Annotated[str, fields.choice(METHODS)], ...], BeforeValidator(fields.as_list), fields.OrShort()
     ] = DEFAULT_METHODS
-    samples: Annotated[int, fields.Whole(2, 10**15)] = 40_000
+    samples: Annotated[int, fields.whole(2, 10**15)] = 40_000
     precision: Precision | None = None
-    sobol: Annotated[int, fields.Whole(0, 10**9)] | None = None
+    sobol: Annotated[int, fields.whole(0, 10**9)] | None = None
     allocate: Allocate | None = None
 
     def checked(self, checker: Checker) -> Self:

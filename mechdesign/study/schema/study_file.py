@@ -31,7 +31,7 @@ class StudyFile(fields.Model):
 
     name: str | None = None
     units: UnitsSection = UnitsSection()
-    seed: Annotated[int, fields.Whole(0)] = 0
+    seed: Annotated[int, fields.whole(0)] = 0
     mechanism: MechanismSection
     kinematics: KinematicsSection | None = None
     workspace: WorkspaceSection | None = None

@@ -23,7 +23,7 @@ class Scan(fields.Model):
     about: tuple[fields.Length, fields.Length] | None = None
     from_: fields.Angle | None = Field(None, alias="from")
     to: fields.Angle | None = None
-    rays: Annotated[int, fields.Whole(2, 1_000_000)] | None = None
+    rays: Annotated[int, fields.whole(2, 1_000_000)] | None = None
 
     @field_validator("to")
     @classmethod
@@ -42,9 +42,9 @@ class Scan(fields.Model):
 class Integrate(fields.Model):
     """The rule of integration over the workspace."""
 
-    rule: Annotated[str, fields.Choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
+    rule: Annotated[str, fields.choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
     tolerance: fields.Positive = 1e-5
-    nodes: Annotated[int, fields.Whole(1, 100_000)] | None = None
+    nodes: Annotated[int, fields.whole(1, 100_000)] | None = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Integrate:
@@ -76,10 +76,10 @@ class WorkspaceSection(fields.Model):
     scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
     integrate: Integrate = Integrate()
     margin: fields.NonNegativeAngle = 0.0
-    assembly: Annotated[str, fields.Choice(("same", "any"))] = "same"
+    assembly: Annotated[str, fields.choice(("same", "any"))] = "same"
     characteristic_length: fields.PositiveLength | None = None
     indices: (
-        Annotated[tuple[Annotated[str, fields.Choice(INDEX_NAMES)], ...], BeforeValidator(fields.as_list)] | None
+        Annotated[tuple[Annotated[str, fields.choice(INDEX_NAMES)], ...], BeforeValidator(fields.as_list)] | None
     ) = None
 
     def checked(self, checker: Checker) -> Self:
