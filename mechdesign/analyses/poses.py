@@ -55,7 +55,6 @@ def study_poses(study: Study, section: str) -> Poses:
     StudyError
         Where nothing sensible can be assumed.
     """
-    turn = TURN / study.units.angle_factor
     for name in dict.fromkeys((section, "kinematics")):
         asked: PoseSection | None = getattr(study, name)
         if asked is not None and asked.at_nodes:
@@ -64,10 +63,10 @@ def study_poses(study: Study, section: str) -> Poses:
 
             return workspace_nodes(study)
         if asked is not None:
-            found = expand(asked, study.path.parent if study.path else Path(), turn)
+            found = expand(asked, study.path.parent if study.path else Path())
             if found is not None:
                 return found
-    return default(study.mechanism.description, turn)
+    return default(study.mechanism.description)
 
 
 def radians(study: Study, coordinate: Coordinate, value: Value) -> Value:
