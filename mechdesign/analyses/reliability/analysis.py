@@ -12,7 +12,6 @@ from mechdesign.analyses.kinematics.rates import DriveRates, drive_rates
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses, study_poses
 from mechdesign.analyses.reliability import drawn_tables, methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import allocate
-from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
 from mechdesign.analyses.reliability.engine.precision import Precision
@@ -20,7 +19,7 @@ from mechdesign.analyses.reliability.engine.sobol import SobolIndices
 from mechdesign.analyses.reliability.first_order import linear_errors, nominal_values
 from mechdesign.analyses.reliability.notes import notes
 from mechdesign.analyses.reliability.question import ask, unsaid
-from mechdesign.analyses.reliability.simulation import Setting
+from mechdesign.analyses.reliability.setting import Setting, forward_plan
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MOST, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted
@@ -206,8 +205,6 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     settings = []
     for solved, rates in groups:
         given = set(solved.given) == set(mechanism.drives)
-        each = [solved.configuration.value(mechanism.coordinate(name)) for name in mechanism.drives]
-        drives = [np.broadcast_to(values, solved.configuration.shape) for values in each]
         for k, row in enumerate(solved.rows.tolist()):
             if not task.assembled[row]:
                 continue
@@ -219,9 +216,8 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
             settings.append(
                 Setting(
                     task.question, row, mechanism, mechanism.forward if given else forward_plan(mechanism, pose), pose,
-                    [float(values[k]) for values in drives], rates.take(k),
-                    task.nominal[:, row].tolist(), None if task.elastic is None else task.elastic.take([row]), scale,
-                    row == assembled[0],
+                    rates.take(k), task.nominal[:, row].tolist(),
+                    None if task.elastic is None else task.elastic.take([row]), scale, row == assembled[0],
                 )
             )  # fmt: skip
     return sorted(settings, key=lambda setting: setting.pose)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mechdesign.analyses.reliability.error_limits import correlation
+from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.analyses.reliability.tables import at_poses, of_channels
 from mechdesign.analyses.reliability.task import Task

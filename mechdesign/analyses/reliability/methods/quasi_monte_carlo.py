@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from mechdesign.analyses.reliability.engine import quasi
 from mechdesign.analyses.reliability.methods import QUASI, pose_by_pose
-from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, sums_of
+from mechdesign.analyses.reliability.setting import Setting
+from mechdesign.analyses.reliability.simulation import Sums, generator, sums_of
 from mechdesign.analyses.reliability.task import MethodResult, Task
 
 NAME = "quasi_monte_carlo"
