@@ -11,7 +11,7 @@ from scipy.special import ndtr
 from mechdesign.analyses.reliability.engine.design_points import find
 from mechdesign.analyses.reliability.engine.form import form
 from mechdesign.analyses.reliability.engine.importance import importance_sampling
-from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
+from mechdesign.analyses.reliability.engine.intervals import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 
 CASES = {

@@ -15,7 +15,7 @@ import numpy as np
 
 from mechdesign.analyses.reliability import methods
 from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, ToleranceModel, UnreachableError, cheapest
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.tables import at_poses
 from mechdesign.analyses.reliability.task import Partial, Task

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.rates import DriveRates, drive_rates
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses, study_poses
-from mechdesign.analyses.reliability import drawn_tables, methods, sobol, tables
+from mechdesign.analyses.reliability import methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.sobol import SobolIndices
 from mechdesign.analyses.reliability.first_order import linear_errors, nominal_values
 from mechdesign.analyses.reliability.notes import notes
@@ -117,7 +117,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     made = [tables.moments(task, found), *([tables.success(task, found)] if task.question.limited else ())]
     made += [tables.contributions(task, indices)]
     # Of the first method that samples the errors.
-    made += drawn_tables.build(task, next((each.sums for each in found if each.sums), {}))
+    made += tables.of_drawn(task, next((each.sums for each in found if each.sums), {}))
     result = Result(
         "reliability", {table.name: table for table in made} | dict(allocated.tables),
         [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.setting import Setting, errors_of
 from mechdesign.analyses.reliability.simulation import CHUNK, generator
@@ -118,7 +119,5 @@ def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk:
 
 
 def _estimate(counted: Ints) -> Estimate:
-    from mechdesign.analyses.reliability.engine.intervals import binomial
-
     samples, failures, invalid, evaluations = counted.tolist()
     return Estimate(failures / samples, *binomial(failures, samples), evaluations, samples, failures, invalid)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
 from mechdesign.analyses.reliability.question import Question

@@ -8,6 +8,7 @@ from importlib import import_module
 
 import numpy as np
 
+from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.setting import Setting
@@ -55,8 +56,6 @@ def sampled(name: str, task: Task, sums: Mapping[int, Sums]) -> MethodResult:
 
 def counted(sums: Sums) -> Estimate:
     """Estimate from counted failures, with the interval of Clopper and Pearson."""
-    from mechdesign.analyses.reliability.engine.intervals import binomial
-
     low, high = binomial(sums.failures, sums.samples)
     invalid = sums.samples - sums.valid
     return Estimate(sums.failures / sums.samples, low, high, sums.samples, sums.samples, sums.failures, invalid)
