@@ -11,7 +11,7 @@ from scipy.special import ndtr
 from mechdesign.analyses.reliability.engine.design_points import find
 from mechdesign.analyses.reliability.engine.form import form
 from mechdesign.analyses.reliability.engine.importance import importance_sampling
-from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
+from mechdesign.analyses.reliability.engine.intervals import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 
 CASES = {
@@ -176,7 +176,7 @@ def test_a_limit_out_of_reach_of_a_bounded_variable_is_never_broken() -> None:
 
 def test_pins_in_contact() -> None:
     """Two pins on their rims: the x offset of both beyond a limit, against the integral over the one's direction."""
-    from mechdesign.analyses.reliability.pins import PIN_LAWS
+    from mechdesign.analyses.reliability.laws import PIN_LAWS
 
     limit = 1.99
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from mechdesign.analyses.reliability.engine.sobol import Replicate, SobolIndices, combine, sample
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.simulation import Setting, errors_of, generator
-from mechdesign.analyses.reliability.sources import Drawn, Sources
+from mechdesign.analyses.reliability.setting import Setting, errors_of
+from mechdesign.analyses.reliability.simulation import generator
+from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
@@ -90,17 +91,9 @@ def _beside(setting: Setting, sources: Sources, linear: FirstOrder) -> Callable[
     def model(u: Floats) -> Floats:
         drawn = sources.at(u)
         errors, valid = errors_of(setting, sources.made(drawn), u.shape[1])
-        return np.stack([np.where(valid, errors, np.nan), slopes @ _components(sources, drawn, u.shape[1])])
+        return np.stack([np.where(valid, errors, np.nan), slopes @ sources.components(drawn)])
 
     return model
-
-
-def _components(sources: Sources, drawn: Drawn, count: int) -> Floats:
-    """Values of the components of the linear model, shape (components, count)."""
-    rows: list[Floats | float] = [*drawn.scalars]
-    for pin, radius, place in zip(sources.pins, drawn.radii, drawn.pins, strict=True):
-        rows += [radius * part for part, _ in zip(place, pin.places, strict=False)]
-    return np.stack([np.broadcast_to(row, (count,)) for row in rows]) if rows else np.zeros((0, count))
 
 
 def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:
@@ -115,9 +108,6 @@ def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:
 def columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> list[Column]:
     """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; nan where not asked."""
     made: list[Column] = []
-    ends = (
-        ("", ""), ("_low", ", lower end of its interval, 99.7 %"), ("_high", ", upper end of its interval, 99.7 %"),
-    )  # fmt: skip
     for kind, meaning in (
         ("first", "share of the output's variance that the source causes by itself [Sobol, 1993]"),
         ("total", "share that the source causes by itself and together with others"),

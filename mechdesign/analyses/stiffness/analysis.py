@@ -13,17 +13,17 @@ from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words
 from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held
-from mechdesign.analyses.stiffness.elements import Guide, Hinge
 from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
-from mechdesign.analyses.stiffness.legs import Leg, find_legs
-from mechdesign.analyses.stiffness.loads import Effects, displacements_table, effects_of, forces_table
-from mechdesign.analyses.stiffness.network import Network, build_network, carrying_edges
-from mechdesign.analyses.stiffness.serial import hold_by_legs
+from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
+from mechdesign.analyses.stiffness.loads import Effects, effects_of
+from mechdesign.analyses.stiffness.network import Guide, Hinge, Network, build_network, carrying_edges
 from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,
     deflections_table,
+    displacements_table,
     eigen_table,
+    forces_table,
     springs_table,
     stiffness_table,
 )
@@ -206,7 +206,7 @@ def tables(study: Study, body: Body, poses: Poses, solved: Solved) -> dict[str, 
     if body.size == 3 and body.section.characteristic_length is not None:
         made.append(eigen_table(study, poses, soft, body.section.characteristic_length))
     if body.legs is not None:
-        made.append(springs_table(study, poses, body.legs, solved.springs))
+        made.append(springs_table(study, poses, [leg.name for leg in body.legs], solved.springs))
     if solved.effects is not None:
         made += [
             deflections_table(study, poses, np.array(body.section.loads), soft),

@@ -10,7 +10,8 @@ import numpy as np
 
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import Held, directional, principal
-from mechdesign.analyses.stiffness.legs import Leg
+from mechdesign.analyses.stiffness.loads import Effects, joints_of, points_of
+from mechdesign.analyses.stiffness.network import Network
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -125,7 +126,7 @@ def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
     )
 
 
-def springs_table(study: Study, poses: Poses, legs: Sequence[Leg], springs: Sequence[Springs]) -> Table:
+def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Sequence[Springs]) -> Table:
     units = study.units
     row = np.concatenate([s.row for s in springs] or [np.zeros(0, dtype=np.intp)])
     leg = np.concatenate([s.leg for s in springs] or [np.zeros(0, dtype=np.intp)])
@@ -134,7 +135,7 @@ def springs_table(study: Study, poses: Poses, legs: Sequence[Leg], springs: Sequ
     def gather(name: str) -> Any:
         return np.concatenate([getattr(s, name) for s in springs] or [np.zeros(0)])[order]
 
-    names = np.array([leg.name for leg in legs] or [""])
+    names = np.array([*legs] or [""])
     place, angle = gather("place"), gather("angle")
     per_radian = units.label("rotational_stiffness")
     columns = [Column(c.name, c.values[row[order]], c.unit, c.meaning) for c in pose_columns(study, poses)]
@@ -162,3 +163,63 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
     for k, (name, unit) in enumerate(zip(("dx", "dy", "dphi")[:size], (length, length, "rad"), strict=False)):
         columns.append(Column(name, moved[:, k], unit, "deflection of the asked point"))
     return Table("deflections", tuple(columns), "deflections under the study's loads")
+
+
+def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
+    """``forces.csv``: what every joint bears, a row a pose, load and joint."""
+    edges = [network.edges[k] for k in joints_of(network)]
+    count, joints, loads, _ = effects.forces.shape
+    values = effects.forces.swapaxes(1, 2).reshape(-1, 3)
+    units = study.units
+    body = "a link, 'asked' (the asked point), or the pin of a slot ('slot:') or of several links ('pin:')"
+    columns = _of_loads(study, poses, loads, joints)
+    columns += [
+        Column("joint", np.tile([edge.name for edge in edges], count * loads), "", "point or slide"),
+        Column("on", np.tile([_link(edge.a) for edge in edges], count * loads), "", f"what the force acts on: {body}"),
+        Column(
+            "by",
+            np.tile([_link(edge.b) for edge in edges], count * loads),
+            "",
+            "what exerts it; in a telescopic leg its rod, on the part at its first end",
+        ),
+        Column("fx", values[:, 0], units.label("force"), "force on the one by the other, axes of the world"),
+        Column("fy", values[:, 1], units.label("force"), "force on the one by the other, axes of the world"),
+        Column("mz", values[:, 2], units.label("moment"), "moment likewise, about the joint's point"),
+    ]
+    return Table("forces", tuple(columns), "what the joints bear under the study's loads")
+
+
+def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
+    """``displacements.csv``: where every point goes, a row a pose, load and point of a link."""
+    points = points_of(network)
+    moves = effects.moved(network)
+    count, number, loads = moves.shape
+    moved = moves.swapaxes(1, 2).ravel()
+    places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
+    length = study.units.label("length")
+    columns = _of_loads(study, poses, loads, number)
+    columns += [
+        Column("link", np.tile([link for link, _, _ in points], count * loads), "", "link"),
+        Column("point", np.tile([point for _, point, _ in points], count * loads), "", "its point"),
+        Column("x", places.real, length, "place without a load"),
+        Column("y", places.imag, length, "place without a load"),
+        Column("dx", moved.real, length, "displacement"),
+        Column("dy", moved.imag, length, "displacement"),
+    ]
+    return Table("displacements", tuple(columns), "displacements of all points under the study's loads")
+
+
+def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]:
+    """Pose columns and the number of the load, for so many rows of each."""
+    repeat = np.repeat(np.arange(poses.count), loads * rows)
+    return [
+        *(Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)),
+        Column(
+            "load", np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count), "", "which of the study's loads"
+        ),
+    ]
+
+
+def _link(vertex: str) -> str:
+    """The link that a vertex is a part of; of massless ones their kind."""
+    return vertex.split("@")[0].removesuffix(":rod").removeprefix(":")

@@ -9,6 +9,7 @@ these.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,13 +19,14 @@ from mechdesign.analyses.reliability.engine.descent import descend, sizes
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints
 from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
-from mechdesign.analyses.reliability.probability import half_spaces
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Flags, Floats
 
 # Directions that are drawn to learn which ones count, how often, and for the value; design points that each begins at.
 CHOICES, ROUNDS, VALUED, BEGUN = 96, 2, 384, 8
 # Share of the directions that are drawn from all alike, and points that each choice's half-spaces are drawn with.
 ALL, DRAWN = 0.1, 16
+# Points that half-spaces are drawn with.
+_POINTS = 20_000
 # Density of a part that ends.
 LEAST = 0.02
 
@@ -99,3 +101,44 @@ def _chances(problem: Problem, points: DesignPoints, u: Floats, rng: np.random.G
         z += own * np.nan_to_num(depth - (own * z).sum(axis=0))
         held = (np.einsum("dhn,dmn->hmn", normal, z) > distance[:, None]).sum(axis=0)
     return np.asarray(np.minimum(total * (1.0 / np.maximum(held, 1)).mean(axis=0), 1.0))
+
+
+def half_spaces(
+    normals: Floats,
+    distances: Floats,
+    broken: Callable[[Floats, Flags], Flags] | None = None,
+) -> float:
+    """Probability that a standard normal point lies in any half-space ``normal . u > distance``, to some 1e-3 of it.
+
+    Parameters
+    ----------
+    normals : ndarray, shape (half-spaces, dimension)
+        Unit vectors.
+    distances : ndarray, shape (half-spaces,)
+    broken : callable, optional
+        Which points count, where not all in the half-spaces do: from points, shape (dimension, n), and the half-spaces
+        that hold them, shape (half-spaces, n).
+
+    Notes
+    -----
+    The sum of their probabilities, times the mean of one over how many of them hold a point that was drawn in one
+    [Owen, Maximov & Chertkov, Importance sampling the union of rare events, 2019]: however rare, and however they
+    depend on each other.
+    """
+    chances = ndtr(-distances)
+    total = float(chances.sum())
+    if total == 0 or (len(chances) < 2 and broken is None):
+        return total
+    rng = np.random.Generator(np.random.SFC64(0))
+    half = rng.choice(len(chances), _POINTS, p=chances / total)
+    normal = normals[half].T
+    u = rng.standard_normal(normal.shape)
+    depth = -ndtri(chances[half] * (1.0 - rng.random(_POINTS)))
+    u += normal * (depth - (normal * u).sum(axis=0))
+    held = normals @ u > distances[:, None]
+    # Its own half-space holds a point whatever rounding says.
+    held[half, np.arange(_POINTS)] = True
+    weights = 1.0 / held.sum(axis=0)
+    if broken is not None:
+        weights = np.where(broken(u, held), weights, 0.0)
+    return min(total * float(np.mean(weights)), 1.0)

@@ -12,9 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.design_points import EXPLORED, MOST, DesignPoints, explored_weights
-from mechdesign.analyses.reliability.engine.intervals import weighted
+from mechdesign.analyses.reliability.engine.intervals import Precision, weighted
 from mechdesign.analyses.reliability.engine.mixture import Mixture
-from mechdesign.analyses.reliability.engine.precision import Precision
 from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Problem, failed
 from mechdesign.numerics.arrays import Floats
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 
 # Plain samples that every rung is checked with, and up to how many of them need no other method.

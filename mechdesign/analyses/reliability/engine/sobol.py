@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.precision import CONFIDENCE
+from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE
 from mechdesign.analyses.reliability.engine.problem import BLOCK
 from mechdesign.numerics.arrays import Floats
 

@@ -8,9 +8,11 @@ from importlib import import_module
 
 import numpy as np
 
+from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.error_limits import correlation
-from mechdesign.analyses.reliability.simulation import Setting, Sums
+from mechdesign.analyses.reliability.first_order import correlation
+from mechdesign.analyses.reliability.setting import Setting
+from mechdesign.analyses.reliability.simulation import Sums
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
@@ -54,8 +56,6 @@ def sampled(name: str, task: Task, sums: Mapping[int, Sums]) -> MethodResult:
 
 def counted(sums: Sums) -> Estimate:
     """Estimate from counted failures, with the interval of Clopper and Pearson."""
-    from mechdesign.analyses.reliability.engine.intervals import binomial
-
     low, high = binomial(sums.failures, sums.samples)
     invalid = sums.samples - sums.valid
     return Estimate(sums.failures / sums.samples, low, high, sums.samples, sums.samples, sums.failures, invalid)

@@ -6,9 +6,9 @@ from importlib import import_module
 
 from mechdesign.analyses.reliability.engine import ladder
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.limit_states import problem_of
 from mechdesign.analyses.reliability.methods import SEARCH, counted, pose_by_pose
-from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, simulate_chunk
+from mechdesign.analyses.reliability.setting import Setting, problem_of
+from mechdesign.analyses.reliability.simulation import Sums, generator, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 

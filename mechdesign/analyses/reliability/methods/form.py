@@ -6,11 +6,11 @@ import numpy as np
 
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
 from mechdesign.analyses.reliability.engine.form import form
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
-from mechdesign.analyses.reliability.limit_states import problem_of
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
-from mechdesign.analyses.reliability.simulation import Setting, generator
+from mechdesign.analyses.reliability.setting import Setting, problem_of
+from mechdesign.analyses.reliability.simulation import generator
 from mechdesign.analyses.reliability.task import MethodResult, Task
 
 

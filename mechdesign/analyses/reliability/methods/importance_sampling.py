@@ -7,9 +7,9 @@ from dataclasses import replace
 from mechdesign.analyses.reliability.engine.design_points import find
 from mechdesign.analyses.reliability.engine.importance import importance_sampling
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.limit_states import problem_of
 from mechdesign.analyses.reliability.methods import SEARCH, counted, of_limits
-from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, simulate
+from mechdesign.analyses.reliability.setting import Setting, problem_of
+from mechdesign.analyses.reliability.simulation import Sums, generator, simulate
 from mechdesign.analyses.reliability.task import MethodResult, Task
 
 rung = importance_sampling
