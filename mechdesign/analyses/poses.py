@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from mechdesign.analyses.continuity import continuous
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
-from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.algebra import TURN, Value
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.turns import TURN, angles_of
 from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.parallel import map_chunks
