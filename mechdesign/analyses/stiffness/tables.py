@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import Held, directional, principal
 from mechdesign.analyses.stiffness.legs import Leg
@@ -79,7 +80,7 @@ def stiffness_table(
         columns.append(
             Column(name, held.free[:, k], per, "the free twist, per radian where it turns; nan where none is free")
         )
-    columns.append(Column("valid", valid, "", "1 where the pose is assembled and within its limits"))
+    columns += shared(units, valid=valid)
     columns.append(
         Column(
             "method", np.full(poses.count, method), "", "serial legs: reciprocal screws [S4]; force method: any other"
@@ -106,7 +107,7 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: float) -> Tabl
     twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
     repeat = np.repeat(np.arange(poses.count), 3)
     units = study.units
-    columns = [Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns = [column.take(repeat) for column in pose_columns(study, poses)]
     columns += [
         Column("mode", np.tile([1, 2, 3], poses.count), "", "softest first"),
         Column("stiffness", stiffness.ravel(), units.label("stiffness"), "eigenvalue of the scaled stiffness matrix"),
@@ -137,7 +138,7 @@ def springs_table(study: Study, poses: Poses, legs: Sequence[Leg], springs: Sequ
     names = np.array([leg.name for leg in legs] or [""])
     place, angle = gather("place"), gather("angle")
     per_radian = units.label("rotational_stiffness")
-    columns = [Column(c.name, c.values[row[order]], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns = [column.take(row[order]) for column in pose_columns(study, poses)]
     columns += [
         Column("leg", names[leg[order]], "", "links of the leg, from the base"),
         Column("stiffness", gather("stiffness"), units.label("stiffness"),
@@ -155,7 +156,7 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
     moved = np.einsum("nij,lj->nli", soft, loads[:, :size]).reshape(-1, size)
     repeat = np.repeat(np.arange(poses.count), len(loads))
     applied = np.tile(loads, (poses.count, 1))
-    columns = [Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns = [column.take(repeat) for column in pose_columns(study, poses)]
     force, moment, length = units.label("force"), units.label("moment"), units.label("length")
     for k, (name, unit) in enumerate(zip(("fx", "fy", "mz")[:size], (force, force, moment), strict=False)):
         columns.append(Column(name, applied[:, k], unit, "load at the asked point"))
