@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judge import JudgedDesigns
 from mechdesign.analyses.optimize.variables import steps
@@ -86,7 +87,7 @@ class Comparison:
             if each in designs.errors:
                 meaning = f"estimated error of {each.name}"
                 yield Column(f"{each.name}_error", designs.errors[each][rows], told[each][0], meaning)
-        yield Column("CPI", self.cpi[rows], "", "sum of the normalised indices")
+        yield from shared(self.study.units, CPI=self.cpi[rows])
 
     def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
         worst = ("", f"worst row of {judged.name}")
@@ -109,7 +110,7 @@ def optimum_table(compared: Comparison, active: Sequence[str]) -> Table:
             for each, column in zip(compared.designs.goals, compared.weights.T, strict=True)
         ),
         *compared.columns(rows),
-        Column("score", np.array(scores), "", "weighted sum of the normalised indices"),
+        *shared(study.units, score=scores),
         *(Column(name, value, "", "parameter that follows from the variables") for name, value in following.items()),
         Column("active", np.array(active, dtype=object), "", "bounds and conditions that the optimum lies at"),
     )
@@ -170,6 +171,6 @@ def best_table(compared: Comparison) -> Table:
         Column("optimum", row_numbers, "", "row of optimum.csv whose weights are taken"),
         Column("rank", ranks, "", "1 is the optimum"),
         *compared.columns(picked),
-        Column("score", scores, "", "weighted sum of the normalised indices"),
+        *shared(compared.study.units, score=scores),
     )
     return Table("best", columns, "the best designs for each set of weights, none of them next to a better one")

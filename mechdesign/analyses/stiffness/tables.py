@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import Held, directional, principal
 from mechdesign.analyses.stiffness.loads import Effects, joints_of, points_of
@@ -80,7 +81,7 @@ def stiffness_table(
         columns.append(
             Column(name, held.free[:, k], per, "the free twist, per radian where it turns; nan where none is free")
         )
-    columns.append(Column("valid", valid, "", "1 where the pose is assembled and within its limits"))
+    columns += shared(units, valid=valid)
     columns.append(
         Column(
             "method", np.full(poses.count, method), "", "serial legs: reciprocal screws [S4]; force method: any other"
@@ -107,7 +108,7 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: float) -> Tabl
     twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
     repeat = np.repeat(np.arange(poses.count), 3)
     units = study.units
-    columns = [Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns = [column.take(repeat) for column in pose_columns(study, poses)]
     columns += [
         Column("mode", np.tile([1, 2, 3], poses.count), "", "softest first"),
         Column("stiffness", stiffness.ravel(), units.label("stiffness"), "eigenvalue of the scaled stiffness matrix"),
@@ -138,7 +139,7 @@ def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Sequ
     names = np.array([*legs] or [""])
     place, angle = gather("place"), gather("angle")
     per_radian = units.label("rotational_stiffness")
-    columns = [Column(c.name, c.values[row[order]], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns = [column.take(row[order]) for column in pose_columns(study, poses)]
     columns += [
         Column("leg", names[leg[order]], "", "links of the leg, from the base"),
         Column("stiffness", gather("stiffness"), units.label("stiffness"),
@@ -156,7 +157,7 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
     moved = np.einsum("nij,lj->nli", soft, loads[:, :size]).reshape(-1, size)
     repeat = np.repeat(np.arange(poses.count), len(loads))
     applied = np.tile(loads, (poses.count, 1))
-    columns = [Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns = [column.take(repeat) for column in pose_columns(study, poses)]
     force, moment, length = units.label("force"), units.label("moment"), units.label("length")
     for k, (name, unit) in enumerate(zip(("fx", "fy", "mz")[:size], (force, force, moment), strict=False)):
         columns.append(Column(name, applied[:, k], unit, "load at the asked point"))
@@ -213,7 +214,7 @@ def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]
     """Pose columns and the number of the load, for so many rows of each."""
     repeat = np.repeat(np.arange(poses.count), loads * rows)
     return [
-        *(Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)),
+        *(column.take(repeat) for column in pose_columns(study, poses)),
         Column(
             "load", np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count), "", "which of the study's loads"
         ),
