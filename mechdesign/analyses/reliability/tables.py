@@ -43,14 +43,14 @@ def of_channels(task: Task, channels: Ints) -> list[Column]:
 
 def moments(task: Task, found: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
-    known = [each for each in found if each.mean is not None] or [methods.run("analytic", task)]
+    known = [each for each in found if each.sums or each.normal] or [methods.run("analytic", task)]
+    each_mean, each_covariance = zip(*(each.moments(task) for each in known), strict=True)
     scale, linear = task.scale[:, None], task.linear
     shape = (task.poses.count, len(known), len(scale))
     pose, method, channel = (index.ravel() for index in np.indices(shape))
-    mean, sigma = (
-        np.stack([getattr(each, name) for each in known])[method, channel, pose] * scale[channel, 0]
-        for name in ("mean", "sigma")
-    )
+    mean = np.stack(each_mean)[method, channel, pose] * scale[channel, 0]
+    variance = np.stack(each_covariance)[method, pose, channel, channel]
+    sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
     columns = [
@@ -79,7 +79,6 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
     pose = np.array([row for row, _, _ in entries + cycles])
     used = [each.used.get(row, each.method) for row, each, _ in entries]
     used += ["monte_carlo" if estimate.samples else "bounds" for _, _, estimate in cycles]
-    rho = [np.nan if each.rho is None else each.rho[row] for row, each, _ in entries] + [np.nan] * len(cycles)
     estimates = [estimate for _, _, estimate in entries + cycles]
     failure, low, high, error = (
         np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high", "error")
@@ -109,7 +108,10 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("used", np.array(used), meaning="where the value comes from: of auto, the method it used"),
     ]  # fmt: skip
     if task.question.pair is not None:
-        columns.append(Column("rho", np.array(rho), meaning="correlation of the two outputs"))
+        pair = np.ix_(range(task.poses.count), task.question.pair, task.question.pair)
+        rho = np.stack([correlation(each.moments(task)[1][pair]) for each in found], axis=1)
+        values = np.append(rho, np.full(len(cycles), np.nan))
+        columns.append(Column("rho", values, meaning="correlation of the two outputs"))
     valid = np.where(whole, (task.reason == 0).all(), task.reason[pose] == 0)
     columns.append(Column("valid", valid, meaning="1 where the nominal pose (all, of a cycle) is valid"))
     return Table("reliability", tuple(columns), "probability that the errors keep their limits")
