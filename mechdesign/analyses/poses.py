@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from mechdesign.analyses.continuity import continuous
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
-from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.algebra import TURN, Value
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.turns import TURN, angles_of
 from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.parallel import map_chunks
@@ -56,7 +55,6 @@ def study_poses(study: Study, section: str) -> Poses:
     StudyError
         Where nothing sensible can be assumed.
     """
-    turn = TURN / study.units.angle_factor
     for name in dict.fromkeys((section, "kinematics")):
         asked: PoseSection | None = getattr(study, name)
         if asked is not None and asked.at_nodes:
@@ -65,10 +63,10 @@ def study_poses(study: Study, section: str) -> Poses:
 
             return workspace_nodes(study)
         if asked is not None:
-            found = expand(asked, study.path.parent if study.path else Path(), turn)
+            found = expand(asked, study.path.parent if study.path else Path())
             if found is not None:
                 return found
-    return default(study.mechanism.description, turn)
+    return default(study.mechanism.description)
 
 
 def radians(study: Study, coordinate: Coordinate, value: Value) -> Value:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -198,15 +198,10 @@ def drawn_value(graph: Graph, geometry: Geometry, sketch: Sketch, coordinate: Co
     return float(dot(head - tail - complex(geometry.nominal.w[k]) * turn, complex(geometry.nominal.d[k]) * turn))
 
 
-def roots_as_drawn(
-    graph: Graph, geometry: Geometry, structure: Structure, sketch: Sketch
-) -> Mapping[int, tuple[list[float], list[float]]]:
+def unknowns_as_drawn(graph: Graph, geometry: Geometry, structure: Structure, sketch: Sketch) -> list[float]:
     """Angles and slides of the groups without a closed form as drawn: where Newton's method starts."""
-    found: dict[int, tuple[list[float], list[float]]] = {}
-    for index, group in enumerate(structure.groups):
-        if group.form != "newton":
-            continue
-        angles, slides = [], []
+    found: list[float] = []
+    for group in (structure.groups[index] for index in structure.unknowns):
         for root in group.angles:
             turn = sketch.rotations[root] if root < graph.classes else None
             if turn is None:
@@ -215,11 +210,10 @@ def roots_as_drawn(
                     f"the points of link '{names[0] if names else '?'}' are needed as a start; add them to the sketch",
                     KEY,
                 )
-            angles.append(float(np.angle(turn)))
+            found.append(float(np.angle(turn)))
         for slide in group.slides:
             value = drawn_value(graph, geometry, sketch, Coordinate("", "slide", "length", slide=slide))
             if value is None:
                 raise MechanismError(f"the ends of '{graph.slides[slide]}' are needed as a start", KEY)
-            slides.append(value)
-        found[index] = (angles, slides)
+            found.append(value)
     return found

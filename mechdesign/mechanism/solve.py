@@ -9,7 +9,7 @@ import numpy as np
 from mechdesign.mechanism import dyads
 from mechdesign.mechanism.algebra import Value, plus
 from mechdesign.mechanism.newton import CONVERGED, STEPS, solve_newton
-from mechdesign.mechanism.state import Guess, State, loop_gap
+from mechdesign.mechanism.state import State, Unknowns, loop_gap
 from mechdesign.mechanism.structure import Group
 
 # Dividing by a vector that has shrunk to nothing gives inf, where Python's own zero would raise.
@@ -19,7 +19,7 @@ ZERO = np.float64(0.0)
 def run(
     state: State,
     modes: Sequence[Value],
-    guess: Guess | None = None,
+    guess: Unknowns | None = None,
     given: Sequence[Value] = (),
     size: float = 1.0,
     steps: int = STEPS,
@@ -33,7 +33,7 @@ def run(
     modes : sequence
         Assembly mode (+1 or -1) of each group, or an array of one for each pose. Groups that it does not reach are left
         unsolved.
-    guess : mapping, optional
+    guess : sequence, optional
         Where Newton's method starts, for the groups without a closed form.
     size, steps, enough
         See `mechdesign.mechanism.newton.solve_newton`.
@@ -45,7 +45,7 @@ def run(
             continue
         if group.form == "newton":
             assert guess is not None
-            solve_newton(state, index, *guess[index], given, size, steps, enough)
+            solve_newton(state, index, guess[state.structure.unknowns[index]], given, size, steps, enough)
         elif group.form != "place":
             _closed_form(state, group, mode)
         state.place(group)

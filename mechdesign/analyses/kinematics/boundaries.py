@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.analyses.poses import CHUNK
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
-from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins, joints_of
+from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins
 from mechdesign.mechanism.turning import turning_point
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.minima import lowest
@@ -248,7 +248,7 @@ class _Search:
         exact = turning_point(margins.plan, given, margins.which, pose)
         if exact is None:
             return None
-        joint = joints_of(margins.mechanism, margins.plan.structure.groups[exact[2]])
+        joint = " ".join(margins.mechanism.graph.joined(margins.plan.structure.groups[exact[2]].edges))
         position = float(self._position(np.array([step]), np.array([exact[0]]))[0])
         return Boundary(position, exact[0], replace(cause, joint=joint, group=exact[2]), exact[1])
 

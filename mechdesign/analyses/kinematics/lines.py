@@ -14,11 +14,9 @@ from mechdesign.analyses.kinematics.rates import drive_velocities
 from mechdesign.analyses.poses import CHUNK, dimensions, in_study_units, radians, starts
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet, wrap
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, regularity
-from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.rates import Rates
-from mechdesign.mechanism.turns import angles_of
+from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 

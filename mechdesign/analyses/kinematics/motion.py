@@ -14,13 +14,12 @@ from mechdesign.analyses.kinematics.targets import Error, needed
 from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, study_poses
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.jacobians import Jacobian, mixes
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
-from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column
 from mechdesign.study import Poses, Study
@@ -180,7 +179,7 @@ class Motion:
         for output in found.values():
             for order, value in (
                 ("velocity", first(configuration, output, velocity)),
-                ("acceleration", second(configuration, output, velocity, acceleration)),
+                ("acceleration", second(configuration, output, velocity, velocity, acceleration)),
             ):
                 value = np.where(regular, in_study_units(self.question.study, output, value), np.nan)
                 self.put(f"{output.name}_{order}", solved.rows, value)

@@ -10,9 +10,8 @@ from mechdesign.analyses.kinematics.boundaries import Boundary, ChangePoint, bou
 from mechdesign.analyses.kinematics.lines import thinned
 from mechdesign.analyses.kinematics.motion import Motion, as_given
 from mechdesign.analyses.poses import in_study_units, radians
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.margins import SweepMargins
-from mechdesign.mechanism.turns import angles_of
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study

@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion
 from mechdesign.analyses.kinematics.targets import errors
 from mechdesign.analyses.poses import SolvedPoses, in_study_units, radians, solve_poses
-from mechdesign.mechanism.turns import angles_of
+from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.progress import NULL, Progress
 from mechdesign.study.poses import PoseGroup, Poses
 

@@ -18,8 +18,7 @@ from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import LOADS

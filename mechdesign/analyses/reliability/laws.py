@@ -17,7 +17,7 @@ import numpy as np
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.schema.reliability import Spread
+from mechdesign.study.schema.reliability import Dimension
 
 # A tolerance is three standard deviations of a normal law, which `truncated_normal` is cut at [S2, eq. 5].
 SIGMAS = 3.0
@@ -82,12 +82,12 @@ class Marginal(ABC):
         return replace(self, low=factor * self.low, high=factor * self.high, nominal=factor * self.nominal)
 
 
-def marginal(spread: Spread, nominal: float, factor: float = 1.0) -> Marginal:
+def marginal(spread: Dimension, nominal: float, factor: float = 1.0) -> Marginal:
     """The law that a study gives.
 
     Parameters
     ----------
-    spread : Spread
+    spread : Dimension
         Tolerance or sigma, and distribution; in the study's units.
     nominal : float
         Nominal value in the core's units.

@@ -15,8 +15,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import SUFFIXES, ReliabilitySection, split_order
-from mechdesign.study.schema.reliability_checks import others
+from mechdesign.study.schema.reliability import SUFFIXES, ReliabilitySection, others, split_order
 from mechdesign.study.text import fields
 
 

@@ -58,10 +58,10 @@ class _Path:
         """Place (2, n), and its slope by the drive (2, n)."""
         mechanism = self.margins.mechanism
         pose = self.margins.solve(self.drive(t), limits=False)
-        rates = mechanism.linearize(pose).drives()
+        rates = mechanism.linearize(pose).velocity([1.0])
         coordinates = [mechanism.coordinate(name) for name in self.outputs]
         place = np.stack([np.broadcast_to(pose.value(c), t.shape) for c in coordinates])
-        slope = np.stack([np.broadcast_to(first(pose, c, rates), (1, *t.shape))[0] for c in coordinates])
+        slope = np.stack([np.broadcast_to(first(pose, c, rates), t.shape) for c in coordinates])
         return place, slope
 
     def speed(self, t: Floats) -> Floats:

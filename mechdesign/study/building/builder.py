@@ -13,7 +13,7 @@ from mechdesign.study.building import section as models
 from mechdesign.study.building.names import GROUND, Names
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import StudyNumber
+from mechdesign.study.text.fields import StudyNumber
 from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Units
 

@@ -1,15 +1,29 @@
-"""From the validated mechanism section to `mechdesign.mechanism.model.Description`."""
+"""From the validated mechanism section to `Description`: names checked, defaults of joints filled in."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Literal
+import contextlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Literal, NoReturn
 
 import numpy as np
 
+from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression, ExpressionError
-from mechdesign.mechanism.model import Description, Drive, Limit, Measure, Quantity, Term
-from mechdesign.study.building import joints as joint_rules
+from mechdesign.mechanism.model import (
+    Description,
+    Drive,
+    Fixed,
+    Joint,
+    Limit,
+    Line,
+    Link,
+    Measure,
+    Prismatic,
+    Quantity,
+    Slot,
+    Term,
+)
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.building.names import GROUND
@@ -21,15 +35,176 @@ def build(builder: Builder) -> Description:
     builder.check_distinct()
     builder.check_sketch()
     builder.build_links()
-    joints = joint_rules.build(builder)
-    joint_rules.check_connected(builder)
-    joint_rules.check_pins(builder)
+    joints = _joints(builder)
+    _check_connected(builder)
+    _check_pins(builder)
     drives, measures, limits = _drives(builder), _measures(builder), _limits(builder)
     branch: Literal["side", "follow"] = "follow" if builder.section.branch == "follow" else "side"
     return Description(
         builder.places, builder.links, joints, drives, measures, limits, builder.sketch, branch,
         builder.units.angle_factor,
     )  # fmt: skip
+
+
+class _WrongJoint(Exception):
+    """What is wrong with a joint has been noted."""
+
+
+def _joints(builder: Builder) -> dict[str, Joint]:
+    """Build every joint of the section whose names are right."""
+    makers: dict[str, Callable[..., Joint]] = {"prismatic": _prismatic, "slot": _slot, "fixed": _fixed}
+    joints: dict[str, Joint] = {}
+    for name, section in builder.section.joints.items():
+        with contextlib.suppress(_WrongJoint):
+            joints[name] = makers[section.kind](builder, name, section, getattr(section, section.kind))
+    return joints
+
+
+def _refuse(builder: Builder, path: KeyPath, message: str) -> NoReturn:
+    builder.report(path, message)
+    raise _WrongJoint
+
+
+def _check_named(builder: Builder, what: str, names: Sequence[str], path: KeyPath) -> None:
+    if not builder.check_named(what, names, path):
+        raise _WrongJoint
+    if len(names) == 2 and names[0] == names[1]:
+        _refuse(builder, path, f"a joint of link {names[0]!r} with itself")
+
+
+def _check_on_link(builder: Builder, link: str, point: str, path: KeyPath) -> None:
+    points = builder.names.points_of(link)
+    if point not in points:
+        hint = suggestion(point, points) or f"; it has {', '.join(points)}"
+        _refuse(builder, path, f"link {link!r} has no point {point!r}{hint}")
+
+
+def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line:
+    path: KeyPath = ("joints", name, "through")
+    through = section.through or ()
+    for k, point in enumerate(through):
+        _check_on_link(builder, link, point, (*path, k))
+    if len(through) == 2:
+        points = builder.links[link].points
+        far = [point for point in through if point not in points]
+        if far:
+            message = f"{far[0]!r} moves along leg {link!r}: a line needs two points of one body; give 'direction'"
+            _refuse(builder, path, message)
+        first, second = ([builder.nominal(term) for term in points[point]] for point in through)
+        if first == second:
+            _refuse(builder, path, f"{' and '.join(map(repr, through))} are one place: no direction")
+        return Line(link, through[0], 0.0, through[1])
+    direction = builder.place(f"{name}.direction", section.direction or 0.0, "angle")
+    return Line(link, through[0] if through else None, direction)
+
+
+def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Prismatic:
+    path: KeyPath = ("joints", name)
+    _check_named(builder, "link", pair, (*path, "prismatic"))
+    guide, slider = pair
+    points = builder.names.points_of(slider)
+    if section.point is not None:
+        _check_on_link(builder, slider, section.point, (*path, "point"))
+    elif len(points) != 1:
+        _refuse(builder, path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
+    line = _line(builder, name, section, guide)
+    angle = builder.place(f"{name}.angle", section.angle or 0.0, "angle")
+    return Prismatic(name, line, slider, section.point or points[0], angle)
+
+
+def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slot:
+    path: KeyPath = ("joints", name)
+    _check_named(builder, "link", (guide,), (*path, "slot"))
+    if section.point is None:
+        _refuse(builder, path, "a slot needs the 'point' of another link that slides in it")
+    _check_named(builder, "point", (section.point,), (*path, "point"))
+    if builder.names.owners[section.point] == [guide]:
+        message = f"point {section.point!r} is on link {guide!r} itself, which has the slot"
+        _refuse(builder, (*path, "point"), message)
+    return Slot(name, _line(builder, name, section, guide), section.point)
+
+
+def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed:
+    path: KeyPath = ("joints", name)
+    _check_named(builder, "link", pair, (*path, "fixed"))
+    shared = [point for point in builder.names.points_of(pair[0]) if point in builder.names.points_of(pair[1])]
+    if section.point is not None:
+        for link in pair:
+            _check_on_link(builder, link, section.point, (*path, "point"))
+    elif len(shared) != 1:
+        message = f"links {pair[0]!r} and {pair[1]!r} share {len(shared)} points: say which, as 'point'"
+        _refuse(builder, path, message)
+    point = section.point or shared[0]
+    if section.angle is not None:
+        return Fixed(name, pair, point, builder.place(f"{name}.angle", section.angle, "angle"))
+    one, other = (builder.link_direction(link) for link in pair)
+    if one is None or other is None:
+        lost = pair[0] if one is None else pair[1]
+        message = f"its angle is left out and so measured from the sketch, which does not show how link {lost!r} lies"
+        _refuse(builder, path, message)
+    angle = (other - one) / builder.units.angle_factor
+    return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle", measured=True))
+
+
+def _check_pins(builder: Builder) -> None:
+    """Note links that share two points, and slides between links that a shared point pins together."""
+    section, names = builder.section, builder.names
+    for index, (name, link) in enumerate(builder.links.items()):
+        for other in list(builder.links.values())[:index]:
+            shared = [point for point in link.points if point in other.points]
+            if len(shared) > 1:
+                builder.report(("links", name), _shared_twice(builder, link, other, shared), at_key=True)
+    for name, joint in section.joints.items():
+        pair = joint.prismatic or ((joint.slot, joint.point) if joint.slot and joint.point else None)
+        if pair is None:
+            continue
+        points = names.points_of(pair[0])
+        pinned = [point for point in points if point in (names.points_of(pair[1]) if joint.prismatic else [pair[1]])]
+        if pinned and (joint.prismatic or names.owners[pinned[0]] != [pair[0]]):
+            what = (
+                "a point that two links name pins them together" if joint.prismatic else "a pin holds it to that link"
+            )
+            mend = "give the slider's point a name of its own" if joint.prismatic else "leave it out there"
+            message = f"point {pinned[0]!r} is on link {pair[0]!r} too, so that it cannot slide: {what}; {mend}"
+            builder.report(("joints", name), message)
+
+
+def _shared_twice(builder: Builder, link: Link, other: Link, shared: list[str]) -> str:
+    places = [[complex(*map(builder.nominal, body.points[point])) for point in shared[:2]] for body in (link, other)]
+    one, two = (abs(b - a) for a, b in places)
+    pins = f"{shared[0]!r} and {shared[1]!r}"
+    if abs(one - two) > 1e-9 * max(one, two):
+        return (
+            f"{pins} are on link {other.name!r} too, but {two:.9g} apart there and {one:.9g} here; keep one of the two"
+        )
+    mend = "leave it out" if other.name == GROUND else "make the two one link that has all their points"
+    return f"{pins} are on link {other.name!r} too: the two are one rigid body; {mend}"
+
+
+def _check_connected(builder: Builder) -> None:
+    """Note links that neither shared points nor joints lead to from the ground."""
+    section, owners = builder.section, builder.names.owners
+    ties = [set(links) for links in owners.values()]
+    for joint in section.joints.values():
+        ties.append({*(joint.prismatic or ()), *(joint.fixed or ())})
+        if joint.slot and joint.point:
+            ties.append({joint.slot, *owners.get(joint.point, ())})
+    reached, before = {GROUND}, 0
+    while len(reached) > before:
+        before = len(reached)
+        reached.update(*(tie for tie in ties if tie & reached))
+    for name in section.links:
+        if name in reached or GROUND not in section.links:
+            continue
+        points = builder.names.points_of(name)
+        mates = sorted({link for tie in ties if name in tie for link in tie} - {name})
+        if mates:
+            message = f"nothing joins it to the ground: only to {', '.join(mates)}"
+        else:
+            others = [point for point, links in owners.items() if links != [name]]
+            hint = next((text for text in (suggestion(point, others) for point in points) if text), "")
+            message = f"no other link shares a point of it ({', '.join(points)}){hint}"
+        builder.report(("links", name), message, at_key=True)
 
 
 def _drives(builder: Builder) -> dict[str, Drive]:

@@ -6,7 +6,6 @@ long form before validation, so that no model is a union and every error has one
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -14,7 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
 from mechdesign.study.text import fields
-from mechdesign.study.text.numbers import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
+from mechdesign.study.text.fields import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
 from mechdesign.study.text.units import QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
@@ -60,7 +59,7 @@ class Link(fields.Model):
     length: fields.PositiveLengthValue | None = None
     telescopic: bool = False
     points: Annotated[
-        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))
+        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
 
     @model_validator(mode="before")
@@ -119,7 +118,7 @@ class Joint(fields.Model):
     slot: fields.LinkName | None = None
     fixed: TwoLinks | None = None
     through: (
-        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort((fields.NAME_FORM,))] | None
+        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort(fields.NAME_FORM)] | None
     ) = None
     direction: fields.AngleValue | None = None
     point: fields.PointName | None = None
@@ -190,26 +189,21 @@ class Limit(fields.Model):
         return self
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """One target as it was written: an expression (a number is one without names), rows, or the name of a file."""
-
-    expression: Expression | None = None
-    rows: tuple[tuple[float, ...], ...] | None = None
-    file: str | None = None
+Wanted = Expression | tuple[tuple[float, ...], ...] | str
+"""A target as it was written: an expression (a number is one without names), rows, or the name of a file."""
 
 
 def _target(raw: Any, context: Context) -> Wanted:
     if isinstance(raw, dict) and list(raw) == ["file"] and isinstance(raw["file"], str):
-        return Wanted(file=raw["file"])
+        return raw["file"]
     if isinstance(raw, str) and raw.lower().endswith(FILES):
-        return Wanted(file=raw)
+        return raw
     if raw is None or isinstance(raw, dict):
         raise failure(f"expected {TARGET_FORMS}, not {shown(raw)}")
     if isinstance(raw, list):
         rule = "every row holds the same one, two or three numbers"
-        return Wanted(rows=read_rows(raw, context, 3, rule, "an empty list: no target"))
-    return Wanted(expression=read_expression(raw, context))
+        return read_rows(raw, context, 3, rule, "an empty list: no target")
+    return read_expression(raw, context)
 
 
 TargetValue = Annotated[
@@ -224,9 +218,9 @@ class MechanismSection(fields.Model):
     links: dict[fields.LinkName, Link]
     joints: dict[fields.JointName, Joint] = Field(default_factory=dict)
     drives: Annotated[
-        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))
+        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
-    branch: Annotated[str, fields.Choice(("side", "follow"))] = "side"
+    branch: Annotated[str, fields.choice(("side", "follow"))] = "side"
     sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
     measures: dict[fields.MeasureName, Measure] = Field(default_factory=dict)
     limits: tuple[Limit, ...] = ()
