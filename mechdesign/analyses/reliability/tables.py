@@ -11,11 +11,10 @@ from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.reliability import methods
 from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.engine.sobol import SobolIndices
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import links_meant
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
-from mechdesign.analyses.reliability.sobol import columns as index_columns
+from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Ints
 from mechdesign.results import Column, Table
@@ -132,9 +131,29 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
         Column("sensitivity", sensitivity.ravel(),
                meaning="derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)"),
         Column("share", share.ravel(), meaning="share of the output's variance, to the first order"),
-        *index_columns(indices, share.shape),
+        *_index_columns(indices, share.shape),
     ]  # fmt: skip
     return Table("contributions", tuple(columns), "what the errors come from")
+
+
+def _index_columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> list[Column]:
+    """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; nan where not asked."""
+    made: list[Column] = []
+    for kind, meaning in (
+        ("first", "share of the output's variance that the source causes by itself [Sobol, 1993]"),
+        ("total", "share that the source causes by itself and together with others"),
+    ):
+        values = np.full((3, *shape), np.nan)
+        for pose, each in found.items():
+            values[:, pose] = getattr(each, kind)
+        ends = (
+            ("", ""),
+            ("_low", ", lower end of its interval, 99.7 %"),
+            ("_high", ", upper end of its interval, 99.7 %"),
+        )
+        made += [Column(f"sobol_{kind}{end}", part.ravel(), meaning=meaning + more)
+                 for (end, more), part in zip(ends, values, strict=True) if found]  # fmt: skip
+    return made
 
 
 def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:
