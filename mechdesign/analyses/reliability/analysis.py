@@ -15,11 +15,11 @@ from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
 from mechdesign.analyses.reliability.engine.intervals import Precision
-from mechdesign.analyses.reliability.engine.sobol import SobolIndices
 from mechdesign.analyses.reliability.first_order import linear_errors, nominal_values
 from mechdesign.analyses.reliability.notes import notes
 from mechdesign.analyses.reliability.question import ask, unsaid
 from mechdesign.analyses.reliability.setting import Setting, forward_plan
+from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MOST, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted

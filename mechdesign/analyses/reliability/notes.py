@@ -7,8 +7,8 @@ import math
 from collections.abc import Sequence
 
 from mechdesign.analyses.reliability.engine.intervals import WIDTH
-from mechdesign.analyses.reliability.engine.ladder import FACTOR, disagree
 from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.methods.auto import FACTOR, disagree
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 

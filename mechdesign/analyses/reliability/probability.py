@@ -6,13 +6,12 @@ reliability is one minus it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from mechdesign.analyses.reliability.engine.form import half_spaces
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import Band, Disc
 from mechdesign.numerics.arrays import Flags, Floats
@@ -23,6 +22,7 @@ _LATTICE = 8191
 _SHIFTS = 8
 # Below this sum of the limits' probabilities a lattice sees too few failures; points that are drawn there instead.
 _RARE = 0.05
+_POINTS = 20_000
 # Sides of the polygon in a circle, beyond which points are drawn.
 _SIDES = 64
 
@@ -111,6 +111,47 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
     return half_spaces(
         np.array(slopes)[used] / size[used, None], np.array(ends)[used] / size[used], broken if discs else None
     )
+
+
+def half_spaces(
+    normals: Floats,
+    distances: Floats,
+    broken: Callable[[Floats, Flags], Flags] | None = None,
+) -> float:
+    """Probability that a standard normal point lies in any half-space ``normal . u > distance``, to some 1e-3 of it.
+
+    Parameters
+    ----------
+    normals : ndarray, shape (half-spaces, dimension)
+        Unit vectors.
+    distances : ndarray, shape (half-spaces,)
+    broken : callable, optional
+        Which points count, where not all in the half-spaces do: from points, shape (dimension, n), and the half-spaces
+        that hold them, shape (half-spaces, n).
+
+    Notes
+    -----
+    The sum of their probabilities, times the mean of one over how many of them hold a point that was drawn in one
+    [Owen, Maximov & Chertkov, Importance sampling the union of rare events, 2019]: however rare, and however they
+    depend on each other.
+    """
+    chances = ndtr(-distances)
+    total = float(chances.sum())
+    if total == 0 or (len(chances) < 2 and broken is None):
+        return total
+    rng = np.random.Generator(np.random.SFC64(0))
+    half = rng.choice(len(chances), _POINTS, p=chances / total)
+    normal = normals[half].T
+    u = rng.standard_normal(normal.shape)
+    depth = -ndtri(chances[half] * (1.0 - rng.random(_POINTS)))
+    u += normal * (depth - (normal * u).sum(axis=0))
+    held = normals @ u > distances[:, None]
+    # Its own half-space holds a point whatever rounding says.
+    held[half, np.arange(_POINTS)] = True
+    weights = 1.0 / held.sum(axis=0)
+    if broken is not None:
+        weights = np.where(broken(u, held), weights, 0.0)
+    return min(total * float(np.mean(weights)), 1.0)
 
 
 def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) -> float:

@@ -12,11 +12,10 @@ from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.reliability import methods
 from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.engine.sobol import SobolIndices
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import links_meant
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
-from mechdesign.analyses.reliability.sobol import columns as index_columns
+from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Ints
 from mechdesign.results import Column, Table
@@ -41,14 +40,14 @@ def of_channels(task: Task, channels: Ints) -> list[Column]:
 
 def moments(task: Task, found: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
-    known = [each for each in found if each.mean is not None] or [methods.run("analytic", task)]
+    known = [each for each in found if each.sums or each.normal] or [methods.run("analytic", task)]
+    each_mean, each_covariance = zip(*(each.moments(task) for each in known), strict=True)
     scale, linear = task.scale[:, None], task.linear
     shape = (task.poses.count, len(known), len(scale))
     pose, method, channel = (index.ravel() for index in np.indices(shape))
-    mean, sigma = (
-        np.stack([getattr(each, name) for each in known])[method, channel, pose] * scale[channel, 0]
-        for name in ("mean", "sigma")
-    )
+    mean = np.stack(each_mean)[method, channel, pose] * scale[channel, 0]
+    variance = np.stack(each_covariance)[method, pose, channel, channel]
+    sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
     columns = [
@@ -77,7 +76,6 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
     pose = np.array([row for row, _, _ in entries + cycles])
     used = [each.used.get(row, each.method) for row, each, _ in entries]
     used += ["monte_carlo" if estimate.samples else "bounds" for _, _, estimate in cycles]
-    rho = [np.nan if each.rho is None else each.rho[row] for row, each, _ in entries] + [np.nan] * len(cycles)
     estimates = [estimate for _, _, estimate in entries + cycles]
     failure, low, high, error = (
         np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high", "error")
@@ -107,7 +105,10 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("used", np.array(used), meaning="where the value comes from: of auto, the method it used"),
     ]  # fmt: skip
     if task.question.pair is not None:
-        columns.append(Column("rho", np.array(rho), meaning="correlation of the two outputs"))
+        pair = np.ix_(range(task.poses.count), task.question.pair, task.question.pair)
+        rho = np.stack([correlation(each.moments(task)[1][pair]) for each in found], axis=1)
+        values = np.append(rho, np.full(len(cycles), np.nan))
+        columns.append(Column("rho", values, meaning="correlation of the two outputs"))
     valid = np.where(whole, (task.reason == 0).all(), task.reason[pose] == 0)
     columns.append(Column("valid", valid, meaning="1 where the nominal pose (all, of a cycle) is valid"))
     return Table("reliability", tuple(columns), "probability that the errors keep their limits")
@@ -128,9 +129,29 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
         Column("sensitivity", sensitivity.ravel(),
                meaning="derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)"),
         Column("share", share.ravel(), meaning="share of the output's variance, to the first order"),
-        *index_columns(indices, share.shape),
+        *_index_columns(indices, share.shape),
     ]  # fmt: skip
     return Table("contributions", tuple(columns), "what the errors come from")
+
+
+def _index_columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> list[Column]:
+    """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; nan where not asked."""
+    made: list[Column] = []
+    for kind, meaning in (
+        ("first", "share of the output's variance that the source causes by itself [Sobol, 1993]"),
+        ("total", "share that the source causes by itself and together with others"),
+    ):
+        values = np.full((3, *shape), np.nan)
+        for pose, each in found.items():
+            values[:, pose] = getattr(each, kind)
+        ends = (
+            ("", ""),
+            ("_low", ", lower end of its interval, 99.7 %"),
+            ("_high", ", upper end of its interval, 99.7 %"),
+        )
+        made += [Column(f"sobol_{kind}{end}", part.ravel(), meaning=meaning + more)
+                 for (end, more), part in zip(ends, values, strict=True) if found]  # fmt: skip
+    return made
 
 
 def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:

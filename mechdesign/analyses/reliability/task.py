@@ -109,10 +109,9 @@ class MethodResult:
         By pose, the method that the value comes from, where it is not this one.
     rungs : dict of int to dict of str to Estimate
         By pose, what the methods tried before say.
-    mean, sigma : ndarray, shape (channels, poses), or None
-        Of the errors (radians, lengths); None where the method gives no moments.
-    rho : ndarray, shape (poses,), or None
-        Correlation of the two outputs.
+    normal : (ndarray, ndarray) or None
+        Mean, shape (channels, poses), and covariance, shape (poses, channels, channels), of errors that are not drawn
+        (radians, lengths); None where the method gives none.
     cycle : Estimate or None
         Of the whole motion.
     """
@@ -122,10 +121,19 @@ class MethodResult:
     sums: dict[int, Sums] = field(default_factory=dict)
     used: dict[int, str] = field(default_factory=dict)
     rungs: dict[int, dict[str, Estimate]] = field(default_factory=dict)
-    mean: Floats | None = None
-    sigma: Floats | None = None
-    rho: Floats | None = None
+    normal: tuple[Floats, Floats] | None = None
     cycle: Estimate | None = None
+
+    def moments(self, task: Task) -> tuple[Floats, Floats]:
+        """Mean and covariance of the errors, as `normal` has them, or of those that were drawn; nan where unknown."""
+        if self.normal is not None:
+            return self.normal
+        channels, poses = task.nominal.shape
+        mean, covariance = np.full((channels, poses), np.nan), np.full((poses, channels, channels), np.nan)
+        for pose, sums in self.sums.items():
+            if sums.valid:
+                mean[:, pose], covariance[pose] = sums.mean, sums.covariance
+        return mean, covariance
 
     def add(self, other: MethodResult) -> None:
         """Join what is said of other poses."""

@@ -9,7 +9,7 @@ import numpy as np
 from mechdesign.analyses.stiffness.force_method import Loaded
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.mechanism import Configuration
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +43,6 @@ class Effects:
             np.full((poses, points), complex(np.nan, np.nan)),
             np.full(poses, complex(np.nan, np.nan)),
         )
-
-    def put(self, rows: Ints, part: Effects) -> None:
-        """Fill in some poses."""
-        for name, values in vars(part).items():
-            getattr(self, name)[rows] = values
 
     def moved(self, network: Network) -> Complexes:
         """Displacements of the points that `points_of` names, shape (n, points, loads)."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -21,13 +20,26 @@ from mechdesign.study.poses import Poses
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Rows of the table of springs, in no order."""
+    """Rows of the table of springs."""
 
     row: Ints
     leg: Ints
     stiffness: Floats
     place: Complexes
     angle: Floats
+
+    def take(self, rows: Ints | Flags) -> Springs:
+        """Some of them."""
+        return Springs(*(values[rows] for values in vars(self).values()))
+
+    @staticmethod
+    def sorted(parts: Sequence[Springs]) -> Springs:
+        """All together, by pose and leg."""
+        if not parts:
+            none = np.zeros(0)
+            return Springs(none.astype(np.intp), none.astype(np.intp), none, none.astype(complex), none)
+        whole = Springs(*(np.concatenate(values) for values in zip(*(vars(p).values() for p in parts), strict=True)))
+        return whole.take(np.lexsort((whole.leg, whole.row)))
 
 
 def _kinds(size: int, what: str) -> dict[tuple[int, int], str]:
@@ -53,40 +65,25 @@ def stiffness_table(
     with np.errstate(divide="ignore"):
         direct = [1 / soft[:, k, k] for k in range(size)]
     columns = pose_columns(study, poses)
-    columns += [
-        Column(name, values, units.label(kind), "load over its own displacement, the others free")
-        for name, values, kind in zip(
-            ("k_x", "k_y", "k_phi"), direct, ("stiffness", "stiffness", "rotational_stiffness"), strict=False
-        )
-    ]
-    unit = units.label("stiffness")
+    unit, turning = units.label("stiffness"), units.label("rotational_stiffness")
+    for name, values, per in zip(("k_x", "k_y", "k_phi"), direct, (unit, unit, turning), strict=False):
+        columns.append(Column(name, values, per, "load over its own displacement, the others free"))
     columns += [
         Column("k_min", low, unit, "stiffness to a force in the softest direction, the body free to turn"),
         Column("k_max", high, unit, "stiffness to a force in the stiffest direction, the body free to turn"),
         Column("k_angle", angle / units.angle_factor, units.label("angle"), "angle of the stiffest direction"),
     ]
     if direction is not None:
-        columns.append(
-            Column(
-                "k_direction",
-                directional(soft, direction * units.angle_factor),
-                unit,
-                "force in the asked direction over displacement along it",
-            )
-        )
+        along = directional(soft, direction * units.angle_factor)
+        columns.append(Column("k_direction", along, unit, "force in the asked direction over displacement along it"))
     columns += _entries(study, "K", held.stiffness, "stiffness", "stiffness matrix at the asked point; nan where rigid")
     columns.append(Column("rank", held.rank, "", "number of independent wrenches that hold the body"))
-    for k, name in enumerate(("free_x", "free_y", "free_phi")[:size]):
-        per = "" if k == 2 else units.label("length")
-        columns.append(
-            Column(name, held.free[:, k], per, "the free twist, per radian where it turns; nan where none is free")
-        )
+    free = zip(("free_x", "free_y", "free_phi"), held.free.T, (units.label("length"),) * 2 + ("",), strict=False)
+    for name, values, per in free:
+        columns.append(Column(name, values, per, "the free twist, per radian where it turns; nan where none is free"))
+    how = "serial legs: reciprocal screws [S4]; force method: any other"
     columns += shared(units, valid=valid)
-    columns.append(
-        Column(
-            "method", np.full(poses.count, method), "", "serial legs: reciprocal screws [S4]; force method: any other"
-        )
-    )
+    columns.append(Column("method", np.full(poses.count, method), "", how))
     return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
 
 
@@ -108,7 +105,7 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: float) -> Tabl
     twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
     repeat = np.repeat(np.arange(poses.count), 3)
     units = study.units
-    columns = [column.take(repeat) for column in pose_columns(study, poses)]
+    columns = pose_columns(study, poses, repeat)
     columns += [
         Column("mode", np.tile([1, 2, 3], poses.count), "", "softest first"),
         Column("stiffness", stiffness.ravel(), units.label("stiffness"), "eigenvalue of the scaled stiffness matrix"),
@@ -127,26 +124,18 @@ def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
     )
 
 
-def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Sequence[Springs]) -> Table:
+def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Springs) -> Table:
+    """``springs.csv``: a row a pose, leg and spring."""
     units = study.units
-    row = np.concatenate([s.row for s in springs] or [np.zeros(0, dtype=np.intp)])
-    leg = np.concatenate([s.leg for s in springs] or [np.zeros(0, dtype=np.intp)])
-    order = np.lexsort((leg, row))
-
-    def gather(name: str) -> Any:
-        return np.concatenate([getattr(s, name) for s in springs] or [np.zeros(0)])[order]
-
-    names = np.array([*legs] or [""])
-    place, angle = gather("place"), gather("angle")
     per_radian = units.label("rotational_stiffness")
-    columns = [column.take(row[order]) for column in pose_columns(study, poses)]
-    columns += [
-        Column("leg", names[leg[order]], "", "links of the leg, from the base"),
-        Column("stiffness", gather("stiffness"), units.label("stiffness"),
+    columns = [
+        *pose_columns(study, poses, springs.row),
+        Column("leg", np.array([*legs, ""])[springs.leg], "", "links of the leg, from the base"),
+        Column("stiffness", springs.stiffness, units.label("stiffness"),
                f"along its line, inf where rigid; where angle is nan about its point ({per_radian})"),
-        Column("x", np.real(place), units.label("length"), "a point on its line"),
-        Column("y", np.imag(place), units.label("length"), "a point on its line"),
-        Column("angle", angle / units.angle_factor, units.label("angle"), "direction of its line"),
+        Column("x", springs.place.real, units.label("length"), "a point on its line"),
+        Column("y", springs.place.imag, units.label("length"), "a point on its line"),
+        Column("angle", springs.angle / units.angle_factor, units.label("angle"), "direction of its line"),
     ]  # fmt: skip
     return Table("springs", tuple(columns), "springs that hold the body as its legs do")
 
@@ -157,7 +146,7 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
     moved = np.einsum("nij,lj->nli", soft, loads[:, :size]).reshape(-1, size)
     repeat = np.repeat(np.arange(poses.count), len(loads))
     applied = np.tile(loads, (poses.count, 1))
-    columns = [column.take(repeat) for column in pose_columns(study, poses)]
+    columns = pose_columns(study, poses, repeat)
     force, moment, length = units.label("force"), units.label("moment"), units.label("length")
     for k, (name, unit) in enumerate(zip(("fx", "fy", "mz")[:size], (force, force, moment), strict=False)):
         columns.append(Column(name, applied[:, k], unit, "load at the asked point"))
@@ -214,7 +203,7 @@ def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]
     """Pose columns and the number of the load, for so many rows of each."""
     repeat = np.repeat(np.arange(poses.count), loads * rows)
     return [
-        *(column.take(repeat) for column in pose_columns(study, poses)),
+        *pose_columns(study, poses, repeat),
         Column(
             "load", np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count), "", "which of the study's loads"
         ),
