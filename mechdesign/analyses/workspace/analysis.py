@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.analyses.columns import SHARED, shared
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.panels import SINGLE
 from mechdesign.analyses.region.regions import RAYS
@@ -27,7 +28,6 @@ from mechdesign.analyses.workspace.question import (
 from mechdesign.analyses.workspace.shown import poses_along
 from mechdesign.analyses.workspace.singularities import singular_everywhere
 from mechdesign.analyses.workspace.tables import (
-    PIECE,
     held_columns,
     inscribed_columns,
     left_out,
@@ -185,14 +185,11 @@ def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluati
 
 def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str]]:
     """Unit and meaning of each column of the answer."""
-    area = study.units.label("area")
     found = {
         "GII": ("", "mean of the inverse condition number over the region"),
         "GRI": (index("resistivity").unit(study, question.field), "mean of 1/abs(det J) over the region"),
-        "SUI": ("", "area of the region over that of the rectangle around it"),
-        "area": (area, "area of the region"),
-        "box_area": (area, "area of the rectangle around the region"),
     }
+    found |= {name: (study.units.label(SHARED[name][0]), SHARED[name][1]) for name in ("SUI", "area", "box_area")}
     for name in (name for name in question.wanted if name not in COLUMNS):
         declared, kind = index(split(name)[0]), split(name)[1]
         unit = declared.unit(study, question.field)
@@ -211,7 +208,7 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     node = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)) for grid in grids])
     ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
     patch = np.repeat(np.arange(len(grids)), [grid.size for grid in grids])
-    length, per_area = study.units.label("length"), power_of_length(study, determinant_power(question.field))
+    per_area = power_of_length(study, determinant_power(question.field))
     determinant = np.broadcast_to(local.determinant, z.shape)
     if question.field.same_assembly:
         # It has one sign all over a patch; at a tip where no node is off the boundary rounding would choose another.
@@ -224,13 +221,12 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     ]  # fmt: skip
     return [
         *held_columns(study, question, len(z)),
-        Column("x", z.real, length, "place of the point"),
-        Column("y", z.imag, length, "place of the point"),
+        *shared(study.units, x=z.real, y=z.imag),
         *columns[:2],
         Column("det_J", determinant, per_area, "determinant of the Jacobian, per radian"),
         *columns[2:],
         Column("patch", patch, "", "part of the region between two boundary curves"),
         Column("ray", ray, "", "ray of the patch's grid"),
         Column("node", node, "", "node along the ray, from the inner to the outer boundary"),
-        Column("piece", np.repeat([patch.piece for patch in found], [grid.size for grid in grids]), "", PIECE),
+        *shared(study.units, piece=np.repeat([patch.piece for patch in found], [grid.size for grid in grids])),
     ]

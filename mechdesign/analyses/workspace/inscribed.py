@@ -26,8 +26,8 @@ CELLS, TRIALS = 96, 4
 # Places of a border that are always looked at, those of rectangles at its corners, too; and those added beside each of
 # the lowest at which a margin is smallest.
 PLACES, CONTACTS, CLOSER = 64, 12, np.linspace(-1, 1, 9)
-# Rounds of growing, how far one may move (parts of the region's size), and how far a border may lie outside: then nothing
-# is left to gain, and at the last.
+# Rounds of growing, how far one may move (parts of the region's size); what a border may lie outside and a round may
+# still gain at the end, and how far it may lie outside after all rounds.
 ROUNDS, LEAP, DEPTH, LATE = 24, 0.06, 1e-9, 1e-7
 # A curve shorter than this part of the longest is a point; a trial not nearly as good as the best so far is left.
 POINT, HOPEFUL = 1e-6, 0.8

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.panels import Effort
@@ -72,9 +73,7 @@ def reachable(study: Study, progress: Progress) -> Result:
     area, error = values["area"], np.concatenate([given.errors["area"] for given in answers])
     indices = (
         *stacked([held_columns(study, question, 1) for question in asked]),
-        Column("SUI", values["SUI"], "", "area of the region over that of the rectangle around it"),
-        Column("area", area, square, "area of the region"),
-        Column("box_area", values["box_area"], square, "area of the rectangle around the region"),
+        *shared(study.units, **values),
         Column("area_error", error, square, "estimated error of area"),
     )
     tables = [

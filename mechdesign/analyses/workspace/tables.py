@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch
 from mechdesign.analyses.workspace.inscribed import INSCRIBED
@@ -19,7 +21,6 @@ from mechdesign.study import Study
 
 # So far inside the boundary (as a part of the radius) the drives are read where rounding opens the mechanism.
 BESIDE = 1e-12
-PIECE = "piece of the region: 1 is the sketch's, or else the largest"
 
 
 def where(question: Question) -> str:
@@ -50,10 +51,9 @@ def held_columns(study: Study, question: Question, rows: int) -> list[Column]:
 def stacked(parts: Sequence[Sequence[Column]]) -> tuple[Column, ...]:
     """Columns of several regions below each other."""
     return tuple(
-        Column(columns[0].name, np.concatenate([column.values for column in columns]), columns[0].unit,
-               columns[0].meaning)
+        replace(columns[0], values=np.concatenate([column.values for column in columns]))
         for columns in zip(*parts, strict=True)
-    )  # fmt: skip
+    )
 
 
 def boundary_columns(
@@ -83,19 +83,15 @@ def boundary_columns(
     inwards, turn = np.where(side == "inner", 1.0, -1.0), np.exp(1j * theta)
     z = np.asarray(question.about + radius * turn)
     within = np.asarray(question.about + radius * (1 + BESIDE * inwards) * turn)
-    length, angle = study.units.label("length"), study.units.label("angle")
+    angle = study.units.label("angle")
     kinds = np.array([kind for kind, _ in question.field.labels])
     return [
         *held_columns(study, question, len(z)),
-        Column("x", z.real, length, "place of the point"),
-        Column("y", z.imag, length, "place of the point"),
-        Column("kind", kinds[margin], "", "what ends the region: limit or singularity"),
+        *shared(study.units, x=z.real, y=z.imag, kind=kinds[margin]),
         *also(z, within, inwards, margin),
-        Column("at", np.array(told)[margin], "", "which limit or singularity"),
+        *shared(study.units, at=np.array(told)[margin]),
         Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
-        Column("side", side, "", "which end of the ray's interval"),
-        Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth part of the boundary"),
-        Column("piece", piece, "", PIECE),
+        *shared(study.units, side=side, curve=np.repeat(np.arange(len(curves)), lengths), piece=piece),
     ]
 
 
@@ -110,7 +106,7 @@ def piece_columns(
     z = np.array([patch.middle(question.about) for patch in widest])
     return [
         *held_columns(study, question, len(z)),
-        Column("piece", number, "", PIECE),
+        *shared(study.units, piece=number),
         Column("area", np.array(areas), study.units.label("area"), "area of the piece"),
         Column("x", z.real, length, "a place inside the piece"),
         Column("y", z.imag, length, "a place inside the piece"),
@@ -123,7 +119,6 @@ def singularity_columns(study: Study, question: Question, found: Sequence[Patch]
     loci = [*inside(question.field, question.about, found), *around(question.field, question.about, found)]
     lengths = [len(locus.points) for locus in loci]
     z = np.concatenate([np.zeros(0, dtype=complex), *(locus.points for locus in loci)])
-    length = study.units.label("length")
 
     def each(values: Sequence[str]) -> NDArray[np.str_]:
         return np.repeat(np.array(values, dtype=str), lengths)
@@ -133,8 +128,7 @@ def singularity_columns(study: Study, question: Question, found: Sequence[Patch]
         Column("curve", np.repeat(np.arange(len(loci)), lengths), "", "points of one curve, in order"),
         Column("kind", each([locus.kind for locus in loci]), "",
                "forward: the drives do not hold the mechanism; inverse: a leg is stretched or folded"),
-        Column("x", z.real, length, "place of the point"),
-        Column("y", z.imag, length, "place of the point"),
+        *shared(study.units, x=z.real, y=z.imag),
         Column("cause", each([locus.cause for locus in loci]), "", "which links, and what they do there"),
     ]  # fmt: skip
 
