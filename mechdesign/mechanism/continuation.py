@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, angle_of, wrap
-from mechdesign.mechanism.newton import STEPS
-from mechdesign.mechanism.state import State
+from mechdesign.mechanism.state import STEPS, State
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 

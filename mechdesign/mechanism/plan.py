@@ -15,9 +15,8 @@ from mechdesign.mechanism.configuration import Configuration, Reason, hide, join
 from mechdesign.mechanism.continuation import Start, follow, unknowns_of
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
-from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
-from mechdesign.mechanism.state import State, Unknowns, start_state
+from mechdesign.mechanism.state import CONVERGED, STEPS, State, Unknowns, start_state
 from mechdesign.mechanism.structure import Structure
 from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -84,9 +83,9 @@ class Plan:
     ) -> State:
         """Solve all groups, in the assembly as drawn unless `modes` says another."""
         state = start_state(self.core.graph, self.structure, vectors, given)
-        state.beyond = beyond
-        size = self.core.size if self.iterative else 1.0
-        return run(state, self.modes if modes is None else modes, guess, given, size, steps, enough)
+        state.steps, state.enough, state.beyond = steps, enough, beyond
+        state.size = self.core.size if self.iterative else 1.0
+        return run(state, self.modes if modes is None else modes, guess)
 
     def start(self, at: Configuration | None) -> Start:
         """A solved pose to continue from; the sketch where left out."""

@@ -73,13 +73,14 @@ def _fold(
         """Everything up to the group, with its unknowns and the coordinate in their own scales."""
         values = at(unknowns[-1])
         state = start_state(plan.core.graph, plan.structure, near.vectors, values)
-        run(state, plan.modes_at(values)[:index], guess, values, size)
+        state.size = size
+        run(state, plan.modes_at(values)[:index], guess)
         set_unknowns(state, group, unknowns[:-1] * weights)
         return state
 
     def system(unknowns: Floats) -> tuple[Floats, float]:
         """Errors of the group's equations and their determinant, lengths in parts of the mechanism's size."""
-        rows, right = equations(state_at(unknowns), group, at(unknowns[-1]))
+        rows, right = equations(state_at(unknowns), group)
         matrix = np.array(rows, dtype=float) * weights / size
         return np.array(right, dtype=float) / size, float(np.linalg.det(matrix))
 
@@ -94,4 +95,4 @@ def _fold(
         return None
     value, state = float(answer.x[-1]), state_at(answer.x)
     state.place(group)
-    return value, run(state, plan.modes_at(at(value)), guess, at(value), size, begin=index + 1)
+    return value, run(state, plan.modes_at(at(value)), guess, begin=index + 1)
