@@ -55,7 +55,6 @@ def study_poses(study: Study, section: str) -> Poses:
     StudyError
         Where nothing sensible can be assumed.
     """
-    turn = TURN / study.units.angle_factor
     for name in dict.fromkeys((section, "kinematics")):
         asked: PoseSection | None = getattr(study, name)
         if asked is not None and asked.at_nodes:
@@ -64,10 +63,10 @@ def study_poses(study: Study, section: str) -> Poses:
 
             return workspace_nodes(study)
         if asked is not None:
-            found = expand(asked, study.path.parent if study.path else Path(), turn)
+            found = expand(asked, study.path.parent if study.path else Path())
             if found is not None:
                 return found
-    return default(study.mechanism.description, turn)
+    return default(study.mechanism.description)
 
 
 def radians(study: Study, coordinate: Coordinate, value: Value) -> Value:
@@ -178,13 +177,12 @@ def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | No
     return drawn(mechanism, dimensions(poses, designs * each)).take(which.reshape(rows.shape))
 
 
-def pose_columns(study: Study, poses: Poses) -> list[Column]:
-    """The coordinates that the study gives, as columns."""
-    columns = []
-    for name, values in poses.values.items():
-        quantity = study.mechanism.quantity(name)
-        columns.append(Column(name, values, study.units.label(quantity), "given"))
-    return columns
+def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -> list[Column]:
+    """The coordinates that the study gives, as columns; of these rows of the poses."""
+    return [
+        Column(name, values[rows], study.units.label(study.mechanism.quantity(name)), "given")
+        for name, values in poses.values.items()
+    ]
 
 
 def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tuple[list[str], str]:

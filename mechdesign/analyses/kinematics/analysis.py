@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary, motion_limits
 from mechdesign.analyses.kinematics.lines import PoseLine
@@ -206,7 +207,7 @@ def jacobian_table(motion: Motion) -> Table:
             name = entry(output, drive)
             meaning = f"derivative of {output.name} by {drive.name}, angles in radians"
             columns.append(Column(name, motion.arrays[name], _per(question.study, output, drive), meaning))
-    columns.append(Column("valid", motion.valid, meaning="1 where the pose is assembled and within its limits"))
+    columns += shared(question.study.units, valid=motion.valid)
     return Table("jacobian", tuple(columns), "derivatives of the listed outputs by the drives, per radian")
 
 

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.targets import Error, errors, needed
 from mechdesign.analyses.poses import (
@@ -264,8 +265,7 @@ class Motion:
             if name in arrays:
                 unit = label("moment" if drive.quantity == "angle" else "force")
                 columns.append(Column(name, arrays[name], unit, "drive effort that balances the loads"))
-        columns.append(Column("valid", self.valid, meaning="1 where the pose is assembled and within its limits"))
-        return columns
+        return [*columns, *shared(self.question.study.units, valid=self.valid)]
 
     def pose_columns(self) -> list[Column]:
         """The drives, and the coordinates that the study gives."""

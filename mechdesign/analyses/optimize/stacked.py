@@ -14,7 +14,7 @@ from mechdesign.analyses.kinematics.motion import Motion, motion_question, move
 from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
-from mechdesign.expressions import Expression, is_linear
+from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Flags
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -104,7 +104,7 @@ def _first_order(study: Study, names: Collection[str]) -> bool:
     reached = {name for name in section.dimensions if name in study.parameters.nominal}
     for name, formula in {**study.parameters.formulas, **study.parameters.dependent}.items():
         if formula.names & reached:
-            if not is_linear(formula) or name in names:
+            if not formula.is_linear() or name in names:
                 return False
             reached.add(name)
     return True
