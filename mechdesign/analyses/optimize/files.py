@@ -14,8 +14,7 @@ from mechdesign.analyses.optimize.variables import in_words
 from mechdesign.errors import MechdesignError
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
-from mechdesign.study.rewriting import rewritten
-from mechdesign.study.variants import changed_data, variant
+from mechdesign.study.variants import changed_data, rewritten, variant
 
 
 def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
