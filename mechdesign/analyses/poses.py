@@ -177,13 +177,12 @@ def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | No
     return drawn(mechanism, dimensions(poses, designs * each)).take(which.reshape(rows.shape))
 
 
-def pose_columns(study: Study, poses: Poses) -> list[Column]:
-    """The coordinates that the study gives, as columns."""
-    columns = []
-    for name, values in poses.values.items():
-        quantity = study.mechanism.quantity(name)
-        columns.append(Column(name, values, study.units.label(quantity), "given"))
-    return columns
+def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -> list[Column]:
+    """The coordinates that the study gives, as columns; of some poses, by their numbers."""
+    return [
+        Column(name, values[rows], study.units.label(study.mechanism.quantity(name)), "given")
+        for name, values in poses.values.items()
+    ]
 
 
 def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tuple[list[str], str]:

@@ -70,7 +70,8 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
 
     worst = 0
     owners: dict[str, Path | None] = {}
-    for path in paths or [None]:
+    asked: Sequence[Path | None] = paths or [None]
+    for path in asked:
         try:
             study = load_study(path, options)
             label = study.label
@@ -84,7 +85,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 from mechdesign.report.writer import write_sketch
 
                 claim(owners, study)
-                directory = folder(study, "check", options, several=len(paths or ()) > 1)
+                directory = folder(study, "check", options, several=len(asked) > 1)
                 terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
         except Exception as error:
             code, message = explain(error)

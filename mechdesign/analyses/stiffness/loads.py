@@ -139,7 +139,7 @@ def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]
     """Pose columns and the number of the load, for so many rows of each."""
     repeat = np.repeat(np.arange(poses.count), loads * rows)
     return [
-        *(column.take(repeat) for column in pose_columns(study, poses)),
+        *pose_columns(study, poses, repeat),
         Column(
             "load", np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count), "", "which of the study's loads"
         ),

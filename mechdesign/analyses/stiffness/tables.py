@@ -107,7 +107,7 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: float) -> Tabl
     twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
     repeat = np.repeat(np.arange(poses.count), 3)
     units = study.units
-    columns = [column.take(repeat) for column in pose_columns(study, poses)]
+    columns = pose_columns(study, poses, repeat)
     columns += [
         Column("mode", np.tile([1, 2, 3], poses.count), "", "softest first"),
         Column("stiffness", stiffness.ravel(), units.label("stiffness"), "eigenvalue of the scaled stiffness matrix"),
@@ -138,7 +138,7 @@ def springs_table(study: Study, poses: Poses, legs: Sequence[Leg], springs: Sequ
     names = np.array([leg.name for leg in legs] or [""])
     place, angle = gather("place"), gather("angle")
     per_radian = units.label("rotational_stiffness")
-    columns = [column.take(row[order]) for column in pose_columns(study, poses)]
+    columns = pose_columns(study, poses, row[order])
     columns += [
         Column("leg", names[leg[order]], "", "links of the leg, from the base"),
         Column("stiffness", gather("stiffness"), units.label("stiffness"),
@@ -156,7 +156,7 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
     moved = np.einsum("nij,lj->nli", soft, loads[:, :size]).reshape(-1, size)
     repeat = np.repeat(np.arange(poses.count), len(loads))
     applied = np.tile(loads, (poses.count, 1))
-    columns = [column.take(repeat) for column in pose_columns(study, poses)]
+    columns = pose_columns(study, poses, repeat)
     force, moment, length = units.label("force"), units.label("moment"), units.label("length")
     for k, (name, unit) in enumerate(zip(("fx", "fy", "mz")[:size], (force, force, moment), strict=False)):
         columns.append(Column(name, applied[:, k], unit, "load at the asked point"))
