@@ -178,7 +178,7 @@ def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | No
 
 
 def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -> list[Column]:
-    """The coordinates that the study gives, as columns; of some poses, by their numbers."""
+    """The coordinates that the study gives, as columns; of these rows of the poses."""
     return [
         Column(name, values[rows], study.units.label(study.mechanism.quantity(name)), "given")
         for name, values in poses.values.items()

@@ -10,13 +10,18 @@ import numpy as np
 
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.kinematics import targets
-from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.extremes import extremes, needed
+from mechdesign.analyses.kinematics.boundaries import Boundary, motion_limits
 from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
-from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, characteristic_length, entry, motion_question
-from mechdesign.analyses.kinematics.motion_limits import motion_limits
-from mechdesign.analyses.kinematics.moving import move
+from mechdesign.analyses.kinematics.motion import (
+    Motion,
+    MotionQuestion,
+    characteristic_length,
+    entry,
+    motion_question,
+    move,
+)
+from mechdesign.analyses.kinematics.peaks import extremes, needed
 from mechdesign.analyses.poses import judge_failures, pose_in_words
 from mechdesign.analyses.shown import Keeper, Shown
 from mechdesign.errors import Problem, StudyError

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.error_limits import Channel
+from mechdesign.analyses.reliability.question import Channel
 from mechdesign.analyses.stiffness.analysis import Body
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value

@@ -13,7 +13,7 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.error_limits import Channel
+from mechdesign.analyses.reliability.question import Channel
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
@@ -103,6 +103,13 @@ class FirstOrder:
         )
         offset = 0.0 if self.offset is None else self.offset
         return np.minimum(low, high).sum(axis=1) + offset, np.maximum(low, high).sum(axis=1) + offset
+
+
+def correlation(covariance: Floats) -> Floats:
+    """Correlation of two errors, of shape (..., 2, 2); nan where one does not vary [S2, eq. 11, prints its inverse]."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        product = np.sqrt(covariance[..., 0, 0] * covariance[..., 1, 1])
+        return np.asarray(np.where(product > 0, covariance[..., 0, 1] / product, np.nan))
 
 
 def nominal_values(

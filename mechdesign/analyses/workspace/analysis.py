@@ -12,7 +12,7 @@ from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.panels import SINGLE
 from mechdesign.analyses.region.regions import RAYS
 from mechdesign.analyses.workspace.index import determinant_power, power_of_length, prepare
-from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
+from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
@@ -38,6 +38,7 @@ from mechdesign.analyses.workspace.tables import (
 )
 from mechdesign.errors import AssemblyError
 from mechdesign.indices import index
+from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -77,7 +78,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     answers: list[Evaluation] = []
     local: list[list[Column]] = []
     regions: list[tuple[Study, Question, list[Patch]]] = []
-    shapes: list[tuple[Circle, Rectangle]] = []
+    shapes: list[Floats] = []
     pieces: list[list[Column]] = []
     several = False
     warnings: list[str] = []
@@ -100,7 +101,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             others = [patch for patch in found if patch not in counted]
             shapes.append(inscribed(question.field, question.about, question.scan, counted, others))
             regions.append((study, question, found))
-            if not np.isfinite([shapes[-1][0].radius, shapes[-1][1].width]).all():
+            if not np.isfinite(shapes[-1]).all():
                 warnings.append(
                     f"the largest circle or rectangle inside the region{where(question)} was not found: where a limit "
                     "jumps (an angle's turn ends there) no slope leads along the boundary"
@@ -111,7 +112,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             if others:
                 warnings.append(left_out(study, question, areas, drawn))
         else:
-            shapes.append((NO_CIRCLE, NO_RECTANGLE))
+            shapes.append(np.full(len(INSCRIBED), np.nan))
         progress.update(1)
     if not local:
         raise AssemblyError(_unreachable(study, asked))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch
-from mechdesign.analyses.workspace.inscribed import Circle, Rectangle
+from mechdesign.analyses.workspace.inscribed import INSCRIBED
 from mechdesign.analyses.workspace.question import Question
 from mechdesign.analyses.workspace.singularities import around, causes, inside
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
@@ -130,19 +130,16 @@ def singularity_columns(study: Study, question: Question, found: Sequence[Patch]
     ]  # fmt: skip
 
 
-def inscribed_columns(study: Study, shapes: Sequence[tuple[Circle, Rectangle]]) -> list[Column]:
-    """The largest circle and rectangle inside each region; nan where it is empty."""
+def inscribed_columns(study: Study, shapes: Sequence[Floats]) -> list[Column]:
+    """The largest circle and rectangle inside each region, as `inscribed` gives them; nan where it is empty."""
     length = study.units.label("length")
-    circles, rectangles = [shape[0] for shape in shapes], [shape[1] for shape in shapes]
-    circle, rectangle = "the largest circle inside the region", "the largest axis-parallel rectangle inside the region"
+    shape = {"circle": "the largest circle", "rectangle": "the largest axis-parallel rectangle"}
+    told = {"x": "centre", "y": "centre", "radius": "radius", "width": "width", "height": "height"}
     return [
-        Column("circle_x", np.array([c.centre.real for c in circles]), length, f"centre of {circle}"),
-        Column("circle_y", np.array([c.centre.imag for c in circles]), length, f"centre of {circle}"),
-        Column("circle_radius", np.array([c.radius for c in circles]), length, f"radius of {circle}"),
-        Column("rectangle_x", np.array([r.centre.real for r in rectangles]), length, f"centre of {rectangle}"),
-        Column("rectangle_y", np.array([r.centre.imag for r in rectangles]), length, f"centre of {rectangle}"),
-        Column("rectangle_width", np.array([r.width for r in rectangles]), length, f"width of {rectangle}"),
-        Column("rectangle_height", np.array([r.height for r in rectangles]), length, f"height of {rectangle}"),
+        Column(
+            name, values, length, f"{told[name.partition('_')[2]]} of {shape[name.partition('_')[0]]} inside the region"
+        )
+        for name, values in zip(INSCRIBED, np.transpose(shapes), strict=True)
     ]
 
 
