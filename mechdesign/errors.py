@@ -90,6 +90,8 @@ class Interrupted(KeyboardInterrupt):
     Not a `MechdesignError`: who expects those does not expect to be interrupted.
     """
 
+    exit_code = 130
+
     def __init__(self, result: Result) -> None:
         self.result = result
         super().__init__(result.interrupted)

@@ -134,38 +134,45 @@ class Expression:
         Plain floats give a float and raise ExpressionError where there is no finite value; arrays give an array with
         nan or inf there.
         """
-        stack: list[Any] = []
-        with np.errstate(all="ignore"):
-            for kind, item in self.program:
-                if kind == "constant":
-                    stack.append(item)
-                elif kind == "name":
-                    stack.append(self._variable(env, str(item)))
-                else:
-                    count = arity(str(item))
-                    arguments = stack[-count:]
-                    del stack[-count:]
-                    stack.append(self._apply(str(item), arguments))
-        result: Number = stack[0]
+        result: Number = self._run(float, lambda name: self._variable(env, name), self._apply)
         if type(result) is float and not math.isfinite(result) and not _has_nan(env, self.names):
             raise ExpressionError(f"{self.text!r} has no finite value")
         return result
 
     def derivatives(self, env: Mapping[str, ArrayLike]) -> dict[str, Number]:
         """Exact partial derivative with respect to every variable, at the values of `env` (forward mode)."""
-        stack: list[tuple[Any, dict[str, Any]]] = []
+        _, partials = self._run(
+            lambda value: (value, {}), lambda name: (self._variable(env, name), {name: 1.0}), self._differentiate
+        )
+        return {name: _plain(value) for name, value in partials.items()}
+
+    def is_linear(self) -> bool:
+        """Whether the derivatives are the same everywhere, as the form shows."""
+
+        def degree(function: str, inner: list[int]) -> int:
+            if function in ("+", "-", "negate"):
+                return max(inner)
+            if function == "*":
+                return sum(inner)
+            # A quotient by a constant is linear; all else of a variable counts as not.
+            return inner[0] if function == "/" and not inner[1] else 2 * max(inner)
+
+        found: int = self._run(lambda value: 0, lambda name: 1, degree)
+        return found <= 1
+
+    def _run(
+        self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[str, list[Any]], Any]
+    ) -> Any:
+        """What the program leaves on the stack, where constants, variables and calls mean these."""
+        stack: list[Any] = []
         with np.errstate(all="ignore"):
             for kind, item in self.program:
-                if kind == "constant":
-                    stack.append((item, {}))
-                elif kind == "name":
-                    stack.append((self._variable(env, str(item)), {str(item): 1.0}))
-                else:
+                if kind == "call":
                     count = arity(str(item))
-                    arguments = stack[-count:]
-                    del stack[-count:]
-                    stack.append(self._differentiate(str(item), arguments))
-        return {name: _plain(value) for name, value in stack[0][1].items()}
+                    stack[-count:] = [call(str(item), stack[-count:])]
+                else:
+                    stack.append(constant(float(item)) if kind == "constant" else variable(str(item)))
+        return stack[0]
 
     def _variable(self, env: Mapping[str, ArrayLike], name: str) -> Number:
         try:
@@ -216,26 +223,6 @@ def arity(name: str) -> int:
     if name in ("min", "max") or name in _BINDING:
         return 2
     return _ARITY.get(name, 1)
-
-
-def is_linear(expression: Expression) -> bool:
-    """Whether the derivatives of an expression are the same everywhere, as its form shows."""
-    degrees: list[int] = []
-    for kind, item in expression.program:
-        if kind != "call":
-            degrees.append(int(kind == "name"))
-            continue
-        count = arity(str(item))
-        inner = degrees[-count:]
-        del degrees[-count:]
-        if item in ("+", "-", "negate"):
-            degrees.append(max(inner))
-        elif item == "*":
-            degrees.append(sum(inner))
-        else:
-            # A quotient by a constant is linear; all else of a variable counts as not.
-            degrees.append(inner[0] if item == "/" and not inner[1] else 2 * max(inner))
-    return degrees[0] <= 1
 
 
 def _has_nan(env: Mapping[str, ArrayLike], names: frozenset[str]) -> bool:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Protocol
 
-
-class Progress(Protocol):
-    """Receives how far a computation is; numerics call it and never ask who listens."""
+class Progress:
+    """Receives how far a computation is; numerics call it and never ask who listens. This one listens to nothing."""
 
     def start(self, total: int, what: str) -> None:
         """Begin a stage of `total` steps named `what`; ends the stage before it."""
@@ -15,14 +13,4 @@ class Progress(Protocol):
         """`n` more steps are done."""
 
 
-class NullProgress:
-    """Listens to nothing."""
-
-    def start(self, total: int, what: str) -> None:
-        """Ignore the stage."""
-
-    def update(self, n: int) -> None:
-        """Ignore the steps."""
-
-
-NULL = NullProgress()
+NULL = Progress()

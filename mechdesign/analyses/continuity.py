@@ -9,10 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import wrap
+from mechdesign.mechanism.algebra import TURN, wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.turns import TURN
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.poses import Poses
 

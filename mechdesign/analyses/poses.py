@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from mechdesign.analyses.continuity import continuous
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
-from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.algebra import TURN, Value
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.turns import TURN, angles_of
 from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.parallel import map_chunks
@@ -56,7 +55,6 @@ def study_poses(study: Study, section: str) -> Poses:
     StudyError
         Where nothing sensible can be assumed.
     """
-    turn = TURN / study.units.angle_factor
     for name in dict.fromkeys((section, "kinematics")):
         asked: PoseSection | None = getattr(study, name)
         if asked is not None and asked.at_nodes:
@@ -65,10 +63,10 @@ def study_poses(study: Study, section: str) -> Poses:
 
             return workspace_nodes(study)
         if asked is not None:
-            found = expand(asked, study.path.parent if study.path else Path(), turn)
+            found = expand(asked, study.path.parent if study.path else Path())
             if found is not None:
                 return found
-    return default(study.mechanism.description, turn)
+    return default(study.mechanism.description)
 
 
 def radians(study: Study, coordinate: Coordinate, value: Value) -> Value:
@@ -179,13 +177,12 @@ def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | No
     return drawn(mechanism, dimensions(poses, designs * each)).take(which.reshape(rows.shape))
 
 
-def pose_columns(study: Study, poses: Poses) -> list[Column]:
-    """The coordinates that the study gives, as columns."""
-    columns = []
-    for name, values in poses.values.items():
-        quantity = study.mechanism.quantity(name)
-        columns.append(Column(name, values, study.units.label(quantity), "given"))
-    return columns
+def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -> list[Column]:
+    """The coordinates that the study gives, as columns; of these rows of the poses."""
+    return [
+        Column(name, values[rows], study.units.label(study.mechanism.quantity(name)), "given")
+        for name, values in poses.values.items()
+    ]
 
 
 def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tuple[list[str], str]:

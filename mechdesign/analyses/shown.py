@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from mechdesign.analyses.poses import SolvedPoses, radians, study_poses
 from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.configuration import joined
 from mechdesign.numerics.arrays import Ints
 from mechdesign.study import Poses, Study
 
@@ -49,7 +49,10 @@ class Keeper:
     @property
     def shown(self) -> Shown:
         """All that was kept."""
-        return Shown(self.study, self.poses, _rows(self.poses, MOST_POSES), _joined(self._parts))
+        rows, whole = _rows(self.poses, MOST_POSES), self._parts[0]
+        if len(self._parts) > 1:
+            whole = joined(self._parts, rows.shape, whole.take(0).vectors, {})
+        return Shown(self.study, self.poses, rows, whole)
 
 
 def solve_shown(study: Study, most: int = MOST_POSES) -> Shown:
@@ -70,16 +73,3 @@ def solve_shown(study: Study, most: int = MOST_POSES) -> Shown:
 def _rows(poses: Poses, most: int) -> Ints:
     rows = poses.groups[0].rows
     return rows[np.unique(np.linspace(0, len(rows) - 1, most).round().astype(np.intp))]
-
-
-def _joined(parts: Sequence[Configuration]) -> Configuration:
-    """Poses of one mechanism in one batch."""
-    if len(parts) == 1:
-        return parts[0]
-    nodes, rotations, slides, closures = (
-        [np.concatenate(values) for values in zip(*(getattr(part, name) for part in parts), strict=True)]
-        for name in ("nodes", "rotations", "slides", "closures")
-    )
-    reason = np.concatenate([part.reason for part in parts])
-    vectors = parts[0].take(0).vectors
-    return Configuration(parts[0].graph, vectors, reason.shape, nodes, rotations, slides, closures, reason, {})

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -13,9 +14,9 @@ import typer
 
 from mechdesign.cli import options as given
 from mechdesign.cli.execution import BUILT_IN
-from mechdesign.cli.failure import guard
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
+from mechdesign.errors import Interrupted, explain
 
 app = typer.Typer(
     name="mechdesign",
@@ -29,6 +30,22 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+@contextmanager
+def _guard() -> Iterator[None]:
+    """Turn what is raised inside into a message on stderr and an exit code; nobody sees a traceback."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        print("interrupted; what was finished is whole", file=sys.stderr)
+        raise typer.Exit(Interrupted.exit_code) from None
+    except typer.Exit:
+        raise
+    except Exception as error:
+        code, message = explain(error)
+        print(message, file=sys.stderr)
+        raise typer.Exit(code) from None
 
 
 def _show_version(wanted: bool) -> None:
@@ -52,7 +69,7 @@ def _add(name: str, run: Callable[[Any, Options], int], takes: Sequence[Paramete
     """Add a command: what it runs with its study or studies and its options, these, and its help."""
 
     def command(**said: Any) -> None:
-        with guard():
+        with _guard():
             raise typer.Exit(run(said.pop("study"), Options(**said)))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
@@ -106,7 +123,7 @@ def new(
     ] = None,
 ) -> None:
     """Print a commented study to start from."""
-    with guard():
+    with _guard():
         from mechdesign.cli.terminal import emit
         from mechdesign.study import template as template_text
 
@@ -116,7 +133,7 @@ def new(
 @app.command("schema", short_help="Print the JSON Schema of the study file.")
 def schema() -> None:
     """Print the JSON Schema of the study file, with which editors complete and check it."""
-    with guard():
+    with _guard():
         import json
 
         from mechdesign.cli.terminal import emit

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import Outcome, answer, claim, folder, load_study, tell
-from mechdesign.cli.failure import INTERRUPTED
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import StudyError, explain
+from mechdesign.errors import Interrupted, StudyError, explain
 from mechdesign.threads import one_thread
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ _OUTCOMES = {
     2: "wrong study",
     3: "cannot be assembled",
     4: "failed",
-    INTERRUPTED: "interrupted",
+    Interrupted.exit_code: "interrupted",
 }
 
 
@@ -52,13 +51,13 @@ def run(paths: Sequence[Path], options: Options) -> int:
                 break
     except KeyboardInterrupt:
         terminal.say("interrupted; what was finished is whole")
-        answers.append(Outcome("", "", Path(), INTERRUPTED, 0, failed="interrupted"))
+        answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
     terminal.show(_summary(answers), as_json=options.json)
     if options.junit is not None:
         from mechdesign.cli.junit import to_xml
-        from mechdesign.report.writer import write_text
+        from mechdesign.report.writer import write_file
 
-        write_text(options.junit, to_xml(answers))
+        write_file(options.junit, to_xml(answers).encode())
     return max(given.exit_code for given in answers)
 
 

@@ -18,7 +18,7 @@ def check_studies(paths: Sequence[Path | None], options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     from mechdesign.mechanism.describe import describe
     from mechdesign.report.requirements import foresee
-    from mechdesign.study.schema.reliability_checks import in_words
+    from mechdesign.study.schema.reliability import in_words
 
     worst = 0
     owners: dict[str, Path | None] = {}

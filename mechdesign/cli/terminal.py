@@ -8,8 +8,11 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from mechdesign.progress import Progress
+
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import Progress as Shown
+    from rich.progress import TaskID
 
     from mechdesign.results import Table
 
@@ -84,13 +87,13 @@ def _show_to_people(table: Table, rest: str) -> None:
         console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest else ''}"), style="dim")
 
 
-class Bar:
+class Bar(Progress):
     """A progress bar on stderr, which appears only on a terminal and only after a second."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._wanted = not quiet and sys.stderr.isatty()
         self._begun = time.monotonic()
-        self._bar: Progress | None = None
+        self._bar: Shown | None = None
         self._task: TaskID | None = None
         self._total = self._done = 0
         self._what = ""
@@ -125,13 +128,13 @@ class Bar:
         from rich.progress import (
             BarColumn,
             MofNCompleteColumn,
-            Progress,
             TaskProgressColumn,
             TextColumn,
             TimeRemainingColumn,
         )
+        from rich.progress import Progress as Shown
 
-        self._bar = Progress(
+        self._bar = Shown(
             TextColumn("{task.description}"),
             BarColumn(),
             TaskProgressColumn(),

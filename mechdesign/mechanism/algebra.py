@@ -11,6 +11,8 @@ from mechdesign.numerics.arrays import Floats
 # A scalar or an array that broadcasts against the batch; scalars stay scalars, which keeps constants cheap.
 Value = Any
 
+TURN = 2 * np.pi
+
 # Decorator: what is not a number at a singularity or in a pose that fails is told by its value, not by warnings.
 quiet = np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
@@ -37,6 +39,14 @@ def plus(total: Value, sign: int, term: Value) -> Value:
     if isinstance(total, float | complex) and total == 0:
         return term if sign > 0 else -1.0 * term
     return total + term if sign > 0 else total - term
+
+
+def times(a: Value, b: Value) -> Value:
+    """Product without a pass over an array where one factor is plainly 0 or 1."""
+    for one, other in ((a, b), (b, a)):
+        if isinstance(one, float) and one in (0.0, 1.0):
+            return 0.0 if one == 0.0 else other
+    return a * b
 
 
 def vector(x: Value, y: Value) -> Value:
@@ -71,3 +81,8 @@ def angle_of(z: Value) -> Floats:
 def wrap(angle: Value) -> Value:
     """Angle brought into (-pi, pi]."""
     return np.pi - np.mod(np.pi - angle, 2 * np.pi)
+
+
+def nearest(angle: Value, near: Value) -> Value:
+    """An angle in the turn in which it lies within half a turn of `near`."""
+    return angle + TURN * np.round((near - angle) / TURN)

@@ -10,13 +10,11 @@ from itertools import product
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import wrap
+from mechdesign.mechanism.algebra import Value, wrap
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.state import Guess
-from mechdesign.mechanism.structure import Group
+from mechdesign.mechanism.sketch import deciding_joints
 
 # Bound of the assemblies that are listed and followed.
 MOST = 256
@@ -44,15 +42,6 @@ class Assembly:
     label: str
     mechanism: Mechanism
     drawn: bool
-
-
-def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
-    """Names of the joints whose place the assembly mode of a group chooses; those of slides where it has no other."""
-    edges = [graph.edges[k] for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)]
-    ends = {node for loop in group.loops for node in (loop.start, loop.end)}
-    inner = [node for edge in edges for node in (edge.tail, edge.head) if node not in ends]
-    names = [graph.nodes[node] for node in dict.fromkeys(inner) if ":" not in graph.nodes[node]]
-    return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)
 
 
 def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, ...]:
@@ -116,14 +105,10 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
     given = [np.asarray(sketch.value(coordinate), dtype=float) for coordinate in plan.structure.given]
     random = np.random.default_rng(0)
     size = plan.core.size
-    guess: Guess = {
-        index: (
-            [random.uniform(-np.pi, np.pi, STARTS) for _ in group.angles],
-            [random.uniform(-2 * size, 2 * size, STARTS) for _ in (*group.slides, *group.bases, *group.bases)],
-        )
-        for index, group in enumerate(plan.structure.groups)
-        if group.form == "newton"
-    }
+    guess: list[Value] = []
+    for group in (plan.structure.groups[index] for index in plan.structure.unknowns):
+        guess += [random.uniform(-np.pi, np.pi, STARTS) for _ in group.angles]
+        guess += [random.uniform(-2 * size, 2 * size, STARTS) for _ in (*group.slides, *group.bases, *group.bases)]
     state = plan.run(given, vectors, guess, modes, STEPS)
     every = plan.configuration(state, (STARTS,), {}, vectors, state.solved((STARTS,)), limits=False)
     good = every.valid
@@ -143,18 +128,3 @@ def _same(one: Configuration, other: Configuration, size: float) -> bool:
     turns = [wrap(np.angle(a) - np.angle(b)) for a, b in zip(one.rotations, other.rotations, strict=True)]
     shifts = [(a - b) / size for a, b in zip(one.slides, other.slides, strict=True)]
     return bool(np.all(np.abs([*turns, *shifts]) < SAME))
-
-
-def in_words(mechanism: Mechanism) -> list[str]:
-    """How many assembly modes the drives leave, and which joints choose them."""
-    plan = mechanism.forward
-    choosing = [group for group, mode in zip(plan.structure.groups, plan.modes, strict=True) if mode]
-    joints = [" or ".join(deciding_joints(mechanism.graph, group)[:1]) for group in choosing]
-    if not plan.iterative:
-        if not joints:
-            return ["assembly modes: 1"]
-        return [f"assembly modes: {2 ** len(joints)}, chosen by {', '.join(joints)} (2 each)"]
-    free = [j for g in plan.structure.groups if g.form == "newton" for j in deciding_joints(mechanism.graph, g)]
-    count = len(assemblies(mechanism, mechanism.drives))
-    also = f"; {', '.join(joints)} have 2 each" if joints else ""
-    return [f"assembly modes: {count} found at the sketch's drive values, for {', '.join(dict.fromkeys(free))}{also}"]

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
-from mechdesign.mechanism.continuation import MAX_CHANGE, guess_of, scale_of, table_of
+from mechdesign.mechanism.continuation import MAX_CHANGE, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import State
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -219,8 +219,7 @@ class Atlas:
     def _run(self, z: Complexes, sizes: Sizes, table: Floats, steps: int, beyond: bool = False) -> State:
         """The whole mechanism after some of Newton's corrections."""
         vectors = self.plan.core.geometry.vectors(sizes)
-        guess = guess_of(self.plan.structure, table)
-        return self.plan.run([z.real, z.imag, *self.held], vectors, guess, steps=steps, beyond=beyond)
+        return self.plan.run([z.real, z.imag, *self.held], vectors, table, steps=steps, beyond=beyond)
 
     def _nearest(self, z: Complexes, sizes: Sizes) -> tuple[Complexes, Floats, Floats]:
         """Places of the nearest solved poses (nan where there is none), their unknowns and slopes."""

@@ -12,10 +12,9 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
-from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained
+from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained, owners_of
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.redundancy import owners_of
 from mechdesign.mechanism.rigidity import CLOSED
 from mechdesign.mechanism.sketch import KEY
 from mechdesign.mechanism.solve import loop_vectors
@@ -199,10 +198,9 @@ def _turning_slide(state: State, group: Group, walk: _Walk) -> str:
 
 
 def _newton(state: State, group: Group, gaps: Complexes) -> str:
-    graph, edges = state.graph, state.structure.edges
-    used = sorted({k for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)})
-    nodes = {node for k in used for node in (edges[k].tail, edges[k].head)}
-    joints = ", ".join(sorted(graph.nodes[node] for node in nodes if ":" not in graph.nodes[node]))
+    graph = state.graph
+    used = sorted({k for k in group.edges if k < len(graph.edges)})
+    joints = ", ".join(sorted(graph.joined(used)))
     worst = max(used, key=lambda k: abs(gaps[k]))
     at = f"'{owners_of(graph, [worst])[0]}'" if owners_of(graph, [worst]) else "one of them"
     best = f"at best {at} stays {abs(gaps[worst]):.5g} too short or too long"

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from itertools import islice
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.algebra import Value, angle_of, nearest, norm2, quiet
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.turns import angles_of, nearest
 from mechdesign.numerics.arrays import Complexes, Flags, Ints
 
 
@@ -49,7 +50,8 @@ class Configuration:
     reason : int8 array of `shape`
         See `Reason`.
     near : mapping of str to arrays
-        Values that angles are told within half a turn of, by name; the others are told in (-pi, pi].
+        Values that angles are told within half a turn of, by name, where a motion, a given value or a nominal pose
+        says more than a rotation; the others are told in (-pi, pi].
     counted : frozenset of str
         Those of them whose turns count: given, or followed along a motion.
     """
@@ -151,3 +153,27 @@ def hide(value: Value, lost: Flags) -> Value:
         return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
     # Both parts of a position: (nan + 0i) would leave its y at zero.
     return np.where(lost, complex(np.nan, np.nan) if np.iscomplexobj(value) else np.nan, value)
+
+
+def joined(
+    parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
+) -> Configuration:
+    """Flat batches of one mechanism put together to one of a shape; its angles are told in (-pi, pi]."""
+    count, end, whole = int(np.prod(shape, dtype=np.int64)), 0, list[Any]()
+    reason = np.empty(count, dtype=np.int8)
+    for part in parts:
+        some = slice(end, end := end + len(part.reason))
+        reason[some] = part.reason
+        each = [*part.nodes, *part.rotations, *part.slides, *part.closures]
+        whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in each]
+        for k, value in enumerate(each):
+            if np.ndim(value) > np.ndim(whole[k]):
+                # What was the same for every pose so far is a single number.
+                whole[k] = np.full(count, whole[k], dtype=value.dtype)
+            if np.ndim(whole[k]):
+                whole[k][some] = value
+    full = iter([value.reshape(shape) if np.ndim(value) else value for value in whole])
+    nodes, rotations, slides, closures = (
+        list(islice(full, len(values))) for values in (part.nodes, part.rotations, part.slides, part.closures)
+    )
+    return Configuration(part.graph, vectors, shape, nodes, rotations, slides, closures, reason.reshape(shape), places)

@@ -14,7 +14,7 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, angle_of, wrap
 from mechdesign.mechanism.newton import STEPS
-from mechdesign.mechanism.state import Guess, State
+from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
@@ -30,11 +30,11 @@ BEGINNING = 1e-6
 
 @dataclass(frozen=True)
 class Start:
-    """A solved pose to continue from: its given values, dimensions, unknowns by group, signs of the determinants."""
+    """A solved pose to continue from: its given values, dimensions, unknowns, and signs of the determinants."""
 
     given: Sequence[Value]
     places: Mapping[str, Value]
-    unknowns: Guess
+    unknowns: Sequence[Value]
     signs: Sequence[Value]
 
     def map(self, function: Callable[[Value], Value]) -> Start:
@@ -42,50 +42,38 @@ class Start:
         return Start(
             [function(v) for v in self.given],
             {name: function(v) for name, v in self.places.items()},
-            {k: ([function(v) for v in a], [function(v) for v in s]) for k, (a, s) in self.unknowns.items()},
+            [function(v) for v in self.unknowns],
             [function(v) for v in self.signs],
         )
 
 
 # Solves all groups for given values, dimensions and a guess, with a bound of Newton's steps.
-Solver = Callable[[Sequence[Value], Mapping[str, Value], Guess, int], State]
+Solver = Callable[[Sequence[Value], Mapping[str, Value], Floats, int], State]
 
 
 def unknowns_of(
     structure: Structure, rotations: Sequence[Value], slides: Sequence[Value], nodes: Sequence[Value]
-) -> Guess:
+) -> list[Value]:
     """Unknowns of the Newton groups in a solved pose."""
-    found = {}
-    for index, group in enumerate(structure.groups):
-        if group.form == "newton":
-            angles = [angle_of(np.asarray(rotations[root])) for root in group.angles]
-            places = [part for base in group.bases for part in (np.real(nodes[base]), np.imag(nodes[base]))]
-            found[index] = (angles, [*(slides[s] for s in group.slides), *places])
+    found: list[Value] = []
+    for group in (structure.groups[index] for index in structure.unknowns):
+        found += [angle_of(np.asarray(rotations[root])) for root in group.angles]
+        found += [slides[slide] for slide in group.slides]
+        found += [part for base in group.bases for part in (np.real(nodes[base]), np.imag(nodes[base]))]
     return found
 
 
-def guess_of(structure: Structure, table: Floats) -> Guess:
-    """Rows of a table as angles and slides by group."""
-    found, row = {}, 0
-    for index, group in enumerate(structure.groups):
-        if group.form == "newton":
-            lengths = row + len(group.angles)
-            end = lengths + len(group.slides) + 2 * len(group.bases)
-            found[index] = (list(table[row:lengths]), list(table[lengths:end]))
-            row = end
-    return found
-
-
-def table_of(unknowns: Guess, shape: tuple[int, ...]) -> Floats:
+def table_of(unknowns: Sequence[Value], shape: tuple[int, ...]) -> Floats:
     """Unknowns of all groups, one a row."""
-    return np.stack([np.broadcast_to(v, shape) for parts in unknowns.values() for part in parts for v in part])
+    return np.stack([np.broadcast_to(value, shape) for value in unknowns])
 
 
 def angle_rows(structure: Structure) -> Flags:
     """Which rows of a table are angles, shape (rows, 1)."""
-    groups = [group for group in structure.groups if group.form == "newton"]
-    rows = [[True] * len(g.angles) + [False] * (len(g.slides) + 2 * len(g.bases)) for g in groups]
-    return np.concatenate(rows)[:, None]
+    found = [
+        np.arange(rows.stop - rows.start) < len(structure.groups[k].angles) for k, rows in structure.unknowns.items()
+    ]
+    return np.concatenate(found)[:, None]
 
 
 def scale_of(structure: Structure, size: float, table: Floats) -> Floats:
@@ -122,7 +110,7 @@ def follow(
 
         state = solver(
             [between(*pair) for pair in ends], {name: between(*pair) for name, pair in sizes.items()},
-            guess_of(structure, guess), steps,
+            guess, steps,
         )  # fmt: skip
         return table_of(state.unknowns, lanes.shape), state
 

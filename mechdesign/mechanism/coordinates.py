@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -73,6 +74,16 @@ def resolve(name: str, description: Description, graph: Graph) -> Coordinate:
     near = difflib.get_close_matches(name, all_names(description, graph), 1)
     hint = f"; did you mean '{near[0]}'?" if near else ""
     raise MechanismError(f"'{name}' is not a coordinate of this mechanism{hint}", name)
+
+
+def angles_of(coordinates: Iterable[Coordinate]) -> dict[str, Coordinate]:
+    """The angles among coordinates and in their expressions, by name."""
+    found: dict[str, Coordinate] = {}
+    for coordinate in coordinates:
+        if coordinate.kind == "angle":
+            found[coordinate.name] = coordinate
+        found |= angles_of(coordinate.parts)
+    return found
 
 
 def _drive(name: str, drive: Drive, graph: Graph) -> Coordinate:

@@ -21,16 +21,16 @@ The structure used is always that of the drives (their Assur groups), however th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, norm2, plus, quiet
+from mechdesign.mechanism.algebra import Value, cross, norm2, plus, quiet, times
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.newton import solve_linear
-from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.outputs import Rates
 from mechdesign.mechanism.state import State, columns, scalars
 from mechdesign.mechanism.structure import Group, Structure
 
@@ -39,18 +39,17 @@ from mechdesign.mechanism.structure import Group, Structure
 STALLED = 1e-6
 
 
-class Linearization:
+class Linearization(State):
     """The loop equations of the drives' groups at a configuration, ready to be solved for any right-hand side."""
 
     def __init__(self, structure: Structure, geometry: Geometry, configuration: Configuration) -> None:
-        self.structure = structure
-        self.geometry = geometry
-        self.configuration = configuration
         vectors = configuration.vectors
-        self.state = State(
+        super().__init__(
             configuration.graph, structure, vectors, list(vectors.w), list(configuration.nodes),
             list(configuration.rotations), [], list(configuration.slides),
         )  # fmt: skip
+        self.geometry = geometry
+        self.configuration = configuration
         self._columns: dict[int, list[list[Value]]] = {}
         self._scales: dict[int, Value] = {}
         self._edges: dict[int, Value] = {}
@@ -58,17 +57,13 @@ class Linearization:
     def edge(self, k: int) -> Value:
         """World vector of an edge."""
         if k not in self._edges:
-            self._edges[k] = self.state.edge(k)
+            self._edges[k] = super().edge(k)
         return self._edges[k]
-
-    def direction(self, k: int) -> Value:
-        """World direction of an edge's slide."""
-        return self.state.turned(self.state.vectors.d[k], self.structure.edges[k].frame)
 
     def loop_columns(self, index: int, group: Group) -> list[list[Value]]:
         """Per loop of a group, the derivatives of its closure with respect to the group's unknowns."""
         if index not in self._columns:
-            self._columns[index] = [columns(self.state, group, loop.edges)[1] for loop in group.loops]
+            self._columns[index] = [columns(self, group, loop.edges)[1] for loop in group.loops]
         return self._columns[index]
 
     def _solve_group(self, index: int, group: Group, right: list[Value]) -> list[Value]:
@@ -83,13 +78,10 @@ class Linearization:
         return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
 
     @quiet
-    def solve(
-        self,
-        given: Sequence[Value],
-        rest: Sequence[Value],
-        offsets: dict[str, Value] | None = None,
+    def _solve(
+        self, given: Sequence[Value], rest: Sequence[Value], offsets: Mapping[str, Value] | None = None
     ) -> Rates:
-        """Derivatives of everything for derivatives `given` of the drives and `rest` of the edges.
+        """Derivatives of everything.
 
         Parameters
         ----------
@@ -97,33 +89,23 @@ class Linearization:
             Derivative of each drive.
         rest : sequence of Value
             Per edge, the part of its derivative without the highest derivatives of angle and slide.
-        offsets : dict, optional
+        offsets : mapping, optional
             Derivative of each body's constant angle within its class.
         """
-        structure = self.structure
-        offsets = offsets or {}
-        angles: list[Any] = [0.0] * structure.classes
-        for frame, tie in enumerate(structure.ties):
-            total: Value = 0.0
-            for sign, k in tie.given:
-                total = total + sign * given[k]
-            for sign, body in tie.offsets:
-                total = total + sign * offsets.get(body, 0.0)
-            angles[frame] = total
-        slides: list[Any] = [0.0] * len(self.state.slides)
+        structure, offsets = self.structure, offsets or {}
+        angles: list[Any] = []
+        for tie in structure.ties:
+            turns = [*((sign, given[k]) for sign, k in tie.given), *((s, offsets.get(b, 0.0)) for s, b in tie.offsets)]
+            angles.append(sum((sign * turn for sign, turn in turns), 0.0))
+        slides: list[Any] = [0.0] * len(self.slides)
         for slide, k in structure.known_slides:
             slides[slide] = given[k]
-        nodes: list[Any] = [None] * len(self.state.nodes)
-        nodes[0] = 0.0
+        nodes: list[Any] = [0.0, *[None] * (len(self.nodes) - 1)]
 
         def step(k: int) -> Value:
             edge = structure.edges[k]
-            total = rest[k]
-            if not (isinstance(angles[edge.frame], float) and angles[edge.frame] == 0.0):
-                total = plus(total, 1, self.edge(k) * (1j * angles[edge.frame]))
-            if edge.slide is not None and not (isinstance(slides[edge.slide], float) and slides[edge.slide] == 0.0):
-                total = plus(total, 1, slides[edge.slide] * self.direction(k))
-            return total
+            total = plus(rest[k], 1, times(self.edge(k), times(1j, angles[edge.frame])))
+            return total if edge.slide is None else plus(total, 1, times(slides[edge.slide], self.direction(k)))
 
         for index, group in enumerate(structure.groups):
             if group.form != "place":
@@ -134,12 +116,12 @@ class Linearization:
                         total = plus(total, sign, step(k))
                     right.append(total)
                 unknowns = self._solve_group(index, group, right)
-                for position, root in enumerate(group.angles):
+                for root, unknown in zip(group.angles, unknowns, strict=False):
                     for frame, tie in enumerate(structure.ties):
                         if tie.root == root:
-                            angles[frame] = plus(angles[frame], 1, unknowns[position])
-                for position, slide in enumerate(group.slides):
-                    slides[slide] = unknowns[len(group.angles) + position]
+                            angles[frame] = plus(angles[frame], 1, unknown)
+                for slide, unknown in zip(group.slides, unknowns[len(group.angles) :], strict=True):
+                    slides[slide] = unknown
             for k, sign in group.tree:
                 edge = structure.edges[k]
                 if sign > 0:
@@ -148,30 +130,19 @@ class Linearization:
                     nodes[edge.tail] = plus(nodes[edge.head], -1, step(k))
         return Rates(nodes, angles, slides, offsets)
 
-    def drives(self) -> Rates:
-        """Derivatives with respect to each drive; a leading axis runs over the drives."""
-        count = len(self.structure.given)
-        axes = (1,) * len(self.configuration.shape)
-        unit = [np.eye(count)[k].reshape((count, *axes)) for k in range(count)]
-        return self.solve(unit, [0.0] * len(self.structure.edges))
-
     def velocity(self, rates: Sequence[Value]) -> Rates:
-        """Velocities for given drive rates (radians and lengths per time)."""
-        return self.solve(rates, [0.0] * len(self.structure.edges))
+        """Velocities for given drive rates (radians and lengths per time), or derivatives along any change of them."""
+        return self._solve(rates, [0.0] * len(self.structure.edges))
 
     @quiet
     def acceleration(self, velocity: Rates, accelerations: Sequence[Value]) -> Rates:
         """Accelerations for given drive accelerations."""
         rest: list[Value] = []
-        for k, edge in enumerate(self.structure.edges):
+        for k, (edge, s1) in enumerate(zip(self.structure.edges, self._along(velocity.slides), strict=True)):
             omega = velocity.angles[edge.frame]
-            total: Value = 0.0
-            if edge.frame != 0:
-                total = self.edge(k) * (-omega * omega)
-            if edge.slide is not None and edge.frame != 0:
-                total = total + self.direction(k) * (2j * omega * velocity.slides[edge.slide])
-            rest.append(total)
-        return self.solve(accelerations, rest)
+            sliding = times(self.direction(k), times(2j, times(omega, s1)))
+            rest.append(plus(times(self.edge(k), -omega * omega), 1, sliding))
+        return self._solve(accelerations, rest)
 
     @quiet
     def sensitivity(self, places: Sequence[str]) -> Rates:
@@ -181,49 +152,48 @@ class Linearization:
         """
         given, explicit, offsets = self._explicit(places)
         rest = [
-            self.state.turned(w + (0.0 if s is None else s * d), edge.frame)
-            for (w, d), s, edge in zip(explicit, self._slide_values(), self.structure.edges, strict=True)
+            self.turned(plus(w, 1, times(s, d)), edge.frame)
+            for (w, d), s, edge in zip(explicit, self._along(self.slides), self.structure.edges, strict=True)
         ]
-        return self.solve(given, rest, offsets)
+        return self._solve(given, rest, offsets)
 
     @quiet
     def rate_sensitivity(
-        self, places: Sequence[str], position: Rates, velocity: Rates, acceleration: Rates | None
-    ) -> tuple[Rates, Rates | None]:
+        self, places: Sequence[str], position: Rates, velocity: Rates, acceleration: Rates
+    ) -> tuple[Rates, Rates]:
         """Derivatives of velocities and accelerations with respect to dimensions; `position` from `sensitivity`."""
         _, explicit, _ = self._explicit(places)
-        none = [0.0] * len(self.structure.given)
-        first_rest: list[Value] = []
-        second: list[tuple[Any, ...]] = []
-        for k, edge in enumerate(self.structure.edges):
-            (w_z, d_z), d, frame = explicit[k], self.state.vectors.d[k], edge.frame
-            m = self.state.arm(k)
-            s, s1, s_z = (
-                (0.0, 0.0, 0.0)
-                if edge.slide is None
-                else (self.state.slides[edge.slide], velocity.slides[edge.slide], position.slides[edge.slide])
-            )
-            m_z, m1, omega, turn_z = w_z + s * d_z + s_z * d, s1 * d, velocity.angles[frame], position.angles[frame]
-            rest = 1j * omega * m_z + s1 * d_z + 1j * turn_z * (m1 + 1j * omega * m)
-            first_rest.append(self.state.turned(rest, frame))
-            second.append((m, m_z, m1, s1, d, d_z, omega, turn_z))
-        first = self.solve(none, first_rest)
-        if acceleration is None:
-            return first, None
-        second_rest: list[Value] = []
-        for edge, (m, m_z, m1, s1, d, d_z, omega, turn_z) in zip(self.structure.edges, second, strict=True):
-            s2, s1_z = (0.0, 0.0) if edge.slide is None else (acceleration.slides[edge.slide], first.slides[edge.slide])
-            alpha, omega_z = acceleration.angles[edge.frame], first.angles[edge.frame]
-            m1_z, m2, bend = s1_z * d + s1 * d_z, s2 * d, 1j * alpha - omega * omega
-            rest = (
-                s2 * d_z + 2j * omega_z * m1 + 2j * omega * m1_z - 2 * omega * omega_z * m + bend * m_z
-                + 1j * turn_z * (m2 + 2j * omega * m1 + bend * m)
+        none, edges = [0.0] * len(self.structure.given), self.structure.edges
+        s, s1, s2, s_z = map(self._along, (self.slides, velocity.slides, acceleration.slides, position.slides))
+        rest: list[Value] = []
+        known: list[tuple[Value, ...]] = []
+        for k, edge in enumerate(edges):
+            (w_z, d_z), d, m = explicit[k], self.vectors.d[k], self.arm(k)
+            omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
+            m_z, m1 = w_z + s[k] * d_z + s_z[k] * d, s1[k] * d
+            known.append((m, m_z, m1, d, d_z, omega, turn_z))
+            here = 1j * omega * m_z + s1[k] * d_z + 1j * turn_z * (m1 + 1j * omega * m)
+            rest.append(self.turned(here, edge.frame))
+        velocity_z = self._solve(none, rest)
+        s1_z = self._along(velocity_z.slides)
+        for k, edge in enumerate(edges):
+            m, m_z, m1, d, d_z, omega, turn_z = known[k]
+            alpha, omega_z = acceleration.angles[edge.frame], velocity_z.angles[edge.frame]
+            m1_z, bend = s1_z[k] * d + s1[k] * d_z, 1j * alpha - omega * omega
+            here = (
+                s2[k] * d_z + 2j * omega_z * m1 + 2j * omega * m1_z - 2 * omega * omega_z * m + bend * m_z
+                + 1j * turn_z * (s2[k] * d + 2j * omega * m1 + bend * m)
             )  # fmt: skip
-            second_rest.append(self.state.turned(rest, edge.frame))
-        return first, self.solve(none, second_rest)
+            rest[k] = self.turned(here, edge.frame)
+        return velocity_z, self._solve(none, rest)
 
-    def _slide_values(self) -> list[Value | None]:
-        return [None if edge.slide is None else self.state.slides[edge.slide] for edge in self.structure.edges]
+    def direction(self, k: int) -> Value:
+        """World direction of an edge's slide; zero of an edge that has none."""
+        return self.turned(self.vectors.d[k], self.structure.edges[k].frame)
+
+    def _along(self, slides: Sequence[Value]) -> list[Value]:
+        """Displacements, or derivatives of them, by edge; zero for edges without a slide."""
+        return [0.0 if edge.slide is None else slides[edge.slide] for edge in self.structure.edges]
 
     def _explicit(self, places: Sequence[str]) -> tuple[list[Value], list[tuple[Value, Value]], dict[str, Value]]:
         configuration = self.configuration

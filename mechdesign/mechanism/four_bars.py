@@ -23,7 +23,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Fixed, Prismatic, Slot
-from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.outputs import Rates
 
 Kind = Literal["four-bar", "slider-crank", "inverted slider-crank"]
 

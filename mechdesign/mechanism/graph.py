@@ -82,6 +82,11 @@ class Graph:
         """Index of a point."""
         return self.nodes.index(name)
 
+    def joined(self, edges: Iterable[int]) -> list[str]:
+        """Names of the points at the ends of some edges, in their order; edges that stand for distances have none."""
+        ends = [node for k in edges if k < len(self.edges) for node in (self.edges[k].tail, self.edges[k].head)]
+        return [self.nodes[node] for node in dict.fromkeys(ends) if ":" not in self.nodes[node]]
+
 
 def _turns_of(line: Line) -> tuple[Turn, ...]:
     if line.toward is not None and line.through is not None:

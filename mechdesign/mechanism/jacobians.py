@@ -44,8 +44,8 @@ class Jacobian:
     @quiet
     def of(linear: Linearization, rows: Sequence[Coordinate], length: float | None = None) -> Jacobian:
         """The Jacobian at configurations; with `length`, the arc of one radian, angles count as lengths."""
-        drives, rest = linear.structure.given, [0.0] * len(linear.structure.edges)
-        columns = [linear.solve([float(j == k) for j in range(len(drives))], rest) for k in range(len(drives))]
+        drives = linear.structure.given
+        columns = [linear.velocity([float(j == k) for j in range(len(drives))]) for k in range(len(drives))]
         entries = [[first(linear.configuration, row, rates) for rates in columns] for row in rows]
         if length is None:
             return Jacobian(entries, entries, linear.configuration.shape)

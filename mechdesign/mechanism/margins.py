@@ -11,7 +11,6 @@ from mechdesign.mechanism.algebra import Value, cross
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags, Floats
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
@@ -48,7 +47,7 @@ def causes(plan: Plan, mechanism: Mechanism, legs: Iterable[str]) -> list[Cause]
     """What may end it, in the order in which the mechanism is solved: groups, `legs`, stated limits."""
     graph, found = mechanism.graph, list[Cause]()
     for index, group in enumerate(plan.structure.groups):
-        joint = joints_of(mechanism, group)
+        joint = " ".join(graph.joined(group.edges))
         links = "-".join(
             dict.fromkeys(b.removesuffix(":rod") for b, (frame, _) in graph.bodies.items() if frame in group.angles)
         )
@@ -185,10 +184,3 @@ class SweepMargins:
             if structure.edges[k].slide in group.slides
         )
         return cross(np.asarray(one), np.asarray(two))
-
-
-def joints_of(mechanism: Mechanism, group: Group) -> str:
-    """Names of the points at which a group's links meet each other and what was placed before them."""
-    graph = mechanism.graph
-    edges = [graph.edges[k] for loop in group.loops for k, _ in loop.edges if k < len(graph.edges)]
-    return " ".join(dict.fromkeys(graph.nodes[n] for e in edges for n in (e.tail, e.head) if ":" not in graph.nodes[n]))

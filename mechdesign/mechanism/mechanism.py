@@ -15,11 +15,11 @@ from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.independence import check_independent
 from mechdesign.mechanism.jacobians import Jacobian
 from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.sketch import assembly_modes, drawn_value, roots_as_drawn
+from mechdesign.mechanism.rigidity import check_independent
+from mechdesign.mechanism.sketch import assembly_modes, drawn_value, unknowns_as_drawn
 from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Flags, Floats
 
@@ -135,7 +135,7 @@ class Mechanism(Core):
                     "mechanism.sketch",
                 )
             given.append(0.0 if value is None else value)
-        guess = roots_as_drawn(self.graph, self.geometry, plan.structure, self.sketch) if plan.iterative else None
+        guess = unknowns_as_drawn(self.graph, self.geometry, plan.structure, self.sketch) if plan.iterative else None
         values = [np.asarray(g) for g in given]
         state = plan.run(values, self.geometry.nominal, guess)
         reached = state.solved(()) if plan.iterative else None

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from itertools import combinations
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, plus, rotation, vector
+from mechdesign.mechanism.algebra import Value, plus, rotation, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.rates import Rates
-from mechdesign.mechanism.state import State, columns, loop_gap, scalars
+from mechdesign.mechanism.outputs import Rates, first
+from mechdesign.mechanism.state import State, Unknowns, columns, loop_gap, scalars
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
 
@@ -27,14 +27,13 @@ BY_MINORS = 4
 def solve_newton(
     state: State,
     index: int,
-    angles: Sequence[Value],
-    slides: Sequence[Value],
+    guess: Unknowns,
     given: Sequence[Value],
     size: float,
     steps: int = STEPS,
     enough: float = CONVERGED,
 ) -> None:
-    """Solve group `index` of a state from a guess of its angles and slides, and note what came out in the state.
+    """Solve group `index` of a state from a guess of its unknowns, and note what came out in the state.
 
     Parameters
     ----------
@@ -47,41 +46,35 @@ def solve_newton(
         Correction after which a pose has converged.
     """
     group = state.structure.groups[index]
-    theta: list[Value] = [np.asarray(a, dtype=float) for a in angles]
-    s: list[Value] = [np.asarray(a, dtype=float) for a in slides]
-    active: Flags | None = None if steps else np.ones((), dtype=bool)
+    found: list[Value] = [np.asarray(value, dtype=float) for value in guess]
+    small = [enough if k < len(group.angles) else enough * size for k in range(len(found))]
+    active: Flags = np.ones((), dtype=bool)
     determinant: Value = 0.0
     for _ in range(steps):
-        set_unknowns(state, group, theta, s)
-        rows, right = equations(state, group, given)
-        solution, determinant = solve_linear(rows, right)
-        largest: Value = 0.0
-        for k, step in enumerate(solution):
-            largest = np.maximum(largest, np.abs(step) if k < len(theta) else np.abs(step) / size)
-        moving = ~(largest < enough)
-        if active is not None:
+        set_unknowns(state, group, found)
+        solution, determinant = solve_linear(*equations(state, group, given))
+        moving = reduce(np.logical_or, (~(np.abs(step) < limit) for step, limit in zip(solution, small, strict=True)))
+        if active.ndim:
             solution = [np.where(active, step, 0.0) for step in solution]
-            moving &= active
-        theta = [value - step for value, step in zip(theta, solution[: len(theta)], strict=True)]
-        s = [value - step for value, step in zip(s, solution[len(theta) :], strict=True)]
+            moving = moving & active
+        found = [value - step for value, step in zip(found, solution, strict=True)]
         active = np.asarray(moving)
         if not active.any():
             break
-    set_unknowns(state, group, theta, s)
-    assert active is not None
-    state.unknowns[index] = (theta, s)
+    set_unknowns(state, group, found)
+    state.unknowns += found
     state.converged.append(~active)
     state.determinants.append(determinant)
 
 
-def set_unknowns(state: State, group: Group, theta: Sequence[Value], s: Sequence[Value]) -> None:
+def set_unknowns(state: State, group: Group, unknowns: Unknowns) -> None:
     """Put a group's angles, slides and, behind the slides, the x and y of its bases into a state."""
-    for root, value in zip(group.angles, theta, strict=True):
+    rest = iter(unknowns)
+    for root, value in zip(group.angles, rest, strict=False):
         state.turn(root, rotation(value))
-    for slide, value in zip(group.slides, s, strict=False):
+    for slide, value in zip(group.slides, rest, strict=False):
         state.slides[slide] = value
-    places = s[len(group.slides) :]
-    for base, x, y in zip(group.bases, places[::2], places[1::2], strict=True):
+    for base, x, y in zip(group.bases, rest, rest, strict=False):
         state.nodes[base] = vector(x, y)
 
 
@@ -157,7 +150,7 @@ def _by_minors(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple
             k, m = (x for x in range(BY_MINORS) if x not in (i, j))
             sign, one = _signed(upper, order[i], order[j])
             other_sign, other = _signed(lower, order[k], order[m])
-            total = plus(total, sign * other_sign * (-1) ** (i + j + 1), _times(one, other))
+            total = plus(total, sign * other_sign * (-1) ** (i + j + 1), times(one, other))
         return total
 
     determinant = expand(range(BY_MINORS))
@@ -170,21 +163,11 @@ def _by_minors(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple
 
 
 def _minors(one: Sequence[Value], two: Sequence[Value]) -> dict[tuple[int, int], Value]:
-    return {
-        (i, j): plus(_times(one[i], two[j]), -1, _times(one[j], two[i])) for i, j in combinations(range(len(one)), 2)
-    }
+    return {(i, j): plus(times(one[i], two[j]), -1, times(one[j], two[i])) for i, j in combinations(range(len(one)), 2)}
 
 
 def _signed(minors: dict[tuple[int, int], Value], i: int, j: int) -> tuple[int, Value]:
     return (1, minors[i, j]) if i < j else (-1, minors[j, i])
-
-
-def _times(a: Value, b: Value) -> Value:
-    """Product without a pass over an array where one factor is plainly 0 or 1."""
-    for one, other in ((a, b), (b, a)):
-        if isinstance(one, float) and one in (0.0, 1.0):
-            return 0.0 if one == 0.0 else other
-    return a * b
 
 
 def _by_matrix(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple[list[Value], Value]:

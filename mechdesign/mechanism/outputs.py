@@ -1,7 +1,8 @@
-"""Derivatives of coordinates from the derivatives of positions: velocity, acceleration, and their sensitivities."""
+"""Derivatives of coordinates from those of positions: in time, by a drive, by a dimension, and mixed ones."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -11,10 +12,22 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.rates import Rates
 
 # Step of the central difference of an expression's exact gradient, relative to its arguments' scale.
 STEP = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """One derivative of everything: node positions (complex), angles of classes, slides, offsets of bodies.
+
+    Arrays broadcast to the batch, with further leading axes where several derivatives are taken at once.
+    """
+
+    nodes: Sequence[Value]
+    angles: Sequence[Value]
+    slides: Sequence[Value]
+    offsets: Mapping[str, Value]
 
 
 @quiet
@@ -34,7 +47,7 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
             total = total + sign * (rates.angles[frame] + rates.offsets.get(body, 0.0))
         return total
     if kind == "distance":
-        span, change = _span(configuration, coordinate), _difference(coordinate, rates)
+        span, change = _span(configuration.nodes, coordinate), _span(rates.nodes, coordinate)
         return dot(span, change) / np.sqrt(norm2(span))
     gradient = _gradient(coordinate, configuration.user_values(coordinate))
     return sum(g * _user(part, first(configuration, part, rates), coordinate)
@@ -42,56 +55,37 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
 
 
 @quiet
-def second(configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates) -> Value:
-    """Second time derivative of a coordinate."""
+def second(configuration: Configuration, coordinate: Coordinate, one: Rates, other: Rates, both: Rates) -> Value:
+    """Second derivative of a coordinate, along `one` and `other`.
+
+    Parameters
+    ----------
+    both : Rates
+        Second derivatives of positions: the accelerations where `one` and `other` are both the velocities; where
+        `other` is by dimensions, what the velocities change by these.
+    """
     if coordinate.kind == "distance":
-        span, speed = _span(configuration, coordinate), _difference(coordinate, velocity)
-        length = np.sqrt(norm2(span))
-        rate = dot(span, speed) / length
-        return (norm2(speed) + dot(span, _difference(coordinate, acceleration)) - rate * rate) / length
+        span, a, b, ab = (_span(n, coordinate) for n in (configuration.nodes, one.nodes, other.nodes, both.nodes))
+        square = norm2(span)
+        return (dot(a, b) + dot(span, ab) - dot(span, a) * dot(span, b) / square) / np.sqrt(square)
     if coordinate.kind == "expression":
-        speeds = [_user(p, first(configuration, p, velocity), coordinate) for p in coordinate.parts]
-        bends = [_user(p, second(configuration, p, velocity, acceleration), coordinate) for p in coordinate.parts]
+        along_one, along_other = (
+            [_user(part, first(configuration, part, rates), coordinate) for part in coordinate.parts]
+            for rates in (one, other)
+        )
+        mixed = [_user(part, second(configuration, part, one, other, both), coordinate) for part in coordinate.parts]
         values = configuration.user_values(coordinate)
-        gradient = _gradient(coordinate, values)
-        curved = _directional(coordinate, values, speeds)
-        return sum(g * b + c * v for g, b, c, v in zip(gradient, bends, curved, speeds, strict=True))
-    return first(configuration, coordinate, acceleration)
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Time derivatives at a configuration and their derivatives with respect to dimensions."""
-
-    velocity: Rates
-    acceleration: Rates
-    position_z: Rates
-    velocity_z: Rates
-    acceleration_z: Rates
+        gradient, curved = _gradient(coordinate, values), _directional(coordinate, values, along_one)
+        return sum(g * m + c * b for g, m, c, b in zip(gradient, mixed, curved, along_other, strict=True))
+    return first(configuration, coordinate, both)
 
 
 @quiet
-def velocity_sensitivity(configuration: Configuration, coordinate: Coordinate, motion: Motion) -> Value:
-    """Derivative of a coordinate's velocity with respect to dimensions (leading axis)."""
-    if coordinate.kind == "distance":
-        span, length, rate, _ = _distance_rates(configuration, coordinate, motion)
-        speed, span_z = _difference(coordinate, motion.velocity), _difference(coordinate, motion.position_z)
-        length_z = dot(span, span_z) / length
-        return (dot(span_z, speed) + dot(span, _difference(coordinate, motion.velocity_z)) - length_z * rate) / length
-    if coordinate.kind == "expression":
-        values = configuration.user_values(coordinate)
-        speeds = [_user(p, first(configuration, p, motion.velocity), coordinate) for p in coordinate.parts]
-        changes = [_user(p, first(configuration, p, motion.position_z), coordinate) for p in coordinate.parts]
-        mixed = [_user(p, velocity_sensitivity(configuration, p, motion), coordinate) for p in coordinate.parts]
-        curved = _directional(coordinate, values, speeds)
-        gradient = _gradient(coordinate, values)
-        return sum(g * m + c * z for g, m, c, z in zip(gradient, mixed, curved, changes, strict=True))
-    return first(configuration, coordinate, _plain(motion.velocity_z))
-
-
-@quiet
-def acceleration_sensitivity(configuration: Configuration, coordinate: Coordinate, motion: Motion) -> Value:
-    """Derivative of a coordinate's acceleration with respect to dimensions (leading axis).
+def acceleration_sensitivity(
+    configuration: Configuration, coordinate: Coordinate, velocity: Rates, acceleration: Rates,
+    position_z: Rates, velocity_z: Rates, acceleration_z: Rates,
+) -> Value:  # fmt: skip
+    """Derivative of a coordinate's acceleration with respect to dimensions z (leading axis).
 
     Raises
     ------
@@ -105,39 +99,21 @@ def acceleration_sensitivity(configuration: Configuration, coordinate: Coordinat
             "reliability.outputs",
         )
     if coordinate.kind == "distance":
-        span, length, rate, bend = _distance_rates(configuration, coordinate, motion)
-        speed, span_z = _difference(coordinate, motion.velocity), _difference(coordinate, motion.position_z)
-        length_z = dot(span, span_z) / length
-        rate_z = velocity_sensitivity(configuration, coordinate, motion)
+        rate, rate_z = first(configuration, coordinate, velocity), first(configuration, coordinate, position_z)
+        bend = second(configuration, coordinate, velocity, velocity, acceleration)
+        mixed = second(configuration, coordinate, velocity, position_z, velocity_z)
+        span, speed, span_z = (_span(n, coordinate) for n in (configuration.nodes, velocity.nodes, position_z.nodes))
         top = (
-            2 * dot(speed, _difference(coordinate, motion.velocity_z))
-            + dot(span_z, _difference(coordinate, motion.acceleration))
-            + dot(span, _difference(coordinate, motion.acceleration_z))
+            2 * dot(speed, _span(velocity_z.nodes, coordinate))
+            + dot(span_z, _span(acceleration.nodes, coordinate))
+            + dot(span, _span(acceleration_z.nodes, coordinate))
         )
-        return (top - 2 * rate * rate_z - length_z * bend) / length
-    return first(configuration, coordinate, _plain(motion.acceleration_z))
+        return (top - 2 * rate * mixed - rate_z * bend) / np.sqrt(norm2(span))
+    return first(configuration, coordinate, acceleration_z)
 
 
-def _plain(rates: Rates) -> Rates:
-    # A body's constant offset changes its angle with a dimension, but not its angular velocity.
-    return Rates(rates.nodes, rates.angles, rates.slides, {})
-
-
-def _span(configuration: Configuration, coordinate: Coordinate) -> Value:
-    return configuration.nodes[coordinate.other] - configuration.nodes[coordinate.node]
-
-
-def _difference(coordinate: Coordinate, rates: Rates) -> Value:
-    return rates.nodes[coordinate.other] - rates.nodes[coordinate.node]
-
-
-def _distance_rates(
-    configuration: Configuration, coordinate: Coordinate, motion: Motion
-) -> tuple[Value, Value, Value, Value]:
-    span = _span(configuration, coordinate)
-    rate = first(configuration, coordinate, motion.velocity)
-    bend = second(configuration, coordinate, motion.velocity, motion.acceleration)
-    return span, np.sqrt(norm2(span)), rate, bend
+def _span(nodes: Sequence[Value], coordinate: Coordinate) -> Value:
+    return nodes[coordinate.other] - nodes[coordinate.node]
 
 
 def _user(part: Coordinate, value: Value, whole: Coordinate) -> Value:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,10 +12,10 @@ from mechdesign.mechanism.algebra import Value, plus, rotation, vector
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.structure import Group, Structure
-from mechdesign.numerics.arrays import Flags
+from mechdesign.numerics.arrays import Flags, Floats
 
-# Angles of roots, and slides with the x and y of bases behind them, of the groups without a closed form, by group.
-Guess = Mapping[int, tuple[Sequence[Value], Sequence[Value]]]
+# The unknowns of all groups without a closed form, one after another (see `Structure.unknowns`).
+Unknowns = Sequence[Value] | Floats
 
 
 @dataclass
@@ -25,11 +25,11 @@ class State:
     Parameters
     ----------
     beyond : bool
-        Whether groups with a closed form are told beyond their reach (see `mechdesign.mechanism.dyads`).
+        Whether groups with a closed form are told beyond their reach (see `mechdesign.mechanism.solve`).
     closures : list
-        Of the groups with a closed form: positive where they close (see `mechdesign.mechanism.dyads`).
+        Of the groups with a closed form: positive where they close (see `mechdesign.mechanism.solve`).
     unknowns, converged, determinants
-        Of the others, in their order: angles and slides found, whether each pose converged, and the determinant of
+        Of the others, in their order: what was found, whether each pose converged, and the determinant of
         the group's equations.
     """
 
@@ -43,7 +43,7 @@ class State:
     slides: list[Any]
     beyond: bool = False
     closures: list[Value] = field(default_factory=list)
-    unknowns: dict[int, tuple[list[Value], list[Value]]] = field(default_factory=dict)
+    unknowns: list[Value] = field(default_factory=list)
     converged: list[Flags] = field(default_factory=list)
     determinants: list[Value] = field(default_factory=list)
 

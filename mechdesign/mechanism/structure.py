@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from mechdesign.errors import MechanismError
@@ -66,6 +67,11 @@ class Group:
     conditions: tuple[int, ...] = ()
     bases: tuple[int, ...] = ()
 
+    @property
+    def edges(self) -> tuple[int, ...]:
+        """Edges round its loops, in their order."""
+        return tuple(k for loop in self.loops for k, _ in loop.edges)
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -79,6 +85,16 @@ class Structure:
     known_nodes: tuple[tuple[int, int, int], ...]
     spans: tuple[tuple[int, int], ...]
     groups: tuple[Group, ...]
+
+    @cached_property
+    def unknowns(self) -> dict[int, slice]:
+        """By group without a closed form, its part of all their unknowns: angles, slides, x and y of bases."""
+        found, end = {}, 0
+        for index, group in enumerate(self.groups):
+            if group.form == "newton":
+                begin, end = end, end + len(group.angles) + len(group.slides) + 2 * len(group.bases)
+                found[index] = slice(begin, end)
+        return found
 
 
 class Undetermined(MechanismError):

@@ -18,7 +18,7 @@ from mechdesign.mechanism.continuation import unknowns_of
 from mechdesign.mechanism.newton import equations, set_unknowns
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.solve import run
-from mechdesign.mechanism.state import Guess, State, start_state
+from mechdesign.mechanism.state import State, Unknowns, start_state
 from mechdesign.numerics.arrays import Floats
 
 # Largest errors of the equations (parts of the mechanism's size) and of the determinant (parts of that at the last
@@ -47,7 +47,7 @@ def turning_point(
     """
     guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides, near.nodes)
     reach = NEAR * (1.0 if plan.structure.given[k].quantity == "angle" else plan.core.size)
-    folds = [(index, _fold(plan, given, k, near, guess, index)) for index in guess]
+    folds = [(index, _fold(plan, given, k, near, guess, index)) for index in plan.structure.unknowns]
     found = [(abs(fold[0] - given[k]), index, fold) for index, fold in folds if fold is not None]
     distance, index, (value, state) = min(found, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
     if state is None or distance > reach:
@@ -57,24 +57,24 @@ def turning_point(
 
 @quiet
 def _fold(
-    plan: Plan, given: Sequence[float], k: int, near: Configuration, guess: Guess, index: int
+    plan: Plan, given: Sequence[float], k: int, near: Configuration, guess: Unknowns, index: int
 ) -> tuple[float, State] | None:
     """The coordinate's value at a fold of group `index`, and the state there."""
     from scipy.optimize import root
 
     group, size = plan.structure.groups[index], plan.core.size
-    angles, slides = guess[index]
-    weights = np.array([1.0] * len(angles) + [size] * len(slides))
+    own = np.array(guess[plan.structure.unknowns[index]], dtype=float)
+    weights = np.where(np.arange(len(own)) < len(group.angles), 1.0, size)
 
     def at(value: float) -> list[Value]:
         return [np.asarray(value if j == k else v) for j, v in enumerate(given)]
 
     def state_at(unknowns: Floats) -> State:
         """Everything up to the group, with its unknowns and the coordinate in their own scales."""
-        values, y = at(unknowns[-1]), list(unknowns[:-1] * weights)
+        values = at(unknowns[-1])
         state = start_state(plan.core.graph, plan.structure, near.vectors, values)
         run(state, plan.modes_at(values)[:index], guess, values, size)
-        set_unknowns(state, group, y[: len(angles)], y[len(angles) :])
+        set_unknowns(state, group, unknowns[:-1] * weights)
         return state
 
     def system(unknowns: Floats) -> tuple[Floats, float]:
@@ -87,7 +87,7 @@ def _fold(
         errors, determinant = system(unknowns)
         return np.append(errors, determinant / unit)
 
-    begin = np.append(np.array([*angles, *slides], dtype=float) / weights, given[k])
+    begin = np.append(own / weights, given[k])
     unit = abs(system(begin)[1]) or 1.0
     answer: Any = root(residual, begin, method="hybr", options={"xtol": 1e-14, "factor": 0.1})
     if not np.abs(residual(answer.x)).max() < SOLVED:

@@ -33,12 +33,6 @@ class Extras:
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
-    found = origin(study, command, Extras())
-    return {key: value for key, value in found.items() if key not in asdict(Extras())}
-
-
-def origin(study: Study, command: str, asked: Extras) -> dict[str, Any]:
-    """Everything that decides the bytes of the results: what `computed_from` says, and what was asked."""
     from mechdesign.study.rewriting import inputs
 
     files = {file.name: hashlib.sha256(text.encode()).hexdigest() for _, file, text in inputs(study)}
@@ -50,7 +44,6 @@ def origin(study: Study, command: str, asked: Extras) -> dict[str, Any]:
         **({"inputs": files} if files else {}),
         "overrides": list(study.overrides),
         "seed": study.seed,
-        **asdict(asked),
     }
 
 
@@ -58,24 +51,29 @@ def compose(
     study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, str], asked: Extras
 ) -> bytes:
     """The manifest of a result whose files have these SHA-256."""
-    content = origin(study, result.command, asked) | {
-        "counts": plain(dict(result.counts)),
-        "warnings": [*(f"{warning.key}: {warning.message}" for warning in study.warnings), *result.warnings],
-        "failed": result.failed,
-        **({"interrupted": result.interrupted} if result.interrupted else {}),
-        "requirements": [plain(asdict(verdict)) for verdict in verdicts],
-        "tables": {
-            f"{table.name}.csv": {
-                "meaning": table.meaning,
-                "rows": len(table),
-                "columns": [
-                    {"name": column.name, "unit": column.unit, "meaning": column.meaning} for column in table.columns
-                ],
-            }
-            for table in result.tables.values()
-        },
-        "files": dict(files),
-    }
+    content = (
+        computed_from(study, result.command)
+        | asdict(asked)
+        | {
+            "counts": plain(dict(result.counts)),
+            "warnings": [*(f"{warning.key}: {warning.message}" for warning in study.warnings), *result.warnings],
+            "failed": result.failed,
+            **({"interrupted": result.interrupted} if result.interrupted else {}),
+            "requirements": [plain(asdict(verdict)) for verdict in verdicts],
+            "tables": {
+                f"{table.name}.csv": {
+                    "meaning": table.meaning,
+                    "rows": len(table),
+                    "columns": [
+                        {"name": column.name, "unit": column.unit, "meaning": column.meaning}
+                        for column in table.columns
+                    ],
+                }
+                for table in result.tables.values()
+            },
+            "files": dict(files),
+        }
+    )
     return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
 
 
@@ -101,7 +99,7 @@ def is_current(directory: Path, study: Study, command: str, asked: Extras) -> di
     content = read(directory)
     if content is None:
         return None
-    expected = origin(study, command, asked)
+    expected = computed_from(study, command) | asdict(asked)
     for pictures in ("plots", "animate"):
         if not expected[pictures]:
             expected[pictures] = content.get(pictures)

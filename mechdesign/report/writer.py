@@ -80,15 +80,19 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
     return warnings
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write one text file whole or not at all.
+def write_file(path: Path, data: bytes) -> None:
+    """Write one file whole or not at all.
 
     Raises
     ------
     OutputError
         If it cannot be written.
     """
-    _write(path, text.encode())
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace(path, [data])
+    except OSError as error:
+        raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
 
 
 def write_sketch(directory: Path, study: Study) -> str:
@@ -109,7 +113,7 @@ def write_sketch(directory: Path, study: Study) -> str:
             data = style.to_png(sketch_figure(study))
     except Exception as error:
         return f"warning: {_undrawn(MECHANISM, explain(error)[1])}"
-    _write(path, data)
+    write_file(path, data)
     return f"the sketch as understood is in {path}"
 
 
@@ -149,11 +153,3 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[di
 
 def _undrawn(name: str, why: str) -> str:
     return f"picture {name} could not be drawn: {why}"
-
-
-def _write(path: Path, data: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        replace(path, [data])
-    except OSError as error:
-        raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
-import math
 import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, Problem, StudyError
-from mechdesign.expressions import Expression
+from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
@@ -35,7 +34,7 @@ from mechdesign.study.schema.study_file import StudyFile, check, check_poses
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text.document import Document, plain, read
-from mechdesign.study.text.numbers import LOST, Context, check_parameter_name, read_number, shown
+from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 from mechdesign.threads import one_thread
@@ -185,7 +184,7 @@ def load_document(
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
-    check_poses(parts, mechanism, reporter, path.parent, 2.0 * math.pi / context.units.angle_factor)
+    check_poses(parts, mechanism, reporter, path.parent)
     reporter.done()
     name = parts.get("name") or path.stem
     seed = parts["seed"] if seed is None else seed
@@ -229,8 +228,12 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
     formulas: dict[str, Expression] = {}
     for name, value in raw.items():
         path = ("mechanism", "parameters", name)
-        if wrong_name := check_parameter_name(name):
-            reporter.report(path, wrong_name, at_key=True)
+        if not NAME.fullmatch(name):
+            message = "a parameter's name is letters, digits and underscores, with a letter first"
+            reporter.report(path, message, at_key=True)
+        elif name in RESERVED:
+            message = f"{name!r} is a word of the expression language; choose another name"
+            reporter.report(path, message, at_key=True)
         try:
             number = read_number(value, Context(units, nominal, [other for other in raw if other not in nominal]))
         except PydanticCustomError as error:

@@ -136,8 +136,8 @@ def sweep_values(sweep: Sweep) -> Floats:
     return sweep.from_ + sweep.step * np.arange(math.floor(steps) + 1, dtype=np.float64)
 
 
-def expand(section: PoseSection, folder: Path, turn: float) -> Poses | None:
-    """Poses of a section, None where it gives none, or those of the workspace; `turn` as for `default`.
+def expand(section: PoseSection, folder: Path) -> Poses | None:
+    """Poses of a section, None where it gives none, or those of the workspace; files of paths lie in `folder`.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def expand(section: PoseSection, folder: Path, turn: float) -> Poses | None:
     if section.sweep is not None:
         return _grid({name: sweep_values(sweep) for name, sweep in section.sweep.items()})
     if section.path is not None:
-        return _path(section.path, folder, turn)
+        return _path(section.path, folder)
     return None
 
 
@@ -180,13 +180,13 @@ def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> 
     return Poses((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
 
 
-def _path(path: Mapping[str, paths.PathSection], folder: Path, turn: float) -> Poses:
+def _path(path: Mapping[str, paths.PathSection], folder: Path) -> Poses:
     if not path:
         raise StudyError("an empty path")
     columns: dict[str, Floats] = {}
     found: dict[str, paths.Course] = {}
     for name, given in path.items():
-        course = paths.course(name, given, folder, turn)
+        course = paths.course(name, given, folder)
         if isinstance(course, paths.Course):
             found[name] = course
             columns[f"{name}.x"], columns[f"{name}.y"] = course.places.real, course.places.imag
@@ -218,10 +218,8 @@ def _path(path: Mapping[str, paths.PathSection], folder: Path, turn: float) -> P
     return replace(poses, closed=along.closed, slopes=slopes, bends=bends)
 
 
-def default(description: Description, turn: float) -> Poses:
+def default(description: Description) -> Poses:
     """Poses where a study gives none: a turn of an angle drive in 72 steps, or the drive's limits in 50.
-
-    `turn` is a full turn in the study's unit.
 
     Raises
     ------
@@ -241,7 +239,7 @@ def default(description: Description, turn: float) -> Poses:
             ends = [(description.places[end].nominal if isinstance(end, str) else end) / factor for end in (low, high)]
             return _grid({drive.name: np.linspace(ends[0], ends[1], 51)})
     if drive.kind == "angle":
-        return _grid({drive.name: np.linspace(0.0, turn, 73)})
+        return _grid({drive.name: np.linspace(0.0, 2.0 * math.pi / factor, 73)})
     raise StudyError(
         f"the study says no poses, and the drive {drive.name!r} has no limits to move between; "
         "give 'poses', 'sweep' or 'path', or limits of the drive"

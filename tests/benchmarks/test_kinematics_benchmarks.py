@@ -16,7 +16,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.chunks import MANY
+from mechdesign.mechanism.plan import MANY
 from mechdesign.parallel import map_chunks
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -9,8 +9,8 @@ from math import comb, factorial
 import numpy as np
 from scipy.special import gammaincc, ndtr
 
-from mechdesign.analyses.reliability.engine import quasi
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
+from mechdesign.analyses.reliability.methods import quasi_monte_carlo as quasi
 from mechdesign.numerics.arrays import Floats
 
 

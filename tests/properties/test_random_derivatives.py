@@ -15,7 +15,7 @@ from hypothesis import assume, given, settings
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
+from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.numerics.arrays import Floats
 
 BEND = 0.7
@@ -84,7 +84,12 @@ def test_velocities_and_accelerations_are_derivatives(made: Made) -> None:
         coordinate = mechanism.coordinate(name)
         values = along(near, coordinate)
         agree(first(near[2], coordinate, velocity), slopes(values, h), 1e-9, f"{name} velocity")
-        agree(second(near[2], coordinate, velocity, acceleration), bends(values, h), 1e-6, f"{name} acceleration")
+        agree(
+            second(near[2], coordinate, velocity, velocity, acceleration),
+            bends(values, h),
+            1e-6,
+            f"{name} acceleration",
+        )
 
 
 @settings(max_examples=30)
@@ -126,11 +131,12 @@ def test_sensitivities_of_every_order_are_derivatives(made: Made) -> None:
     assume(configuration.valid.all())
     position = linear.sensitivity(places)
     velocity_z, acceleration_z = linear.rate_sensitivity(places, position, velocity, acceleration)
-    motion = Motion(velocity, acceleration, position, velocity_z, acceleration_z)
     orders: list[Callable[[Coordinate], object]] = [
         lambda c: first(configuration, c, position),
-        lambda c: velocity_sensitivity(configuration, c, motion),
-        lambda c: acceleration_sensitivity(configuration, c, motion),
+        lambda c: second(configuration, c, velocity, position, velocity_z),
+        lambda c: acceleration_sensitivity(
+            configuration, c, velocity, acceleration, position, velocity_z, acceleration_z
+        ),
     ]
     names = made.rng.sample([n for n in mechanism.coordinates if n not in mechanism.drives], 5)
     for row, place in enumerate(places):
@@ -141,7 +147,7 @@ def test_sensitivities_of_every_order_are_derivatives(made: Made) -> None:
             shown = [
                 along([state[0] for state in states], c),
                 [np.broadcast_to(first(state[0], c, state[2]), time.shape) for state in states],
-                [np.broadcast_to(second(state[0], c, state[2], state[3]), time.shape) for state in states],
+                [np.broadcast_to(second(state[0], c, state[2], state[2], state[3]), time.shape) for state in states],
             ]
             # The acceleration of an expression has no sensitivity: it is refused.
             told = orders[:2] if c.kind == "expression" else orders

@@ -14,7 +14,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE
-from mechdesign.analyses.reliability.engine.ladder import PILOT
+from mechdesign.analyses.reliability.methods.auto import PILOT
 from mechdesign.results import Result, Table
 
 CONFIGS = Path(__file__).parents[2] / "configs"

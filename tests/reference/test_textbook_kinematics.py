@@ -33,7 +33,7 @@ def test_stephenson_six_bar() -> None:
     point = [mechanism.coordinate(name) for name in ("F.x", "F.y")]
     assert [float(configuration.value(c)) for c in point] == pytest.approx([40.240922, 31.364929], abs=5e-7)
     assert [first(configuration, c, velocity) for c in point] == pytest.approx([-16.383413, -5.427798], abs=5e-7)
-    accelerations = [second(configuration, c, velocity, acceleration) for c in point]
+    accelerations = [second(configuration, c, velocity, velocity, acceleration) for c in point]
     # The published x component, 2.248607, is not that of the published positions: central differences of the six-bar
     # drawn with circles, extrapolated to no step, give 2.2485086; y agrees in every digit.
     assert accelerations == pytest.approx([2.2485086, -19.991494], abs=5e-7)
@@ -63,7 +63,7 @@ mechanism:
     velocity = linear.velocity([1.0])
     rocker = mechanism.coordinate("rocker.angle")
     assert float(first(configuration, rocker, velocity)) == pytest.approx(0.147301, abs=5e-7)
-    bend = second(configuration, rocker, velocity, linear.acceleration(velocity, [0.0]))
+    bend = second(configuration, rocker, velocity, velocity, linear.acceleration(velocity, [0.0]))
     assert float(bend) == pytest.approx(0.378656, abs=5e-7)
 
 

@@ -10,8 +10,9 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism import chunks
-from mechdesign.mechanism.assemblies import assemblies, in_words
+from mechdesign.mechanism.assemblies import assemblies
+from mechdesign.mechanism.describe import assemblies_in_words
+from mechdesign.mechanism.plan import CHUNK
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FOUR_BAR = """
@@ -49,7 +50,7 @@ def test_a_four_bar_has_two_assemblies_mirrored_about_the_line_of_its_outer_join
     mirrored = d + (a - d) * np.conj((one.configuration.point("B") - d) / (a - d))
     assert two.configuration.point("B") == pytest.approx(mirrored, abs=1e-12)
     assert one["rocker.angle"] == pytest.approx(mechanism.solve({"theta": angles})["rocker.angle"])
-    assert in_words(mechanism) == ["assembly modes: 2, chosen by B (2 each)"]
+    assert assemblies_in_words(mechanism) == ["assembly modes: 2, chosen by B (2 each)"]
 
 
 def test_working_modes_of_the_inverse_problem_are_listed_too() -> None:
@@ -78,7 +79,7 @@ def test_every_assembly_of_a_group_without_a_closed_form_solves_its_loops() -> N
         for name in mechanism.drives:
             assert float(again.value(mechanism.coordinate(name))) == pytest.approx(lengths[name], rel=1e-12)
     assert len(np.unique(np.round(places, 6), axis=0)) == len(found)
-    assert f"{len(found)} found" in in_words(mechanism)[0]
+    assert f"{len(found)} found" in assemblies_in_words(mechanism)[0]
 
 
 def test_too_many_assemblies_are_refused() -> None:
@@ -118,11 +119,11 @@ def test_side_keeps_the_joint_on_its_side_instead() -> None:
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_large_batches_come_out_as_small_ones(jobs: int) -> None:
     mechanism = study_of(FOUR_BAR, "mechanism.links.rod.length=1.9").mechanism
-    angles = np.linspace(-2.0, 3.0, 3 * chunks.CHUNK + 17)
+    angles = np.linspace(-2.0, 3.0, 3 * CHUNK + 17)
     longer = np.linspace(1.85, 1.95, len(angles))
     whole = mechanism.forward.solve([angles], {"rod.length": longer}, jobs=jobs)
     assert 0 < whole.valid.sum() < len(angles)
-    for some in (slice(0, 100), slice(chunks.CHUNK - 50, chunks.CHUNK + 50), slice(len(angles) - 20, None)):
+    for some in (slice(0, 100), slice(CHUNK - 50, CHUNK + 50), slice(len(angles) - 20, None)):
         part = mechanism.forward.solve([angles[some]], {"rod.length": longer[some]})
         assert (part.reason == whole.reason[some]).all()
         for name in ("O", "B", "P"):

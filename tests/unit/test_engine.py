@@ -9,10 +9,10 @@ from helpers.limit_states import Case, quasi_monte_carlo
 from scipy.special import ndtr
 
 from mechdesign.analyses.reliability.engine.design_points import find
-from mechdesign.analyses.reliability.engine.form import form
-from mechdesign.analyses.reliability.engine.importance import importance_sampling
-from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
+from mechdesign.analyses.reliability.engine.intervals import WIDTH, Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
+from mechdesign.analyses.reliability.methods.form import form
+from mechdesign.analyses.reliability.methods.importance_sampling import importance_sampling
 
 CASES = {
     **{f"half_space_{d}_{beta:g}": limit_states.linear(d, beta) for d in (1, 2, 30, 100) for beta in (2.0, 4.0, 7.0)},
@@ -176,7 +176,7 @@ def test_a_limit_out_of_reach_of_a_bounded_variable_is_never_broken() -> None:
 
 def test_pins_in_contact() -> None:
     """Two pins on their rims: the x offset of both beyond a limit, against the integral over the one's direction."""
-    from mechdesign.analyses.reliability.pins import PIN_LAWS
+    from mechdesign.analyses.reliability.laws import PIN_LAWS
 
     limit = 1.99
 

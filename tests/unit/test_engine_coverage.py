@@ -8,12 +8,10 @@ from helpers import limit_states
 from helpers.limit_states import Case, quasi_monte_carlo
 
 from mechdesign.analyses.reliability.engine.design_points import find
-from mechdesign.analyses.reliability.engine.importance import importance_sampling
-from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE, binomial, weighted
-from mechdesign.analyses.reliability.engine.ladder import climb
-from mechdesign.analyses.reliability.engine.precision import WIDTH, Precision
+from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE, WIDTH, Precision, binomial, weighted
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
-from mechdesign.analyses.reliability.methods.auto import rungs
+from mechdesign.analyses.reliability.methods.auto import climb, rungs
+from mechdesign.analyses.reliability.methods.importance_sampling import importance_sampling
 
 SEEDS = 80
 CASES = {

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mechdesign.expressions import Expression, ExpressionError, is_linear
+from mechdesign.expressions import Expression, ExpressionError
 
 DEGREE = math.pi / 180
 
@@ -133,4 +133,4 @@ def test_python_is_refused_and_not_executed(text, tmp_path, monkeypatch):
     ],
 )  # fmt: skip
 def test_sums_of_multiples_are_linear(text: str, linear: bool) -> None:
-    assert is_linear(Expression.parse(text)) is linear
+    assert Expression.parse(text).is_linear() is linear

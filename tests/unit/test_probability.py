@@ -8,11 +8,12 @@ from scipy.special import ndtr, owens_t
 
 from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
+from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.probability import (
     disc_failure,
     failure_probability,
 )
+from mechdesign.analyses.reliability.question import Band, Disc
 from mechdesign.numerics.statistics import rectangle_failure
 
 

@@ -10,8 +10,7 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.analyses.reliability.cumulants import cumulants
-from mechdesign.analyses.reliability.methods.second_order import Quadratic
+from mechdesign.analyses.reliability.methods.second_order import Quadratic, cumulants
 from mechdesign.analyses.reliability.sources import find_sources
 from mechdesign.results import Result
 
@@ -132,8 +131,8 @@ def test_cumulants_are_those_of_what_is_drawn(correlation: str) -> None:
     law = cumulants(sources)
     count = 1_000_000
     drawn = sources.draw(np.random.default_rng(5), count)
-    offsets = [radius * part for radius, pin in zip(drawn.radii, drawn.pins, strict=True) for part in pin]
-    z = np.stack([*drawn.scalars, *offsets])
+    pins = drawn[len(sources.scalars) :].reshape(-1, 3, count)
+    z = np.concatenate([drawn[: len(sources.scalars)], (pins[:, :1] * pins[:, 1:]).reshape(-1, count)])
     rng = np.random.default_rng(6)
     sigma = np.sqrt(np.diagonal(law.covariance))
     slope = rng.normal(size=(3, len(z))) / sigma

@@ -22,7 +22,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.stiffness.beams import Beams
-from mechdesign.analyses.stiffness.elements import Beam, Guide, Hinge
+from mechdesign.analyses.stiffness.network import Beam, Guide, Hinge
 
 CRANK, ROD = Beams("crank", ("O", "A"), False), Beams("rod", ("A", "B"), False)
 

@@ -15,7 +15,7 @@ from mechdesign.analyses.poses import solve_poses
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.four_bars import FourBar
-from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.outputs import Rates
 from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Column, Table
 

@@ -99,7 +99,7 @@ def inverse_rates(
     speeds = _solve(matrix, good, rates.velocities)
     velocity = linear.velocity(speeds)
     coasting = linear.acceleration(velocity, [0.0] * len(given))
-    own = [second(linear.configuration, coordinate, velocity, coasting) for coordinate in given]
+    own = [second(linear.configuration, coordinate, velocity, velocity, coasting) for coordinate in given]
     return DriveRates(speeds, _solve(matrix, good, [a - b for a, b in zip(rates.accelerations, own, strict=True)]))
 
 

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.analyses.kinematics import analysis as kinematics
-from mechdesign.analyses.kinematics.motion import Motion, motion_question
-from mechdesign.analyses.kinematics.moving import move
+from mechdesign.analyses.kinematics.motion import Motion, motion_question, move
 from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
-from mechdesign.expressions import Expression, is_linear
+from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Flags, Floats
@@ -107,7 +106,7 @@ def _first_order(study: Study, names: Collection[str]) -> bool:
     reached = {name for name in section.dimensions if name in study.parameters.nominal}
     for name, formula in {**study.parameters.formulas, **study.parameters.dependent}.items():
         if formula.names & reached:
-            if not is_linear(formula) or name in names:
+            if not formula.is_linear() or name in names:
                 return False
             reached.add(name)
     return True

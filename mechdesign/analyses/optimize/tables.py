@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
 from mechdesign.analyses.optimize.variables import ROUNDING, Batch, bounds, steps
@@ -102,7 +103,7 @@ class Comparison:
             if each in designs.errors:
                 meaning = f"estimated error of {each.name}"
                 yield Column(f"{each.name}_error", designs.errors[each][rows], told[each][0], meaning)
-        yield Column("CPI", self.cpi[rows], "", "sum of the normalised indices")
+        yield from shared(self.study.units, CPI=self.cpi[rows])
 
     def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
         worst = ("", f"worst row of {judged.name}")
@@ -125,7 +126,7 @@ def optimum_table(compared: Comparison) -> Table:
             for each, column in zip(compared.designs.goals, compared.weights.T, strict=True)
         ),
         *compared.columns(rows),
-        Column("score", np.array(scores), "", "weighted sum of the normalised indices"),
+        *shared(study.units, score=scores),
         *(Column(name, value, "", "parameter that follows from the variables") for name, value in following.items()),
         Column(
             "active", np.array(_active(compared), dtype=object), "", "bounds and conditions that the optimum lies at"
@@ -188,7 +189,7 @@ def best_table(compared: Comparison) -> Table:
         Column("optimum", row_numbers, "", "row of optimum.csv whose weights are taken"),
         Column("rank", ranks, "", "1 is the optimum"),
         *compared.columns(picked),
-        Column("score", scores, "", "weighted sum of the normalised indices"),
+        *shared(compared.study.units, score=scores),
     )
     return Table("best", columns, "the best designs for each set of weights, none of them next to a better one")
 

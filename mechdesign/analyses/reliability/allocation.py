@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.reliability import methods
-from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, ToleranceModel, UnreachableError, cheapest
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, ToleranceModel, cheapest
+from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.tables import at_poses
 from mechdesign.analyses.reliability.task import Partial, Task
@@ -87,10 +88,9 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     rounds: list[_Round] = []
     failed = ""
     while len(rounds) < _ROUNDS:
-        try:
-            scales = cheapest(model, allowed)
-        except UnreachableError as error:
-            failed = _unreachable(model, error, allowed, asked)
+        scales = cheapest(model, allowed)
+        if scales is None:
+            failed = _unreachable(model, allowed, asked)
             break
         scales[free] = [found[k].rounded(float(scales[k])) for k in free.tolist()]
         analytic = model.failures(scales, range(len(task.settings)))
@@ -146,18 +146,18 @@ def _simulated(model: ToleranceModel, scales: Floats, method: str) -> list[Estim
     return [said.estimates[setting.pose] for setting in task.settings]
 
 
-def _shares(model: ToleranceModel, scales: Floats, k: int) -> Floats:
-    """Share of each source in the variances of the limited errors at a pose, each over the square of its limit."""
+def _shares(model: ToleranceModel, scales: Floats) -> Floats:
+    """Shares of the sources in the variances of limited errors over their squared limits, shape (poses, sources)."""
     question = model.task.question
-    linear = model.linear(scales).take([model.task.settings[k].pose])
-    share, variance = linear.share()[:, :, 0], linear.deviation()[:, 0] ** 2
-    weights = np.zeros(len(variance))
+    linear = model.linear(scales).take([setting.pose for setting in model.task.settings])
+    weights = np.zeros(len(question.channels))
     for band in question.bands:
         weights[band.output] += 1.0 / max(min(abs(band.low), abs(band.high)), _NARROW) ** 2
     for disc in question.discs:
         weights[[disc.x, disc.y]] += 1.0 / max(disc.radius, _NARROW) ** 2
-    parts = np.nansum(share * (weights * variance)[:, None], axis=0)
-    return np.asarray(parts / parts.sum()) if parts.sum() > 0 else np.full(len(parts), np.nan)
+    parts = np.nansum(linear.share() * (weights[:, None] * linear.deviation() ** 2)[:, None], axis=0).T
+    with np.errstate(invalid="ignore"):
+        return np.asarray(parts / parts.sum(axis=1, keepdims=True))
 
 
 def _allocation(last: _Round) -> Table:
@@ -174,7 +174,7 @@ def _allocation(last: _Round) -> Table:
         Column("unit", np.array([tolerance.unit for tolerance in found]), meaning="unit of the two columns before"),
         Column("cost_given", prices[0], meaning="a/T^exponent; nan where it is held"),
         Column("cost_allocated", prices[1], meaning="a/T^exponent; nan where it is held"),
-        Column("share", _shares(last.model, last.scales, int(np.argmax(last.analytic))),
+        Column("share", _shares(last.model, last.scales)[int(np.argmax(last.analytic))],
                meaning="share of the limited errors' variance (over the square of each limit) with the "
                "allocated tolerances, at the pose that fails most often"),
     )  # fmt: skip
@@ -194,7 +194,7 @@ def _confirmation(last: _Round, reliability: float) -> Table:
         Column("low", 1.0 - high, meaning="lower end of its interval, 99.7 %"),
         Column("high", 1.0 - low, meaning="upper end of its interval, 99.7 %"),
         Column("method", np.full(len(rows), last.method), meaning="how it was simulated"),
-        Column("evaluations", np.array([e.evaluations for e in said]), meaning="mechanisms that were solved for it"),
+        *shared(last.model.task.study.units, evaluations=[e.evaluations for e in said]),
         Column("met", ~last.missed(1.0 - reliability), meaning="1 where the interval holds the reliability asked, or "
                "all of it is above"),
     ]  # fmt: skip
@@ -224,8 +224,7 @@ def _ends(last: _Round) -> list[str]:
 
 def _idle(model: ToleranceModel, scales: Floats) -> Flags:
     """Allocated tolerances that change no limited error at any pose, to the first order."""
-    shares = [_shares(model, scales, k)[model.free] for k in range(len(model.task.settings))]
-    return np.asarray(~(np.abs(shares) > _NOTHING).any(axis=0))
+    return np.asarray(~(np.abs(_shares(model, scales)[:, model.free]) > _NOTHING).any(axis=0))
 
 
 def _plain(failure: float) -> str:
@@ -234,15 +233,15 @@ def _plain(failure: float) -> str:
     return f"{1.0 - failure:.{digits}f}".rstrip("0").rstrip(".")
 
 
-def _unreachable(model: ToleranceModel, error: UnreachableError, allowed: Floats, asked: float) -> str:
+def _unreachable(model: ToleranceModel, allowed: Floats, asked: float) -> str:
     """Why the tightest tolerances do not do, and what they reach."""
     # SciPy takes a quarter of a second to import, and a study without limits does not need it.
     from mechdesign.analyses.reliability.probability import failure_probability
 
-    worst = int(np.argmax(error.failures / allowed))
-    pose, question = model.task.settings[worst].pose, model.task.question
-    tightest = model.scales(np.full(len(model.free), np.log(TIGHTEST)))
-    share = _shares(model, tightest, worst)
+    tightest, question = model.scales(model.tightest), model.task.question
+    failures = model.failures(tightest, range(len(allowed)))
+    worst = int(np.argmax(failures / allowed))
+    pose, share = model.task.settings[worst].pose, _shares(model, tightest)[worst]
     held = [
         f"{tolerance.name} ({share[k]:.0%})"
         for k, tolerance in sorted(enumerate(model.tolerances), key=lambda pair: -share[pair[0]])
@@ -262,6 +261,6 @@ def _unreachable(model: ToleranceModel, error: UnreachableError, allowed: Floats
         reason = "they would have to shrink to nothing"
     return (
         f"allocate: a reliability of {target} cannot be reached at {model.task.where(pose)}: with all tolerances at "
-        f"{TIGHTEST:g} times the given ones it is {_plain(error.failures[worst])}; {reason}"
+        f"{TIGHTEST:g} times the given ones it is {_plain(failures[worst])}; {reason}"
         + ("; a clearance that 'cost' names is allocated too" if held else "")
     )

@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.rates import DriveRates, drive_rates
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses, study_poses
-from mechdesign.analyses.reliability import drawn_tables, methods, sobol, tables
+from mechdesign.analyses.reliability import methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import allocate
-from mechdesign.analyses.reliability.assembly import forward_plan
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
-from mechdesign.analyses.reliability.engine.precision import Precision
-from mechdesign.analyses.reliability.engine.sobol import SobolIndices
+from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.first_order import linear_errors, nominal_values
 from mechdesign.analyses.reliability.notes import notes
 from mechdesign.analyses.reliability.question import ask, unsaid
-from mechdesign.analyses.reliability.simulation import Setting
+from mechdesign.analyses.reliability.setting import Setting, forward_plan
+from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MOST, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted
@@ -118,7 +117,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     made = [tables.moments(task, found), *([tables.success(task, found)] if task.question.limited else ())]
     made += [tables.contributions(task, indices)]
     # Of the first method that samples the errors.
-    made += drawn_tables.build(task, next((each.sums for each in found if each.sums), {}))
+    made += tables.of_drawn(task, next((each.sums for each in found if each.sums), {}))
     result = Result(
         "reliability", {table.name: table for table in made} | dict(allocated.tables),
         [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,
@@ -206,8 +205,6 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     settings = []
     for solved, rates in groups:
         given = set(solved.given) == set(mechanism.drives)
-        each = [solved.configuration.value(mechanism.coordinate(name)) for name in mechanism.drives]
-        drives = [np.broadcast_to(values, solved.configuration.shape) for values in each]
         for k, row in enumerate(solved.rows.tolist()):
             if not task.assembled[row]:
                 continue
@@ -219,9 +216,8 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
             settings.append(
                 Setting(
                     task.question, row, mechanism, mechanism.forward if given else forward_plan(mechanism, pose), pose,
-                    [float(values[k]) for values in drives], rates.take(k),
-                    task.nominal[:, row].tolist(), None if task.elastic is None else task.elastic.take([row]), scale,
-                    row == assembled[0],
+                    rates.take(k), task.nominal[:, row].tolist(),
+                    None if task.elastic is None else task.elastic.take([row]), scale, row == assembled[0],
                 )
             )  # fmt: skip
     return sorted(settings, key=lambda setting: setting.pose)

@@ -54,6 +54,11 @@ class ToleranceModel:
         scales[self.free] = np.exp(x)
         return scales
 
+    @property
+    def tightest(self) -> Floats:
+        """Logarithms of the least factors."""
+        return np.full(len(self.free), np.log(TIGHTEST))
+
     def linear(self, scales: Floats) -> FirstOrder:
         """The linear model of these tolerances."""
         return replace(self.task.linear, sources=self.task.sources.widened(scales))
@@ -68,46 +73,17 @@ class ToleranceModel:
 
     def cost(self, x: Floats) -> tuple[float, Floats]:
         """Cost of all that is allocated, and its derivatives by x."""
-        prices, slopes = [], []
-        for k, scale in zip(self.free.tolist(), np.exp(x).tolist(), strict=True):
-            tolerance = self.tolerances[k]
-            assert tolerance.cost is not None
-            prices.append(tolerance.price(tolerance.given * scale))
-            slopes.append(-tolerance.cost.exponent * prices[-1])
-        return float(sum(prices)), np.array(slopes)
+        each = [self.tolerances[k] for k in self.free.tolist()]
+        prices = np.array([t.price(t.given * scale) for t, scale in zip(each, np.exp(x).tolist(), strict=True)])
+        return float(prices.sum()), -np.array([t.cost.exponent for t in each if t.cost is not None]) * prices
 
 
-class UnreachableError(Exception):
-    """Not even the tightest tolerances reach what is asked.
-
-    Parameters
-    ----------
-    failures : ndarray, shape (poses,)
-        That they leave.
-    """
-
-    def __init__(self, failures: Floats) -> None:
-        super().__init__()
-        self.failures = failures
-
-
-def cheapest(model: ToleranceModel, allowed: Floats) -> Floats:
-    """Factors of all tolerances.
-
-    Parameters
-    ----------
-    allowed : ndarray, shape (poses,)
-        Probability of failure that is allowed at each pose.
-
-    Raises
-    ------
-    UnreachableError
-        If the tightest tolerances break a constraint.
-    """
+def cheapest(model: ToleranceModel, allowed: Floats) -> Floats | None:
+    """Factors of all tolerances; None where not even the tightest keep each pose's failures, of shape (poses,)."""
     from scipy.optimize import minimize
 
     count = len(model.free)
-    lowest, highest = np.full(count, np.log(TIGHTEST)), np.log(model.widest)
+    lowest, highest = model.tightest, np.log(model.widest)
     every = range(len(model.task.settings))
     wanted = _distance(allowed)
 
@@ -119,7 +95,7 @@ def cheapest(model: ToleranceModel, allowed: Floats) -> Floats:
         return np.stack([(margins(x + h, which) - margins(x - h, which)) / (2 * _STEP) for h in steps], axis=1)
 
     if margins(lowest, every).min() < 0:
-        raise UnreachableError(model.failures(model.scales(lowest), every))
+        return None
     if margins(highest, every).min() >= 0:
         return model.scales(highest)
     alike = _shifted(margins, np.zeros(count), lowest, highest, every)

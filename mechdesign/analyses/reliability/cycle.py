@@ -14,8 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.simulation import CHUNK, Setting, errors_of, generator, keeps
+from mechdesign.analyses.reliability.setting import Setting, errors_of
+from mechdesign.analyses.reliability.simulation import CHUNK, generator
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Ints
@@ -107,17 +109,15 @@ def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk:
         if not left:
             break
         if place:
-            drawn = sources.redraw_pins(drawn, generator(seed, chunk, place, *_STREAM), left)
+            drawn = sources.redraw_pins(drawn, generator(seed, chunk, place, *_STREAM))
         errors, valid = errors_of(setting, sources.made(drawn), left)
         evaluations += left
-        within &= keeps(setting.question, errors)
+        within &= setting.question.keeps(errors)
         if not valid.all():
-            drawn, within = drawn.take(valid), within[valid]
+            drawn, within = drawn[:, valid], within[valid]
     return np.array([count, count - np.count_nonzero(within), count - len(within), evaluations])
 
 
 def _estimate(counted: Ints) -> Estimate:
-    from mechdesign.analyses.reliability.engine.intervals import binomial
-
     samples, failures, invalid, evaluations = counted.tolist()
     return Estimate(failures / samples, *binomial(failures, samples), evaluations, samples, failures, invalid)

@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.error_limits import Channel
+from mechdesign.analyses.reliability.question import Channel
 from mechdesign.analyses.stiffness.analysis import Body
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.rates import Rates
+from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import LOADS

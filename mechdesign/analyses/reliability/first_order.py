@@ -13,11 +13,11 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.error_limits import Channel
+from mechdesign.analyses.reliability.question import Channel
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.outputs import Motion, acceleration_sensitivity, first, second, velocity_sensitivity
+from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.schema.reliability import LOADS
 
@@ -105,6 +105,13 @@ class FirstOrder:
         return np.minimum(low, high).sum(axis=1) + offset, np.maximum(low, high).sum(axis=1) + offset
 
 
+def correlation(covariance: Floats) -> Floats:
+    """Correlation of two errors, of shape (..., 2, 2); nan where one does not vary [S2, eq. 11, prints its inverse]."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        product = np.sqrt(covariance[..., 0, 0] * covariance[..., 1, 1])
+        return np.asarray(np.where(product > 0, covariance[..., 0, 1] / product, np.nan))
+
+
 def nominal_values(
     mechanism: Mechanism, configuration: Configuration, channels: Sequence[Channel], rates: DriveRates
 ) -> list[Value]:
@@ -122,7 +129,7 @@ def nominal_values(
         elif acceleration is None or channel.order == 1:
             values.append(first(configuration, channel.coordinate, velocity))
         else:
-            values.append(second(configuration, channel.coordinate, velocity, acceleration))
+            values.append(second(configuration, channel.coordinate, velocity, velocity, acceleration))
     return values
 
 
@@ -159,20 +166,19 @@ def derivatives(
     names = [names[row] for row in rows]
     linear = mechanism.linearize(configuration)
     position = linear.sensitivity(names)
-    motion: Motion | None = None
     if any(channel.order for channel in channels):
         velocity = linear.velocity(rates.velocities)
         acceleration = linear.acceleration(velocity, rates.accelerations)
         velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
-        assert acceleration_z is not None
-        motion = Motion(velocity, acceleration, position, velocity_z, acceleration_z)
     for row, channel in zip(found, channels, strict=True):
-        if motion is None or channel.order == 0:
+        if channel.order == 0:
             row[rows] = first(configuration, channel.coordinate, position)
         elif channel.order == 1:
-            row[rows] = velocity_sensitivity(configuration, channel.coordinate, motion)
+            row[rows] = second(configuration, channel.coordinate, velocity, position, velocity_z)
         else:
-            row[rows] = acceleration_sensitivity(configuration, channel.coordinate, motion)
+            row[rows] = acceleration_sensitivity(
+                configuration, channel.coordinate, velocity, acceleration, position, velocity_z, acceleration_z
+            )
     return found
 
 

@@ -6,8 +6,9 @@ import itertools
 import math
 from collections.abc import Sequence
 
-from mechdesign.analyses.reliability.engine.precision import WIDTH
+from mechdesign.analyses.reliability.engine.intervals import WIDTH
 from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.methods.auto import FACTOR, disagree
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 
@@ -22,11 +23,6 @@ def notes(found: Sequence[MethodResult], task: Task) -> list[str]:
 
 def disagreements(found: Sequence[MethodResult], task: Task) -> list[str]:
     """One sentence for each two methods that are apart by more than a factor beyond their intervals: the worst pose."""
-    if not any(each.estimates for each in found):
-        return []
-    # What compares probabilities imports SciPy, which takes a quarter of a second; moments do without.
-    from mechdesign.analyses.reliability.engine.ladder import FACTOR, disagree
-
     apart: dict[tuple[str, str], list[tuple[float, int, Estimate, Estimate]]] = {}
     for pose in range(task.poses.count):
         estimates: dict[str, Estimate] = {}
@@ -55,25 +51,20 @@ def disagreements(found: Sequence[MethodResult], task: Task) -> list[str]:
 
 def _unseen(found: Sequence[MethodResult], task: Task) -> list[str]:
     """Where counted failures are none: the upper end of the interval."""
-
-    def none(estimate: Estimate | None) -> bool:
-        return estimate is not None and estimate.samples > 0 and estimate.failures == 0
-
-    sentences = []
+    cases = []
     for each in found:
-        cases = []
-        poses = {pose: estimate for pose, estimate in each.estimates.items() if none(estimate)}
+        poses = {pose: e for pose, e in each.estimates.items() if e.samples and not e.failures}
         if poses:
             pose, widest = max(poses.items(), key=lambda item: item[1].high)
-            cases.append((widest, "samples", f"at {task.where(pose)}" if len(poses) == 1 else f"at {len(poses)} poses"))
-        if each.cycle is not None and none(each.cycle):
-            cases.append((each.cycle, "made mechanisms", "over the whole cycle"))
-        sentences += [
-            f"{each.method}: no failure in {estimate.samples} {what} {where}: the probability of failure is below "
-            f"{estimate.high:.2g}"
-            for estimate, what, where in cases
-        ]
-    return sentences
+            where = f"at {task.where(pose)}" if len(poses) == 1 else f"at {len(poses)} poses"
+            cases.append((each.method, widest, "samples", where))
+        if each.cycle is not None and each.cycle.samples and not each.cycle.failures:
+            cases.append((each.method, each.cycle, "made mechanisms", "over the whole cycle"))
+    return [
+        f"{method}: no failure in {estimate.samples} {what} {where}: the probability of failure is below "
+        f"{estimate.high:.2g}"
+        for method, estimate, what, where in cases
+    ]
 
 
 def _unreached(found: Sequence[MethodResult], task: Task) -> list[str]:
@@ -120,8 +111,8 @@ def _unassembled(found: Sequence[MethodResult]) -> list[str]:
     """Where samples drawn about the limits meet what cannot be assembled."""
     sentences = []
     for each in found:
-        drawn = [estimate for pose, estimate in each.estimates.items() if estimate.invalid
-                 and _about_limits(each.used.get(pose, each.method))]  # fmt: skip
+        used = [(METHODS[each.used.get(pose, each.method)], estimate) for pose, estimate in each.estimates.items()]
+        drawn = [e for method, e in used if e.invalid and method.sampled and not method.errors]
         if drawn:
             invalid, samples = sum(part.invalid for part in drawn), sum(part.samples for part in drawn)
             sentences.append(
@@ -129,10 +120,6 @@ def _unassembled(found: Sequence[MethodResult]) -> list[str]:
                 "as failures"
             )
     return sentences
-
-
-def _about_limits(method: str) -> bool:
-    return METHODS[method].sampled and not METHODS[method].errors
 
 
 def _of_cycles(found: Sequence[MethodResult], task: Task) -> list[str]:

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from mechdesign.analyses.reliability.error_limits import Band, Disc, correlation
+from mechdesign.analyses.reliability.first_order import correlation
+from mechdesign.analyses.reliability.question import Band, Disc
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.statistics import FAR, outside, rectangle_failure
 

@@ -10,14 +10,44 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, radians
-from mechdesign.analyses.reliability.error_limits import Band, Channel, Disc
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import ReliabilitySection, split_order
-from mechdesign.study.schema.reliability_checks import others
+from mechdesign.study.schema.reliability import SUFFIXES, ReliabilitySection, others, split_order
 from mechdesign.study.text import fields
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One quantity whose error is asked: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
+
+    coordinate: Coordinate
+    order: int
+
+    @property
+    def name(self) -> str:
+        """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
+        return self.coordinate.name + SUFFIXES[self.order]
+
+
+@dataclass(frozen=True)
+class Band:
+    """Error number `output` within [low, high]; either may be infinite."""
+
+    output: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Disc:
+    """Errors number `x` and `y` within a circle about zero."""
+
+    x: int
+    y: int
+    radius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +87,38 @@ class Question:
             tuple(replace(disc, x=place[disc.x], y=place[disc.y]) for disc in self.discs),
             None,
         )
+
+    def keeps(self, errors: Floats) -> Flags:
+        """Which errors, of shape (channels, n), keep every limit; what is not assembled is nan and keeps none."""
+        kept = np.ones(errors.shape[1], dtype=bool)
+        with np.errstate(invalid="ignore"):
+            for band in self.bands:
+                error = errors[band.output]
+                kept &= (error >= band.low) & (error <= band.high)
+            for disc in self.discs:
+                x, y = errors[disc.x], errors[disc.y]
+                kept &= x * x + y * y <= disc.radius * disc.radius
+        return kept
+
+    @property
+    def _ends(self) -> list[tuple[int, float, float]]:
+        """Ends of the bands that are finite: error, end, and 1 of an upper one, -1 of a lower one."""
+        both = [(b.output, end, way) for b in self.bands for end, way in ((b.high, 1.0), (b.low, -1.0))]
+        return [each for each in both if np.isfinite(each[1])]
+
+    def margins(self, errors: Floats) -> Floats:
+        """How far errors, of shape (channels, n), are from each limit, negative beyond it, shape (limits, n)."""
+        found = [way * (end - errors[output]) for output, end, way in self._ends]
+        return np.stack([*found, *(disc.radius - np.hypot(errors[disc.x], errors[disc.y]) for disc in self.discs)])
+
+    def margin_slopes(self, errors: Floats, slopes: Floats) -> Floats:
+        """Derivatives of the margins, from those of the errors of shape (channels, dimension, n)."""
+        found = [-way * slopes[output] for output, _, way in self._ends]
+        for disc in self.discs:
+            x, y = errors[disc.x], errors[disc.y]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                found.append((-x * slopes[disc.x] - y * slopes[disc.y]) / np.hypot(x, y))
+        return np.stack(found)
 
 
 def ask(study: Study, section: ReliabilitySection) -> Question:

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mechdesign.analyses.kinematics.rates import DriveRates
-from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.first_order import nominal_values
-from mechdesign.analyses.reliability.question import Question
+from mechdesign.analyses.reliability.setting import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Made, Sources
-from mechdesign.mechanism import Configuration, Mechanism
-from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
 
@@ -43,53 +36,6 @@ def generator(seed: int, *stream: int) -> np.random.Generator:
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
-    """One pose, at which made mechanisms are solved.
-
-    Parameters
-    ----------
-    pose : int
-        Row of the pose; names its streams.
-    plan : Plan
-        That of the drives, in the assembly of the pose.
-    nominal : Configuration
-        Solved pose of the nominal mechanism.
-    drives : sequence of float
-        Values of the drives, which are held (radians, lengths).
-    rates : DriveRates
-        Held too.
-    centres : sequence of float
-        Nominal values of the channels.
-    elastic : Elastic or None
-        Deflections at this pose.
-    scale : two of (float, float) or None
-        Means and standard deviations for the density of the pair; None where no density is wanted.
-    followed : bool
-        Whether to follow the means and the failures, and to keep the errors of the first chunks.
-    """
-
-    question: Question
-    pose: int
-    mechanism: Mechanism
-    plan: Plan
-    nominal: Configuration
-    drives: Sequence[float]
-    rates: DriveRates
-    centres: Sequence[float]
-    elastic: Elastic | None
-    scale: tuple[tuple[float, float], tuple[float, float]] | None = None
-    followed: bool = False
-
-    def narrowed(self) -> Setting:
-        """The same pose with the limited channels only: nothing else needs to be computed."""
-        channels = self.question.limited_channels
-        return replace(
-            self, question=self.question.narrowed, centres=[self.centres[k] for k in channels], scale=None,
-            elastic=None if self.elastic is None else self.elastic.only(channels),
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
 class Sums:
     """Sums over samples; they add up chunk by chunk, in order.
 
@@ -111,7 +57,7 @@ class Sums:
     failures: int
     errors: Floats
     products: Floats
-    density: NDArray[np.int64]
+    density: Ints
     counted: int
     trend: Floats
     kept: Floats
@@ -177,7 +123,7 @@ def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, co
 def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
     """Sums over made mechanisms; of the first chunks also the density, the trend and the errors."""
     errors, valid = errors_of(setting, made, count)
-    within = keeps(setting.question, errors)
+    within = setting.question.keeps(errors)
     failures, assembled = count - int(np.count_nonzero(within)), int(np.count_nonzero(valid))
     early = setting.followed and chunk < _TREND_CHUNKS
     trend = _trend(errors, valid, within) if early else np.zeros((0, 3 + len(errors)))
@@ -186,10 +132,11 @@ def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
     sums = errors.sum(axis=1)
     if setting.followed and not early and chunk.bit_count() == 1:
         trend = np.concatenate([[count, assembled, failures], sums])[None]
-    density = np.zeros(0, dtype=np.int64)
+    density = np.zeros(0, dtype=np.intp)
     if setting.scale is not None and setting.question.pair is not None and chunk < _DENSITY_CHUNKS:
-        x, y = errors[list(setting.question.pair)]
-        density = _count_cells(x, y, setting.scale)
+        standard = [(errors[k] - mean) / sigma
+                    for k, (mean, sigma) in zip(setting.question.pair, setting.scale, strict=True)]  # fmt: skip
+        density = _count_cells(np.stack(standard))
     return Sums(
         count, assembled, failures, sums, errors @ errors.T, density, assembled if len(density) else 0, trend,
         errors if early else np.empty((len(errors), 0)),
@@ -203,48 +150,8 @@ def _trend(errors: Floats, valid: Flags, within: Flags) -> Floats:
     return np.concatenate([counts[None], np.add.reduceat(steps, begins, axis=1).cumsum(axis=1)]).T
 
 
-def solve(setting: Setting, made: Made) -> Configuration:
-    """Made mechanisms with the drives at the pose, and their errors; angles on the branch of the nominal pose."""
-    given: list[Value] = [
-        value + made.drives[name] if name in made.drives else value
-        for name, value in zip(setting.mechanism.drives, setting.drives, strict=True)
-    ]
-    solved = setting.plan.solve(given, made.places, start=setting.nominal, limits=False)
-    return solved.beside(setting.nominal, [channel.coordinate for channel in setting.question.channels])
-
-
-def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
-    """Errors (value minus nominal), shape (channels, count), and which of the made mechanisms are assembled."""
-    solved = solve(setting, made)
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        values = nominal_values(setting.mechanism, solved, setting.question.channels, setting.rates)
-    errors = np.empty((len(values), count))
-    for error, value, centre in zip(errors, values, setting.centres, strict=True):
-        error[:] = value - centre
-    if setting.elastic is not None:
-        errors += setting.elastic.errors(made.loads, count)
-    return errors, np.broadcast_to(solved.valid, (count,))
-
-
-def keeps(question: Question, errors: Floats) -> Flags:
-    """Which samples keep every limit; one that is not assembled is nan and keeps none."""
-    kept = np.ones(errors.shape[1], dtype=bool)
-    with np.errstate(invalid="ignore"):
-        for band in question.bands:
-            error = errors[band.output]
-            kept &= (error >= band.low) & (error <= band.high)
-        for disc in question.discs:
-            x, y = errors[disc.x], errors[disc.y]
-            kept &= x * x + y * y <= disc.radius * disc.radius
-    return kept
-
-
-def _count_cells(x: Floats, y: Floats, scale: tuple[tuple[float, float], tuple[float, float]]) -> NDArray[np.int64]:
-    cells = []
-    inside = np.ones(len(x), dtype=bool)
-    for value, (mean, sigma) in zip((x, y), scale, strict=True):
-        cell = np.floor(((value - mean) / sigma + REACH) * (CELLS / (2 * REACH)))
-        inside &= (cell >= 0) & (cell < CELLS)
-        cells.append(cell)
-    index = cells[0][inside] * CELLS + cells[1][inside]
-    return np.bincount(index.astype(np.intp), minlength=CELLS * CELLS)
+def _count_cells(standard: Floats) -> Ints:
+    """Samples in each cell of the density's grid, from two standardised errors, shape (2, n)."""
+    cells = np.floor((standard + REACH) * (CELLS / (2 * REACH)))
+    x, y = cells[:, ((cells >= 0) & (cells < CELLS)).all(axis=0)]
+    return np.bincount((x * CELLS + y).astype(np.intp), minlength=CELLS * CELLS)

@@ -1,20 +1,30 @@
-"""Sobol' indices of made mechanisms, beside the linear model."""
+"""Sobol' indices: the share of the variance that each source has alone, and with all others together.
+
+Two sets of points A, B and, for each source, A with that source's variables from B:
+
+    first_i = E[f(B) (f(AB_i) - f(A))] / V      [Saltelli et al., Variance based sensitivity analysis, 2010, tab. 2b]
+    total_i = E[(f(A) - f(AB_i))^2] / (2 V)     [Jansen, Analysis of variance designs for model output, 1999]
+
+Of a linear model both are known. It stands beside the other as a control variate: what is sampled is how far that
+departs from it. Independent replicates give Student's intervals of the ratios.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.sobol import Replicate, SobolIndices, combine, sample
+from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE
+from mechdesign.analyses.reliability.engine.problem import BLOCK
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.simulation import Setting, errors_of, generator
-from mechdesign.analyses.reliability.sources import Drawn, Sources
+from mechdesign.analyses.reliability.setting import Setting, errors_of
+from mechdesign.analyses.reliability.simulation import generator
+from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
-from mechdesign.results import Column
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.reliability import ReliabilitySection
 
@@ -25,6 +35,131 @@ POSES = 4
 # Points of a replicate: beyond these there are more of them.
 _MOST = 4_000
 _STREAM = 3
+
+
+@dataclass(frozen=True, eq=False)
+class SobolIndices:
+    """Indices at one pose.
+
+    Parameters
+    ----------
+    first, total : ndarray, shape (3, channels, sources)
+        Value, and lower and upper end of its interval at 99.7 %; nan of a source without indices of its own and where
+        nothing varies.
+    samples, invalid : int
+        Points evaluated, and those left out since a mechanism cannot be assembled.
+    """
+
+    first: Floats
+    total: Floats
+    samples: int
+    invalid: int
+
+
+@dataclass(frozen=True, eq=False)
+class Replicate:
+    """Sums over the points of one replicate, the model's first, the linear model's second.
+
+    Parameters
+    ----------
+    mixed, change, square : ndarray, shape (2, channels, sources)
+        Of f(B) (f(AB_i) - f(A)), f(AB_i) - f(A) and (f(A) - f(AB_i))^2.
+    sums, squares : ndarray, shape (2, channels)
+        Of f and its square, over A and B.
+    kept, points : int
+        Points of A that enter, and all.
+    """
+
+    mixed: Floats
+    change: Floats
+    square: Floats
+    sums: Floats
+    squares: Floats
+    kept: int
+    points: int
+
+
+def sample(
+    model: Callable[[Floats], Floats], rows: Sequence[Sequence[int]], dimension: int, count: int,
+    rng: np.random.Generator,
+) -> Replicate:  # fmt: skip
+    """One replicate of `count` points.
+
+    Parameters
+    ----------
+    model : callable
+        From standard normal variables, shape (dimension, n), to the values of the model and of the linear model
+        beside it (zero without one), shape (2, channels, n); nan where there is none.
+    rows : sequence of sequences of int
+        The variables of each source; a source without is not asked.
+    """
+    asked = [k for k, own in enumerate(rows) if len(own)]
+    points = np.empty((dimension, 2 + len(asked), count))
+    points[:, :2] = rng.standard_normal((2, dimension, count)).swapaxes(0, 1)
+    points[:, 2:] = points[:, :1]
+    for place, k in enumerate(asked):
+        own = list(rows[k])
+        points[own, 2 + place] = points[own, 1]
+    flat = points.reshape(dimension, -1)
+    parts = [model(flat[:, begin : begin + BLOCK]) for begin in range(0, flat.shape[1], BLOCK)]
+    found = np.concatenate(parts, axis=-1).reshape(*parts[0].shape[:2], 2 + len(asked), count)
+    of_a, of_b = found[:, :, 0], found[:, :, 1]
+    mixed_values = np.full((len(rows), *of_a.shape), np.nan)
+    mixed_values[asked] = np.moveaxis(found[:, :, 2:], 2, 0)
+    keep = np.isfinite(of_a).all(axis=(0, 1)) & np.isfinite(of_b).all(axis=(0, 1))
+    keep &= np.isfinite(mixed_values[asked]).all(axis=(0, 1, 2))
+    of_a, of_b = of_a[:, :, keep], of_b[:, :, keep]
+    change = mixed_values[:, :, :, keep] - of_a
+    return Replicate(
+        np.moveaxis((of_b * change).sum(axis=-1), 0, -1),
+        np.moveaxis(change.sum(axis=-1), 0, -1),
+        np.moveaxis((change * change).sum(axis=-1), 0, -1),
+        of_a.sum(axis=-1) + of_b.sum(axis=-1),
+        (of_a * of_a).sum(axis=-1) + (of_b * of_b).sum(axis=-1),
+        int(np.count_nonzero(keep)),
+        count,
+    )
+
+
+def combine(replicates: Sequence[Replicate], linear: tuple[Floats, Floats] | None = None) -> SobolIndices:
+    """Indices and their intervals from independent replicates.
+
+    Parameters
+    ----------
+    linear : two of ndarray, optional
+        Variances of the linear model: of each source, shape (channels, sources), and of all together.
+    """
+    points = sum(each.points for each in replicates)
+    full = [each for each in replicates if each.kept]
+    kept = sum(each.kept for each in full)
+    shape = (3, *replicates[0].mixed.shape[1:])
+    if len(full) < 2:
+        return SobolIndices(np.full(shape, np.nan), np.full(shape, np.nan), points, points - kept)
+    # About the common mean, or a large mean would drown the products.
+    centre = sum((each.sums for each in full), np.zeros_like(full[0].sums)) / (2 * kept)
+    first = np.stack([(each.mixed - centre[..., None] * each.change) / each.kept for each in full])
+    total = np.stack([0.5 * each.square / each.kept for each in full])
+    whole = np.stack([each.squares / (2 * each.kept) - centre * (each.sums / each.kept - centre) for each in full])
+    # The linear model's variances are those over all points; without those that cannot be assembled they are others.
+    if linear is not None and kept == points:
+        first, total = (part[:, 0] - part[:, 1] + linear[0] for part in (first, total))
+        whole = whole[:, 0] - whole[:, 1] + linear[1]
+    else:
+        first, total, whole = first[:, 0], total[:, 0], whole[:, 0]
+    return SobolIndices(_ratio(first, whole[..., None]), _ratio(total, whole[..., None]), points, points - kept)
+
+
+def _ratio(parts: Floats, whole: Floats) -> Floats:
+    """Ratio of means over replicates and its interval: value, low, high; what is below 0 or above 1 is moved there."""
+    # SciPy takes a quarter of a second to import, and reading a study does not need it.
+    from mechdesign.numerics.statistics import student
+
+    count, mean = len(parts), whole.mean(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        value = np.where(mean > 0, parts.mean(axis=0) / mean, np.nan)
+        spread = np.std((parts - value * whole) / mean, axis=0, ddof=1) / np.sqrt(count)
+    half = student(count - 1, CONFIDENCE) * spread
+    return np.asarray(np.clip(np.stack([value, value - half, value + half]), 0.0, 1.0))
 
 
 def indices(task: Task, section: ReliabilitySection) -> dict[int, SobolIndices]:
@@ -90,17 +225,9 @@ def _beside(setting: Setting, sources: Sources, linear: FirstOrder) -> Callable[
     def model(u: Floats) -> Floats:
         drawn = sources.at(u)
         errors, valid = errors_of(setting, sources.made(drawn), u.shape[1])
-        return np.stack([np.where(valid, errors, np.nan), slopes @ _components(sources, drawn, u.shape[1])])
+        return np.stack([np.where(valid, errors, np.nan), slopes @ sources.components(drawn)])
 
     return model
-
-
-def _components(sources: Sources, drawn: Drawn, count: int) -> Floats:
-    """Values of the components of the linear model, shape (components, count)."""
-    rows: list[Floats | float] = [*drawn.scalars]
-    for pin, radius, place in zip(sources.pins, drawn.radii, drawn.pins, strict=True):
-        rows += [radius * part for part, _ in zip(place, pin.places, strict=False)]
-    return np.stack([np.broadcast_to(row, (count,)) for row in rows]) if rows else np.zeros((0, count))
 
 
 def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:
@@ -110,26 +237,3 @@ def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:
     whole = model.deviation()[:, 0] ** 2
     own = np.nan_to_num(model.share()[:, :, 0]) * whole[:, None]
     return (own, whole) if np.isfinite(whole).all() else None
-
-
-def columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> list[Column]:
-    """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; nan where not asked."""
-    made: list[Column] = []
-    ends = (
-        ("", ""), ("_low", ", lower end of its interval, 99.7 %"), ("_high", ", upper end of its interval, 99.7 %"),
-    )  # fmt: skip
-    for kind, meaning in (
-        ("first", "share of the output's variance that the source causes by itself [Sobol, 1993]"),
-        ("total", "share that the source causes by itself and together with others"),
-    ):
-        values = np.full((3, *shape), np.nan)
-        for pose, each in found.items():
-            values[:, pose] = getattr(each, kind)
-        ends = (
-            ("", ""),
-            ("_low", ", lower end of its interval, 99.7 %"),
-            ("_high", ", upper end of its interval, 99.7 %"),
-        )
-        made += [Column(f"sobol_{kind}{end}", part.ravel(), meaning=meaning + more)
-                 for (end, more), part in zip(ends, values, strict=True) if found]  # fmt: skip
-    return made

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.analyses.reliability.correlation import Correlation
-from mechdesign.analyses.reliability.marginals import Marginal, marginal
-from mechdesign.analyses.reliability.pins import PIN_LAWS
+from mechdesign.analyses.reliability.laws import PIN_LAWS, Correlation, Marginal, marginal
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import LOADS, Clearance
 
@@ -51,7 +50,7 @@ class Scalar:
     @property
     def ends(self) -> tuple[float, float]:
         """Lowest and highest deviation: the tolerance."""
-        return self.law.ends
+        return self.law.low, self.law.high
 
 
 @dataclass(frozen=True)
@@ -68,8 +67,6 @@ class Pin:
         Laws of the pin's place, of the analytic methods and of those that sample.
     places : tuple of str
         What the pin moves: the offsets of its point in its link, or the link's length.
-    factor : float
-        Of the radial clearance, its mean and its deviation alike.
     """
 
     name: str
@@ -78,14 +75,12 @@ class Pin:
     analytic: str
     sampled: str
     places: tuple[str, ...]
-    factor: float = 1.0
 
     @property
     def moments(self) -> tuple[float, float, float, float]:
         """Mean of the radial clearance, and its second to fourth central moment."""
-        mean, *central = (0.0,) * 4 if self.law is None else self.law.moments
-        second, third, fourth = (self.factor**k * moment for k, moment in enumerate(central, start=2))
-        return self.factor * (self.radius + mean), second, third, fourth
+        mean, second, third, fourth = (0.0,) * 4 if self.law is None else self.law.moments
+        return self.radius + mean, second, third, fourth
 
     @property
     def directions(self) -> list[dict[str, float]]:
@@ -101,48 +96,12 @@ class Pin:
     @property
     def ends(self) -> tuple[float, float]:
         """The largest radial clearance in any direction."""
-        largest = self.factor * (self.radius + (0.0 if self.law is None else self.law.ends[1]))
+        largest = self.radius + (0.0 if self.law is None else self.law.high)
         return -largest, largest
 
 
-@dataclass(frozen=True, eq=False)
-class Drawn:
-    """Values of all that varies, each array of shape (count,) or a number.
-
-    Parameters
-    ----------
-    scalars : list of ndarray
-        Deviations, in the order of `Sources.scalars`.
-    radii : list of (ndarray or float)
-        Radial clearances, in the order of `Sources.pins`.
-    pins : list of (ndarray, ndarray)
-        Places of the pins for a radial clearance of 1.
-    """
-
-    scalars: list[Floats]
-    radii: list[Floats | float]
-    pins: list[tuple[Floats, Floats]]
-
-    def take(self, chosen: Flags) -> Drawn:
-        """Some of them."""
-        return Drawn(
-            [values[chosen] for values in self.scalars],
-            [radius if isinstance(radius, float) else radius[chosen] for radius in self.radii],
-            [(x[chosen], y[chosen]) for x, y in self.pins],
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Made:
-    """Made mechanisms.
-
-    Parameters
-    ----------
-    places : dict of str to ndarray, shape (count,)
-        Places that vary (radians, lengths).
-    drives, loads : dict of str to ndarray, shape (count,)
-        Errors of drives (radians, lengths), and of components of the load.
-    """
+class Made(NamedTuple):
+    """Made mechanisms: places that vary (radians, lengths), errors of drives and loads, by name, of shape (count,)."""
 
     places: dict[str, Floats]
     drives: dict[str, Floats]
@@ -152,6 +111,9 @@ class Made:
 @dataclass(frozen=True)
 class Sources:
     """All that varies in a study.
+
+    What is drawn has the shape (variables, count): deviations of the scalars in their order, then each pin's radial
+    clearance, and x and y of its place for a radial clearance of 1.
 
     Parameters
     ----------
@@ -177,73 +139,81 @@ class Sources:
         pins = [pin.name for pin in self.pins for _ in range(2 + (pin.law is not None))]
         return [scalar.name for scalar in self.scalars] + pins
 
+    @property
+    def circles(self) -> list[tuple[int, int]]:
+        """The variables of `at` of which the direction alone counts: the places of pins in contact."""
+        owners = self.owners
+        ends = [len(owners) - owners[::-1].index(pin.name) for pin in self.pins if pin.sampled == "contact"]
+        return [(end - 2, end - 1) for end in ends]
+
     def widened(self, factors: Sequence[float] | Floats) -> Sources:
         """The same where tolerances are as many times as wide; of a clearance, the radius and its tolerance."""
         each = [float(factor) for factor in factors]
         scalars = tuple(replace(s, law=s.law.widened(f)) for s, f in zip(self.scalars, each, strict=False))
-        pins = tuple(replace(p, factor=f) for p, f in zip(self.pins, each[len(scalars) :], strict=True))
+        pins = tuple(
+            replace(p, radius=f * p.radius, law=None if p.law is None else p.law.scaled(f))
+            for p, f in zip(self.pins, each[len(scalars) :], strict=True)
+        )
         return replace(self, scalars=scalars, pins=pins)
 
     def correlated(self) -> Floats | None:
         """Correlation coefficients of the components of `all`; None where all are independent."""
         if self.correlation is None:
             return None
-        count = len(self.scalars) + sum(len(pin.places) for pin in self.pins)
-        found = np.eye(count)
+        found = np.eye(len(self.scalars) + sum(len(pin.places) for pin in self.pins))
         found[: len(self.scalars), : len(self.scalars)] = self.correlation.coefficients
         return found
 
-    def draw(self, rng: np.random.Generator, count: int) -> Drawn:
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Draw what varies in `count` mechanisms."""
         if self.correlation is None:
-            scalars = [scalar.law.draw(rng, count) for scalar in self.scalars]
+            rows: list[Floats | float] = [scalar.law.draw(rng, count) for scalar in self.scalars]
         else:
-            normal = self.correlation.mix(rng.standard_normal((len(self.scalars), count)))
-            scalars = [scalar.law.at(u) for scalar, u in zip(self.scalars, normal, strict=True)]
-        radii: list[Floats | float] = []
-        pins = []
+            normal = self.correlation.root @ rng.standard_normal((len(self.scalars), count))
+            rows = [scalar.law.at(u) for scalar, u in zip(self.scalars, normal, strict=True)]
         for pin in self.pins:
-            radii.append(pin.factor * (pin.radius if pin.law is None else pin.radius + pin.law.draw(rng, count)))
-            pins.append(PIN_LAWS[pin.sampled].draw(rng, count))
-        return Drawn(scalars, radii, pins)
+            radius = pin.radius if pin.law is None else pin.radius + pin.law.draw(rng, count)
+            rows += [radius, *PIN_LAWS[pin.sampled].draw(rng, count)]
+        return np.array([np.broadcast_to(row, (count,)) for row in rows])
 
-    def redraw_pins(self, drawn: Drawn, rng: np.random.Generator, count: int) -> Drawn:
+    def redraw_pins(self, drawn: Floats, rng: np.random.Generator) -> Floats:
         """The same mechanisms with their pins elsewhere in their holes."""
-        return Drawn(drawn.scalars, drawn.radii, [PIN_LAWS[pin.sampled].draw(rng, count) for pin in self.pins])
+        drawn = drawn.copy()
+        for pin, (_, *place) in zip(self.pins, self._by_pin(drawn), strict=True):
+            place[0][:], place[1][:] = PIN_LAWS[pin.sampled].draw(rng, drawn.shape[1])
+        return drawn
 
-    @property
-    def circles(self) -> list[tuple[int, int]]:
-        """The variables of `at` of which the direction alone counts: the places of pins in contact."""
-        found, row = [], len(self.scalars)
-        for pin in self.pins:
-            row += 2 + (pin.law is not None)
-            if pin.sampled == "contact":
-                found.append((row - 2, row - 1))
-        return found
-
-    def at(self, u: Floats, *, directed: bool = False) -> Drawn:
+    def at(self, u: Floats, *, directed: bool = False) -> Floats:
         """What varies at values of independent standard normal variables, shape (len(owners), count).
 
         Where `directed`, the two of a pin in contact are the cosine and sine of its direction.
         """
         count = len(self.scalars)
-        normal = u[:count] if self.correlation is None else self.correlation.mix(u[:count])
-        scalars = [scalar.law.at(row) for scalar, row in zip(self.scalars, normal, strict=True)]
+        normal = u[:count] if self.correlation is None else self.correlation.root @ u[:count]
+        rows: list[Floats | float] = [scalar.law.at(row) for scalar, row in zip(self.scalars, normal, strict=True)]
         rest = iter(u[count:])
-        radii: list[Floats | float] = []
-        pins = []
         for pin in self.pins:
-            radii.append(pin.factor * (pin.radius if pin.law is None else pin.radius + pin.law.at(next(rest))))
+            rows.append(pin.radius if pin.law is None else pin.radius + pin.law.at(next(rest)))
             place = next(rest), next(rest)
             given = directed and pin.sampled == "contact"
-            pins.append(place if given else PIN_LAWS[pin.sampled].at(*place))
-        return Drawn(scalars, radii, pins)
+            rows += place if given else PIN_LAWS[pin.sampled].at(*place)
+        return np.array([np.broadcast_to(row, (u.shape[1],)) for row in rows])
 
-    def made(self, drawn: Drawn) -> Made:
+    def _by_pin(self, drawn: Floats) -> Floats:
+        """Radial clearances and places of the pins, shape (pins, 3, count)."""
+        return drawn[len(self.scalars) :].reshape(-1, 3, drawn.shape[1])
+
+    def components(self, drawn: Floats) -> Floats:
+        """Deviations of the components of `all`, shape (components, count)."""
+        pins = [radius * part for pin, (radius, *place) in zip(self.pins, self._by_pin(drawn), strict=True)
+                for _, part in zip(pin.places, place, strict=False)]  # fmt: skip
+        return np.array([*drawn[: len(self.scalars)], *pins])
+
+    def made(self, drawn: Floats) -> Made:
         """The mechanisms that are made so."""
         study, nominal = self.study, self.study.mechanism.nominal
         by_kind: dict[str, dict[str, Floats]] = {"parameter": {}, "place": {}, "drive": {}, "load": {}}
-        for scalar, deviation in zip(self.scalars, drawn.scalars, strict=True):
+        for scalar, deviation in zip(self.scalars, drawn, strict=False):
             by_kind[scalar.kind][scalar.name] = deviation
         changed = {name: study.parameters.nominal[name] + value for name, value in by_kind["parameter"].items()}
         places: dict[str, Floats] = {
@@ -251,15 +221,11 @@ class Sources:
         }
         for name, deviation in by_kind["place"].items():
             places[name] = places.get(name, nominal[name]) + deviation
-        for pin, radius, (x, y) in zip(self.pins, drawn.radii, drawn.pins, strict=True):
+        for pin, (radius, x, y) in zip(self.pins, self._by_pin(drawn), strict=True):
             along, across = radius * x, radius * y
             if len(pin.places) == 1:
                 (name,) = pin.places
-                along += places.get(name, nominal[name])
-                along *= along
-                across *= across
-                along += across
-                places[name] = np.sqrt(along, out=along)
+                places[name] = np.sqrt((places.get(name, nominal[name]) + along) ** 2 + across**2)
             else:
                 places.update(zip(pin.places, (along, across), strict=True))
         return Made(places, by_kind["drive"], by_kind["load"])
@@ -319,7 +285,7 @@ def _check_sizes(sources: Sources) -> None:
     for scalar in sources.scalars:
         for slope, quantity in scalar.moves.values():
             allowed, words = most.get(quantity, (MOST * size, "a million times the size of the mechanism"))
-            if not max(abs(slope * end) for end in scalar.law.ends) <= allowed:
+            if not max(abs(slope * end) for end in scalar.ends) <= allowed:
                 message = f"varies by more than {words}"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
     for pin in sources.pins:

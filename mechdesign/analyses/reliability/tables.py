@@ -1,4 +1,4 @@
-"""Tables of the reliability question, from the linear error model and what each method says."""
+"""Tables of the reliability question, from the linear error model, what each method says, and what it drew."""
 
 from __future__ import annotations
 
@@ -7,49 +7,52 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.reliability import methods
+from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.engine.sobol import SobolIndices
+from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import links_meant
-from mechdesign.analyses.reliability.sobol import columns as index_columns
+from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
+from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Ints
 from mechdesign.results import Column, Table
 
+# A histogram has about so many bins, of samples that vary no farther than so many standard deviations.
+BINS, WIDEST = 60, 6.0
+ROUNDING = 1e-12
 # Where nothing was computed.
 _UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
 
 
 def at_poses(task: Task, rows: Ints) -> list[Column]:
     """Columns of the poses of these rows."""
-    return [replace(column, values=column.values[rows]) for column in pose_columns(task.study, task.poses)]
+    return [column.take(rows) for column in pose_columns(task.study, task.poses)]
 
 
 def of_channels(task: Task, channels: Ints) -> list[Column]:
     """Columns of the names of these channels."""
     output, order, _ = task.labels
-    return [
-        Column("output", output[channels], meaning="coordinate"),
-        Column("order", order[channels], meaning="position, velocity or acceleration"),
-    ]
+    return shared(task.study.units, output=output[channels], order=order[channels])
 
 
 def moments(task: Task, found: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
-    known = [each for each in found if each.mean is not None] or [methods.run("analytic", task)]
+    known = [each for each in found if each.sums or each.normal] or [methods.run("analytic", task)]
+    each_mean, each_covariance = zip(*(each.moments(task) for each in known), strict=True)
     scale, linear = task.scale[:, None], task.linear
     shape = (task.poses.count, len(known), len(scale))
     pose, method, channel = (index.ravel() for index in np.indices(shape))
-    mean, sigma = (
-        np.stack([getattr(each, name) for each in known])[method, channel, pose] * scale[channel, 0]
-        for name in ("mean", "sigma")
-    )
+    mean = np.stack(each_mean)[method, channel, pose] * scale[channel, 0]
+    variance = np.stack(each_covariance)[method, pose, channel, channel]
+    sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
     columns = [
         *at_poses(task, pose),
-        Column("method", np.array([each.method for each in known])[method], meaning="how it was computed"),
+        *shared(task.study.units, method=np.array([each.method for each in known])[method]),
         *of_channels(task, channel),
         Column("nominal", nominal, meaning="value of the nominal mechanism, in `unit`"),
         Column("mean", nominal + mean, meaning="mean over made mechanisms, in `unit`"),
@@ -60,7 +63,7 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("worst_high", (high * scale)[channel, pose],
                meaning="highest error that the tolerances allow, in `unit`"),
         Column("unit", task.labels[2][channel], meaning="unit of the six columns before"),
-        Column("valid", task.reason[pose] == 0, meaning="1 where the nominal pose is assembled, within its limits"),
+        *shared(task.study.units, valid=task.reason[pose] == 0),
     ]  # fmt: skip
     return Table("moments", tuple(columns), "mean and standard deviation of outputs per pose and method")
 
@@ -73,7 +76,6 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
     pose = np.array([row for row, _, _ in entries + cycles])
     used = [each.used.get(row, each.method) for row, each, _ in entries]
     used += ["monte_carlo" if estimate.samples else "bounds" for _, _, estimate in cycles]
-    rho = [np.nan if each.rho is None else each.rho[row] for row, each, _ in entries] + [np.nan] * len(cycles)
     estimates = [estimate for _, _, estimate in entries + cycles]
     failure, low, high, error = (
         np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high", "error")
@@ -87,7 +89,7 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("scope", np.where(whole, "cycle", "pose"),
                meaning="a pose by itself, or one made mechanism at all poses, the steps between unseen"),
         *(replace(c, values=np.where(whole, np.nan, c.values)) for c in at_poses(task, pose)),
-        Column("method", np.array([each.method for _, each, _ in entries + cycles]), meaning="how it was computed"),
+        *shared(task.study.units, method=[each.method for _, each, _ in entries + cycles]),
         Column("reliability", 1.0 - failure, meaning="probability that every limit is kept"),
         Column("low", 1.0 - high, meaning=f"lower end of its interval, {kind}"),
         Column("high", 1.0 - low, meaning=f"upper end of its interval, {kind}"),
@@ -99,11 +101,14 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
                meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),
         Column("samples", samples, meaning="samples that the value is taken from; 0: none"),
         Column("invalid", invalid, meaning="samples that cannot be assembled; they are failures"),
-        Column("evaluations", evaluations, meaning="mechanisms that were solved for it"),
+        *shared(task.study.units, evaluations=evaluations),
         Column("used", np.array(used), meaning="where the value comes from: of auto, the method it used"),
     ]  # fmt: skip
     if task.question.pair is not None:
-        columns.append(Column("rho", np.array(rho), meaning="correlation of the two outputs"))
+        pair = np.ix_(range(task.poses.count), task.question.pair, task.question.pair)
+        rho = np.stack([correlation(each.moments(task)[1][pair]) for each in found], axis=1)
+        values = np.append(rho, np.full(len(cycles), np.nan))
+        columns.append(Column("rho", values, meaning="correlation of the two outputs"))
     valid = np.where(whole, (task.reason == 0).all(), task.reason[pose] == 0)
     columns.append(Column("valid", valid, meaning="1 where the nominal pose (all, of a cycle) is valid"))
     return Table("reliability", tuple(columns), "probability that the errors keep their limits")
@@ -124,6 +129,133 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
         Column("sensitivity", sensitivity.ravel(),
                meaning="derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)"),
         Column("share", share.ravel(), meaning="share of the output's variance, to the first order"),
-        *index_columns(indices, share.shape),
+        *_index_columns(indices, share.shape),
     ]  # fmt: skip
     return Table("contributions", tuple(columns), "what the errors come from")
+
+
+def _index_columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> list[Column]:
+    """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; nan where not asked."""
+    made: list[Column] = []
+    for kind, meaning in (
+        ("first", "share of the output's variance that the source causes by itself [Sobol, 1993]"),
+        ("total", "share that the source causes by itself and together with others"),
+    ):
+        values = np.full((3, *shape), np.nan)
+        for pose, each in found.items():
+            values[:, pose] = getattr(each, kind)
+        ends = (
+            ("", ""),
+            ("_low", ", lower end of its interval, 99.7 %"),
+            ("_high", ", upper end of its interval, 99.7 %"),
+        )
+        made += [Column(f"sobol_{kind}{end}", part.ravel(), meaning=meaning + more)
+                 for (end, more), part in zip(ends, values, strict=True) if found]  # fmt: skip
+    return made
+
+
+def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:
+    """Density, histogram, convergence and estimate, as far as there is something to say; sums by pose."""
+    made = [_density(task, sums), _histogram(task, sums)]
+    followed = next(((row, each) for row, each in sorted(sums.items()) if len(each.trend)), None)
+    if followed is not None:
+        made += [_convergence(task, *followed), _estimate(task, *followed) if task.question.limited else None]
+    return [table for table in made if table is not None]
+
+
+def _density(task: Task, sums: Mapping[int, Sums]) -> Table | None:
+    """Density of the two outputs within 3 standard deviations: bivariate normal beside the simulated one [S2]."""
+    pair = list(task.question.pair or ())
+    rows = [row for row, each in sorted(sums.items()) if pair and len(each.density) and each.counted]
+    blocks = task.linear.covariance()[rows][:, pair][:, :, pair] if rows else np.zeros((0, 2, 2))
+    rho = correlation(blocks)
+    kept = np.flatnonzero(1.0 - rho**2 > 0)
+    if not len(kept):
+        return None
+    rows, blocks, rho = [rows[k] for k in kept], blocks[kept], rho[kept, None]
+    centres = (np.arange(CELLS) + 0.5) * (2 * REACH / CELLS) - REACH
+    place = [grid.ravel() for grid in np.meshgrid(centres, centres, indexing="ij")]
+    x, y = place
+    rest = 1.0 - rho**2
+    normal = np.exp(-(x * x - 2 * rho * x * y + y * y) / (2 * rest)) / (2 * np.pi * np.sqrt(rest))
+    simulated = [sums[row].density / (sums[row].counted * (2 * REACH / CELLS) ** 2) for row in rows]
+    names, shift = [task.question.channels[k].name for k in pair], task.linear.shift()
+    columns = at_poses(task, np.repeat(rows, len(x)))
+    for k, channel in enumerate(pair):
+        sigma, mean = np.sqrt(blocks[:, k, k]) * task.scale[channel], shift[channel, rows] * task.scale[channel]
+        errors = mean[:, None] + np.outer(sigma, place[k])
+        columns.append(Column(f"{names[k]}_error", errors.ravel(), task.labels[2][channel], "centre of the cell"))
+    for axis, name, values in zip("xy", names, place, strict=True):
+        meaning = f"error of {name} about its mean, in deviations of the first order"
+        columns.append(Column(axis, np.tile(values, len(rows)), meaning=meaning))
+    columns += [
+        Column("normal", normal.ravel(), meaning="bivariate normal density, standardised"),
+        Column("simulated", np.concatenate(simulated), meaning="density of the samples, standardised"),
+    ]
+    return Table("density", tuple(columns), "density of two errors: bivariate normal and simulation [S2, Figs. 4, 5]")
+
+
+def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
+    """Each output's error at the first pose, beside the normal law of the same mean and deviation."""
+    row = next((row for row, each in sorted(sums.items()) if each.kept.shape[1] > 1), None)
+    if row is None:
+        return None
+    units, nominal = task.labels[2], np.abs(task.nominal[:, row] * task.scale)
+    varying, parts = [], []
+    for k, error in enumerate(sums[row].kept * task.scale[:, None]):
+        mean, sigma = float(error.mean()), float(error.std(ddof=1))
+        # What does not vary has rounding for its deviation: of the size of what it is computed from.
+        size = task.study.mechanism.size if units[k] == task.study.units.label("length") else 0.0
+        if not sigma > ROUNDING * max(size, float(nominal[units == units[k]].max())):
+            continue
+        low = max(float(error.min()), mean - WIDEST * sigma)
+        high = min(float(error.max()), mean + WIDEST * sigma)
+        count, edges = np.histogram(error, bins=BINS, range=(low, high))
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        normal = np.exp(-0.5 * ((middle - mean) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
+        varying.append(k)
+        parts.append(np.stack([edges[:-1], edges[1:], count, normal]))
+    if not parts:
+        return None
+    channel, samples = np.repeat(varying, BINS), sums[row].kept.shape[1]
+    low_, high_, count_, normal_ = np.concatenate(parts, axis=1)
+    columns = [
+        *at_poses(task, np.full(len(channel), row)),
+        *of_channels(task, channel),
+        Column("low", low_, meaning="begin of the bin of errors, in `unit`"),
+        Column("high", high_, meaning="end of the bin, in `unit`"),
+        Column("count", count_.astype(np.int64), meaning=f"samples in the bin, of {samples}"),
+        Column("density", count_ / (samples * (high_ - low_)), meaning="their density, in 1/`unit`"),
+        Column("normal", normal_, meaning="density of the normal law of the samples' mean and deviation, in 1/`unit`"),
+        Column("unit", units[channel], meaning="unit of the error"),
+    ]
+    return Table("histogram", tuple(columns), "errors that were drawn at the first pose, and their normal fit")
+
+
+def _convergence(task: Task, row: int, sums: Sums) -> Table:
+    """Mean of each output after so many samples, at the first pose [S3, Fig. 4]."""
+    trend = sums.trend[sums.trend[:, 1] > 0]
+    means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
+    step, channel = (index.ravel() for index in np.indices(means.shape))
+    columns = [
+        *at_poses(task, np.full(len(step), row)),
+        Column("samples", trend[step, 1].astype(np.int64), meaning="valid samples so far"),
+        *of_channels(task, channel),
+        Column("mean", means.ravel(), meaning="their mean, in `unit`"),
+        Column("unit", task.labels[2][channel], meaning="unit of the mean"),
+    ]
+    return Table("convergence", tuple(columns), "trend of the means with the number of samples [S3, Fig. 4]")
+
+
+def _estimate(task: Task, row: int, sums: Sums) -> Table:
+    """Share of failures after so many samples, with its interval, at the first pose."""
+    samples, failures = (sums.trend[:, k].astype(np.int64) for k in (0, 2))
+    interval = np.array([binomial(k, n) for k, n in zip(failures.tolist(), samples.tolist(), strict=True)])
+    columns = [
+        *at_poses(task, np.full(len(samples), row)),
+        Column("samples", samples, meaning="samples so far"),
+        Column("failure", failures / samples, meaning="share of them that broke a limit or cannot be assembled"),
+        Column("failure_low", interval[:, 0], meaning="lower end of its interval, 99.7 %, Clopper-Pearson"),
+        Column("failure_high", interval[:, 1], meaning="upper end of its interval, 99.7 %, Clopper-Pearson"),
+    ]
+    return Table("estimate", tuple(columns), "probability of failure with the number of samples")

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.engine.precision import Precision
+from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
 from mechdesign.analyses.reliability.question import Question
-from mechdesign.analyses.reliability.simulation import Setting, Sums
+from mechdesign.analyses.reliability.setting import Setting
+from mechdesign.analyses.reliability.simulation import Sums
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.mechanism import Reason
 from mechdesign.numerics.arrays import Flags, Floats
@@ -108,10 +109,9 @@ class MethodResult:
         By pose, the method that the value comes from, where it is not this one.
     rungs : dict of int to dict of str to Estimate
         By pose, what the methods tried before say.
-    mean, sigma : ndarray, shape (channels, poses), or None
-        Of the errors (radians, lengths); None where the method gives no moments.
-    rho : ndarray, shape (poses,), or None
-        Correlation of the two outputs.
+    normal : (ndarray, ndarray) or None
+        Mean, shape (channels, poses), and covariance, shape (poses, channels, channels), of errors that are not drawn
+        (radians, lengths); None where the method gives none.
     cycle : Estimate or None
         Of the whole motion.
     """
@@ -121,10 +121,19 @@ class MethodResult:
     sums: dict[int, Sums] = field(default_factory=dict)
     used: dict[int, str] = field(default_factory=dict)
     rungs: dict[int, dict[str, Estimate]] = field(default_factory=dict)
-    mean: Floats | None = None
-    sigma: Floats | None = None
-    rho: Floats | None = None
+    normal: tuple[Floats, Floats] | None = None
     cycle: Estimate | None = None
+
+    def moments(self, task: Task) -> tuple[Floats, Floats]:
+        """Mean and covariance of the errors, as `normal` has them, or of those that were drawn; nan where unknown."""
+        if self.normal is not None:
+            return self.normal
+        channels, poses = task.nominal.shape
+        mean, covariance = np.full((channels, poses), np.nan), np.full((poses, channels, channels), np.nan)
+        for pose, sums in self.sums.items():
+            if sums.valid:
+                mean[:, pose], covariance[pose] = sums.mean, sums.covariance
+        return mean, covariance
 
     def add(self, other: MethodResult) -> None:
         """Join what is said of other poses."""

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
 from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.bodies import build_bodies
-from mechdesign.analyses.stiffness.compliance import Held
-from mechdesign.analyses.stiffness.elements import Guide, Hinge
+from mechdesign.analyses.stiffness.compliance import Held, put
 from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
-from mechdesign.analyses.stiffness.legs import Leg, find_legs
-from mechdesign.analyses.stiffness.loads import Effects, displacements_table, effects_of, forces_table
-from mechdesign.analyses.stiffness.network import Network, build_network, carrying_edges
-from mechdesign.analyses.stiffness.serial import hold_by_legs
+from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
+from mechdesign.analyses.stiffness.loads import Effects, effects_of
+from mechdesign.analyses.stiffness.network import Guide, Hinge, Network, build_network, carrying_edges
 from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,
     deflections_table,
+    displacements_table,
     eigen_table,
+    forces_table,
     springs_table,
     stiffness_table,
 )
@@ -113,6 +113,8 @@ class Solved:
     ----------
     reason : int8 array, shape (poses,)
         See `mechdesign.mechanism.Reason`.
+    springs : Springs
+        Of the legs, by pose.
     effects : Effects or None
         What the study's loads do, where it has any.
     first, loose : (int, Configuration) or None
@@ -121,7 +123,7 @@ class Solved:
 
     held: Held
     reason: NDArray[np.int8]
-    springs: list[Springs]
+    springs: Springs
     effects: Effects | None
     first: Pose | None
     loose: Pose | None
@@ -135,8 +137,8 @@ class Drawn:
     ----------
     row : int
         Its row among the study's poses.
-    springs : list of Springs
-        Those of this pose, one each.
+    springs : Springs
+        Those of this pose.
     twists : mapping of str to ndarray, shape (3, loads)
         How each vertex shifts and turns under the study's loads, about the asked point.
     """
@@ -144,7 +146,7 @@ class Drawn:
     body: Body
     row: int
     configuration: Configuration
-    springs: list[Springs]
+    springs: Springs
     twists: dict[str, Floats]
 
 
@@ -154,10 +156,8 @@ def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
     for name, pose in (("first", solved.first), ("loose", solved.loose)):
         if pose is not None:
             row, configuration = pose
-            here = [(each, each.row == row) for each in solved.springs]
-            springs = [Springs(*(v[of] for v in vars(each).values())) for each, of in here if of.any()]
             twists = dict(zip(body.network.paths, solved.effects.twists[row], strict=True)) if solved.effects else {}
-            drawn[name] = Drawn(body, row, configuration, springs, twists)
+            drawn[name] = Drawn(body, row, configuration, solved.springs.take(solved.springs.row == row), twists)
     return drawn
 
 
@@ -176,17 +176,16 @@ def solve(study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress
         first = first or _pose(solved, configuration.valid)
         assembled = np.flatnonzero(np.isin(configuration.reason, (Reason.OK, Reason.LIMIT)))
         chunks = [assembled[k : k + CHUNK] for k in range(0, len(assembled), CHUNK)]
-        batches = (configuration.take(index) for index in chunks)
-        answers = map_chunks(partial(evaluate, body), batches, jobs)
+        answers = map_chunks(partial(evaluate, body), (configuration.take(index) for index in chunks), jobs)
         for index, (part, found, moved) in zip(chunks, answers, strict=True):
             rows = solved.rows[index]
-            held.put(rows, part)
+            put(held, rows, part)
             springs += [replace(s, row=rows[s.row]) for s in found]
             if effects is not None and moved is not None:
-                effects.put(rows, moved)
+                put(effects, rows, moved)
             progress.update(len(index))
         loose = loose or _pose(solved, np.isfinite(held.free[solved.rows, 0]))
-    return Solved(held, reason, springs, effects, first, loose)
+    return Solved(held, reason, Springs.sorted(springs), effects, first, loose)
 
 
 def _pose(solved: SolvedPoses, wanted: Flags) -> Pose | None:
@@ -206,7 +205,7 @@ def tables(study: Study, body: Body, poses: Poses, solved: Solved) -> dict[str, 
     if body.size == 3 and body.section.characteristic_length is not None:
         made.append(eigen_table(study, poses, soft, body.section.characteristic_length))
     if body.legs is not None:
-        made.append(springs_table(study, poses, body.legs, solved.springs))
+        made.append(springs_table(study, poses, [leg.name for leg in body.legs], solved.springs))
     if solved.effects is not None:
         made += [
             deflections_table(study, poses, np.array(body.section.loads), soft),
@@ -235,7 +234,8 @@ def ask(study: Study) -> Body:
     condensed = link is None and len(bearers) == 1
     if condensed:
         link = bearers[0]
-    standing, pinned = (build_bodies(mechanism, name, section.at, section) for name in (link, section.link))
+    standing = build_bodies(mechanism, link, section.at, section)
+    pinned = build_bodies(mechanism, None, section.at, section) if condensed else standing
     legs = find_legs(carrying_edges(mechanism, standing, section), standing, list(mechanism.description.links))
     network = build_network(mechanism, pinned, section)
     return Body(section, legs, network, 2 if section.link is None else 3, condensed, _spread(mechanism, network))
@@ -258,7 +258,7 @@ def hold(body: Body, configuration: Configuration) -> tuple[Held, list[Springs]]
     held, springs = hold_by_legs(body.legs, body.section, configuration, body.length, body.size, body.condensed)
     rest = np.flatnonzero(held.rank == 0)
     if len(rest):
-        held.put(rest, _loaded(body, configuration.take(rest)).held)
+        put(held, rest, _loaded(body, configuration.take(rest)).held)
     return held, springs
 
 
@@ -273,8 +273,7 @@ def evaluate(body: Body, configuration: Configuration) -> tuple[Held, list[Sprin
 
 
 def _loaded(body: Body, configuration: Configuration) -> Loaded:
-    twists = twists_of(body.network, body.section, configuration, body.length)
-    return load(twists, body.size)
+    return load(twists_of(body.network, body.section, configuration, body.length), body.size)
 
 
 def _cautions(study: Study, poses: Poses, body: Body, held: Held) -> list[str]:

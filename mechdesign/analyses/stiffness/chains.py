@@ -1,4 +1,4 @@
-"""From a leg of the mechanism and solved poses to the screws of its joints and elastic elements."""
+"""From joints and elastic elements and solved poses to their screws."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from mechdesign.analyses.stiffness.beams import Course, course_of
-from mechdesign.analyses.stiffness.elements import Beam, Bearing, Element, Guide, Shift
-from mechdesign.analyses.stiffness.legs import Leg
-from mechdesign.analyses.stiffness.screws import Chain, hinge_twist, slide_twist
+from mechdesign.analyses.stiffness.network import Beam, Bearing, Element, Guide, Shift
+from mechdesign.analyses.stiffness.screws import hinge_twist, slide_twist
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -17,18 +16,6 @@ from mechdesign.study.schema.stiffness import Profile, StiffnessSection
 
 # A point this many times as far from the joints as they lie apart is far away.
 FAR = 10.0
-
-
-def chain_of(leg: Leg, section: StiffnessSection, configuration: Configuration, at: Complexes) -> Chain:
-    """A leg's joints and elastic elements in each pose, seen from places `at`."""
-    found = list(freedoms(leg.elements, section, configuration, at))
-    return Chain(
-        [twist for twist, compliance in found if compliance is None],
-        [twist for twist, compliance in found if compliance is not None],
-        [compliance for _, compliance in found if compliance is not None],
-        configuration.point(leg.base) - at,
-        configuration.point(leg.tip) - at,
-    )
 
 
 def looked_at_from(points: Iterable[str], at: Complexes, configuration: Configuration, length: float) -> Complexes:

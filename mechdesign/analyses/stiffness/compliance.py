@@ -46,19 +46,8 @@ class Held:
     @staticmethod
     def unknown(n: int, size: int) -> Held:
         """Room for n poses: of rank 0, all else nan."""
-        matrix = (n, size, size)
-        return Held(
-            np.full(matrix, np.nan),
-            np.full(matrix, np.nan),
-            np.zeros(n, dtype=np.intp),
-            np.full((n, size), np.nan),
-            np.full(n, np.inf),
-        )
-
-    def put(self, rows: Ints, part: Held) -> None:
-        """Fill in some poses."""
-        self.stiffness[rows], self.compliance[rows], self.rank[rows] = part.stiffness, part.compliance, part.rank
-        self.free[rows], self.margin[rows] = part.free, part.margin
+        matrix = np.full((n, size, size), np.nan)
+        return Held(matrix, matrix.copy(), np.zeros(n, dtype=np.intp), matrix[:, 0].copy(), np.full(n, np.inf))
 
     def seen_from(self, arm: Complexes) -> Held:
         """The same body asked at points that are `arm` (n,) away; a pin is asked where it is.
@@ -74,6 +63,12 @@ class Held:
             compliance=there @ self.compliance @ there.swapaxes(1, 2),
             free=(there @ self.free[:, :, None])[:, :, 0],
         )
+
+
+def put(whole: object, rows: Ints, part: object) -> None:
+    """Fill in some poses of a record of arrays."""
+    for name, values in vars(part).items():
+        getattr(whole, name)[rows] = values
 
 
 def moved_to(arm: Complexes) -> Floats:

@@ -15,15 +15,60 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.beams import beams_of
+from mechdesign.analyses.stiffness.beams import Beams, beams_of
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact
-from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, joint_elements
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.stiffness import StiffnessSection
 
 Way = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A revolute joint at a point; driven if `drive` names a drive."""
+
+    point: str
+    drive: str | None = None
+
+
+@dataclass(frozen=True)
+class Guide:
+    """A slide of the mechanism's graph (its index); driven if `drive` names a drive."""
+
+    slide: int
+    drive: str | None = None
+
+
+@dataclass(frozen=True)
+class Beam:
+    """The beams of an elastic link between the feet of two points; see `mechdesign.analyses.stiffness.beams`."""
+
+    beams: Beams
+    tail: str
+    head: str
+    section: str
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A free displacement along a direction of the world: between links that only a motor holds to each other."""
+
+    direction: complex
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """The give of a joint itself, so many times; across its slide, or in all directions of a pin."""
+
+    name: str
+    point: str
+    slide: int | None = None
+    give: float = 1.0
+
+
+Element = Hinge | Guide | Beam | Shift | Bearing
 
 
 @dataclass(frozen=True)
@@ -116,7 +161,7 @@ class _Builder:
         """All joints, the motors that sit at no joint, and the ways along the beams of elastic links."""
         found: list[Edge] = []
         for contact in self.bodies.contacts:
-            elements = tuple(joint_elements(self.mechanism, contact, self.section))
+            elements = tuple(_joint_elements(self.mechanism, contact, self.section))
             name = contact.point if contact.slide is None else self.mechanism.graph.slides[contact.slide]
             if contact.kind == "motor":
                 name = contact.drive or ""
@@ -179,6 +224,24 @@ class _Builder:
             for seat, point in sitting.items()
             if seat != root
         ]  # fmt: skip
+
+
+def _joint_elements(mechanism: Mechanism, contact: Contact, section: StiffnessSection) -> list[Element]:
+    """What gives at a joint: its freedom, unless a rigid drive holds it, and its bearing, that of a leg at its base."""
+    found: list[Element] = []
+    drive = contact.drive
+    if contact.kind == "clamp":
+        return found
+    if contact.kind == "motor":
+        found += [Shift(1.0 + 0j), Shift(1j)]
+    if drive is None or drive in section.actuators:
+        found.append(Hinge(contact.point, drive) if contact.slide is None else Guide(contact.slide, drive))
+    description = mechanism.description
+    name = contact.point if contact.slide is None else mechanism.graph.slides[contact.slide]
+    if name in section.bearings and contact.kind != "motor":
+        ends = description.links[name].ends if name in description.links else None
+        found.append(Bearing(name, contact.point if ends is None else ends[0], contact.slide, contact.give))
+    return found
 
 
 def _carrying(edges: list[Edge], asked: str) -> list[Edge]:

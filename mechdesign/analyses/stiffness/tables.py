@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import Held, directional, principal
-from mechdesign.analyses.stiffness.legs import Leg
+from mechdesign.analyses.stiffness.loads import Effects, joints_of, points_of
+from mechdesign.analyses.stiffness.network import Network
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -19,13 +20,26 @@ from mechdesign.study.poses import Poses
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Rows of the table of springs, in no order."""
+    """Rows of the table of springs."""
 
     row: Ints
     leg: Ints
     stiffness: Floats
     place: Complexes
     angle: Floats
+
+    def take(self, rows: Ints | Flags) -> Springs:
+        """Some of them."""
+        return Springs(*(values[rows] for values in vars(self).values()))
+
+    @staticmethod
+    def sorted(parts: Sequence[Springs]) -> Springs:
+        """All together, by pose and leg."""
+        if not parts:
+            none = np.zeros(0)
+            return Springs(none.astype(np.intp), none.astype(np.intp), none, none.astype(complex), none)
+        whole = Springs(*(np.concatenate(values) for values in zip(*(vars(p).values() for p in parts), strict=True)))
+        return whole.take(np.lexsort((whole.leg, whole.row)))
 
 
 def _kinds(size: int, what: str) -> dict[tuple[int, int], str]:
@@ -51,40 +65,25 @@ def stiffness_table(
     with np.errstate(divide="ignore"):
         direct = [1 / soft[:, k, k] for k in range(size)]
     columns = pose_columns(study, poses)
-    columns += [
-        Column(name, values, units.label(kind), "load over its own displacement, the others free")
-        for name, values, kind in zip(
-            ("k_x", "k_y", "k_phi"), direct, ("stiffness", "stiffness", "rotational_stiffness"), strict=False
-        )
-    ]
-    unit = units.label("stiffness")
+    unit, turning = units.label("stiffness"), units.label("rotational_stiffness")
+    for name, values, per in zip(("k_x", "k_y", "k_phi"), direct, (unit, unit, turning), strict=False):
+        columns.append(Column(name, values, per, "load over its own displacement, the others free"))
     columns += [
         Column("k_min", low, unit, "stiffness to a force in the softest direction, the body free to turn"),
         Column("k_max", high, unit, "stiffness to a force in the stiffest direction, the body free to turn"),
         Column("k_angle", angle / units.angle_factor, units.label("angle"), "angle of the stiffest direction"),
     ]
     if direction is not None:
-        columns.append(
-            Column(
-                "k_direction",
-                directional(soft, direction * units.angle_factor),
-                unit,
-                "force in the asked direction over displacement along it",
-            )
-        )
+        along = directional(soft, direction * units.angle_factor)
+        columns.append(Column("k_direction", along, unit, "force in the asked direction over displacement along it"))
     columns += _entries(study, "K", held.stiffness, "stiffness", "stiffness matrix at the asked point; nan where rigid")
     columns.append(Column("rank", held.rank, "", "number of independent wrenches that hold the body"))
-    for k, name in enumerate(("free_x", "free_y", "free_phi")[:size]):
-        per = "" if k == 2 else units.label("length")
-        columns.append(
-            Column(name, held.free[:, k], per, "the free twist, per radian where it turns; nan where none is free")
-        )
-    columns.append(Column("valid", valid, "", "1 where the pose is assembled and within its limits"))
-    columns.append(
-        Column(
-            "method", np.full(poses.count, method), "", "serial legs: reciprocal screws [S4]; force method: any other"
-        )
-    )
+    free = zip(("free_x", "free_y", "free_phi"), held.free.T, (units.label("length"),) * 2 + ("",), strict=False)
+    for name, values, per in free:
+        columns.append(Column(name, values, per, "the free twist, per radian where it turns; nan where none is free"))
+    how = "serial legs: reciprocal screws [S4]; force method: any other"
+    columns += shared(units, valid=valid)
+    columns.append(Column("method", np.full(poses.count, method), "", how))
     return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
 
 
@@ -106,7 +105,7 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: float) -> Tabl
     twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
     repeat = np.repeat(np.arange(poses.count), 3)
     units = study.units
-    columns = [Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns = pose_columns(study, poses, repeat)
     columns += [
         Column("mode", np.tile([1, 2, 3], poses.count), "", "softest first"),
         Column("stiffness", stiffness.ravel(), units.label("stiffness"), "eigenvalue of the scaled stiffness matrix"),
@@ -125,26 +124,18 @@ def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
     )
 
 
-def springs_table(study: Study, poses: Poses, legs: Sequence[Leg], springs: Sequence[Springs]) -> Table:
+def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Springs) -> Table:
+    """``springs.csv``: a row a pose, leg and spring."""
     units = study.units
-    row = np.concatenate([s.row for s in springs] or [np.zeros(0, dtype=np.intp)])
-    leg = np.concatenate([s.leg for s in springs] or [np.zeros(0, dtype=np.intp)])
-    order = np.lexsort((leg, row))
-
-    def gather(name: str) -> Any:
-        return np.concatenate([getattr(s, name) for s in springs] or [np.zeros(0)])[order]
-
-    names = np.array([leg.name for leg in legs] or [""])
-    place, angle = gather("place"), gather("angle")
     per_radian = units.label("rotational_stiffness")
-    columns = [Column(c.name, c.values[row[order]], c.unit, c.meaning) for c in pose_columns(study, poses)]
-    columns += [
-        Column("leg", names[leg[order]], "", "links of the leg, from the base"),
-        Column("stiffness", gather("stiffness"), units.label("stiffness"),
+    columns = [
+        *pose_columns(study, poses, springs.row),
+        Column("leg", np.array([*legs, ""])[springs.leg], "", "links of the leg, from the base"),
+        Column("stiffness", springs.stiffness, units.label("stiffness"),
                f"along its line, inf where rigid; where angle is nan about its point ({per_radian})"),
-        Column("x", np.real(place), units.label("length"), "a point on its line"),
-        Column("y", np.imag(place), units.label("length"), "a point on its line"),
-        Column("angle", angle / units.angle_factor, units.label("angle"), "direction of its line"),
+        Column("x", springs.place.real, units.label("length"), "a point on its line"),
+        Column("y", springs.place.imag, units.label("length"), "a point on its line"),
+        Column("angle", springs.angle / units.angle_factor, units.label("angle"), "direction of its line"),
     ]  # fmt: skip
     return Table("springs", tuple(columns), "springs that hold the body as its legs do")
 
@@ -155,10 +146,70 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
     moved = np.einsum("nij,lj->nli", soft, loads[:, :size]).reshape(-1, size)
     repeat = np.repeat(np.arange(poses.count), len(loads))
     applied = np.tile(loads, (poses.count, 1))
-    columns = [Column(c.name, c.values[repeat], c.unit, c.meaning) for c in pose_columns(study, poses)]
+    columns = pose_columns(study, poses, repeat)
     force, moment, length = units.label("force"), units.label("moment"), units.label("length")
     for k, (name, unit) in enumerate(zip(("fx", "fy", "mz")[:size], (force, force, moment), strict=False)):
         columns.append(Column(name, applied[:, k], unit, "load at the asked point"))
     for k, (name, unit) in enumerate(zip(("dx", "dy", "dphi")[:size], (length, length, "rad"), strict=False)):
         columns.append(Column(name, moved[:, k], unit, "deflection of the asked point"))
     return Table("deflections", tuple(columns), "deflections under the study's loads")
+
+
+def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
+    """``forces.csv``: what every joint bears, a row a pose, load and joint."""
+    edges = [network.edges[k] for k in joints_of(network)]
+    count, joints, loads, _ = effects.forces.shape
+    values = effects.forces.swapaxes(1, 2).reshape(-1, 3)
+    units = study.units
+    body = "a link, 'asked' (the asked point), or the pin of a slot ('slot:') or of several links ('pin:')"
+    columns = _of_loads(study, poses, loads, joints)
+    columns += [
+        Column("joint", np.tile([edge.name for edge in edges], count * loads), "", "point or slide"),
+        Column("on", np.tile([_link(edge.a) for edge in edges], count * loads), "", f"what the force acts on: {body}"),
+        Column(
+            "by",
+            np.tile([_link(edge.b) for edge in edges], count * loads),
+            "",
+            "what exerts it; in a telescopic leg its rod, on the part at its first end",
+        ),
+        Column("fx", values[:, 0], units.label("force"), "force on the one by the other, axes of the world"),
+        Column("fy", values[:, 1], units.label("force"), "force on the one by the other, axes of the world"),
+        Column("mz", values[:, 2], units.label("moment"), "moment likewise, about the joint's point"),
+    ]
+    return Table("forces", tuple(columns), "what the joints bear under the study's loads")
+
+
+def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
+    """``displacements.csv``: where every point goes, a row a pose, load and point of a link."""
+    points = points_of(network)
+    moves = effects.moved(network)
+    count, number, loads = moves.shape
+    moved = moves.swapaxes(1, 2).ravel()
+    places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
+    length = study.units.label("length")
+    columns = _of_loads(study, poses, loads, number)
+    columns += [
+        Column("link", np.tile([link for link, _, _ in points], count * loads), "", "link"),
+        Column("point", np.tile([point for _, point, _ in points], count * loads), "", "its point"),
+        Column("x", places.real, length, "place without a load"),
+        Column("y", places.imag, length, "place without a load"),
+        Column("dx", moved.real, length, "displacement"),
+        Column("dy", moved.imag, length, "displacement"),
+    ]
+    return Table("displacements", tuple(columns), "displacements of all points under the study's loads")
+
+
+def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]:
+    """Pose columns and the number of the load, for so many rows of each."""
+    repeat = np.repeat(np.arange(poses.count), loads * rows)
+    return [
+        *pose_columns(study, poses, repeat),
+        Column(
+            "load", np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count), "", "which of the study's loads"
+        ),
+    ]
+
+
+def _link(vertex: str) -> str:
+    """The link that a vertex is a part of; of massless ones their kind."""
+    return vertex.split("@")[0].removesuffix(":rod").removeprefix(":")

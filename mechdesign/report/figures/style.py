@@ -17,6 +17,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 DPI = 120
+# Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 10 ms a picture; 9 takes 40 ms for two hundredths more.
+DEFLATE_LEVEL = 8
 WIDTH = 8.0  # inches; 960 pixels, which a README shows at about 800
 
 # Okabe and Ito: told apart with every kind of colour vision, and in grey by their order of brightness.
@@ -123,5 +125,5 @@ def to_png(figure: Figure) -> bytes:
     stream = io.BytesIO()
     # Of Pillow's ways this one keeps rare colours: no colour moves by more than some 15 of 255, measured.
     few = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    few.save(stream, format="png", dpi=(DPI, DPI))
+    few.save(stream, format="png", dpi=(DPI, DPI), compress_level=DEFLATE_LEVEL)
     return stream.getvalue()

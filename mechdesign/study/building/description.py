@@ -1,18 +1,32 @@
-"""From the validated mechanism section to `mechdesign.mechanism.model.Description`."""
+"""From the validated mechanism section to `Description`: names checked, defaults of joints filled in."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Literal
+import contextlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Literal, NoReturn
 
 import numpy as np
 
+from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression, ExpressionError
-from mechdesign.mechanism.model import Description, Drive, Limit, Measure, Quantity, Term
-from mechdesign.study.building import joints as joint_rules
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import (
+    Description,
+    Drive,
+    Fixed,
+    Joint,
+    Limit,
+    Line,
+    Link,
+    Measure,
+    Prismatic,
+    Quantity,
+    Slot,
+    Term,
+)
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
-from mechdesign.study.building.names import GROUND
 from mechdesign.study.text.document import KeyPath
 
 
@@ -21,9 +35,9 @@ def build(builder: Builder) -> Description:
     builder.check_distinct()
     builder.check_sketch()
     builder.build_links()
-    joints = joint_rules.build(builder)
-    joint_rules.check_connected(builder)
-    joint_rules.check_pins(builder)
+    joints = _joints(builder)
+    _check_connected(builder)
+    _check_pins(builder)
     drives, measures, limits = _drives(builder), _measures(builder), _limits(builder)
     branch: Literal["side", "follow"] = "follow" if builder.section.branch == "follow" else "side"
     return Description(
@@ -32,22 +46,183 @@ def build(builder: Builder) -> Description:
     )  # fmt: skip
 
 
+class _WrongJoint(Exception):
+    """What is wrong with a joint has been noted."""
+
+
+def _joints(builder: Builder) -> dict[str, Joint]:
+    """Build every joint of the section whose names are right."""
+    makers: dict[str, Callable[..., Joint]] = {"prismatic": _prismatic, "slot": _slot, "fixed": _fixed}
+    joints: dict[str, Joint] = {}
+    for name, section in builder.section.joints.items():
+        with contextlib.suppress(_WrongJoint):
+            joints[name] = makers[section.kind](builder, name, section, getattr(section, section.kind))
+    return joints
+
+
+def _refuse(builder: Builder, path: KeyPath, message: str) -> NoReturn:
+    builder.report(path, message)
+    raise _WrongJoint
+
+
+def _check_named(builder: Builder, what: str, names: Sequence[str], path: KeyPath) -> None:
+    if not builder.check_named(what, names, path):
+        raise _WrongJoint
+    if len(names) == 2 and names[0] == names[1]:
+        _refuse(builder, path, f"a joint of link {names[0]!r} with itself")
+
+
+def _check_on_link(builder: Builder, link: str, point: str, path: KeyPath) -> None:
+    points = builder.section.points_of(link)
+    if point not in points:
+        hint = suggestion(point, points) or f"; it has {', '.join(points)}"
+        _refuse(builder, path, f"link {link!r} has no point {point!r}{hint}")
+
+
+def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line:
+    path: KeyPath = ("joints", name, "through")
+    through = section.through or ()
+    for k, point in enumerate(through):
+        _check_on_link(builder, link, point, (*path, k))
+    if len(through) == 2:
+        points = builder.links[link].points
+        far = [point for point in through if point not in points]
+        if far:
+            message = f"{far[0]!r} moves along leg {link!r}: a line needs two points of one body; give 'direction'"
+            _refuse(builder, path, message)
+        first, second = ([builder.nominal(term) for term in points[point]] for point in through)
+        if first == second:
+            _refuse(builder, path, f"{' and '.join(map(repr, through))} are one place: no direction")
+        return Line(link, through[0], 0.0, through[1])
+    direction = builder.place(f"{name}.direction", section.direction or 0.0, "angle")
+    return Line(link, through[0] if through else None, direction)
+
+
+def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Prismatic:
+    path: KeyPath = ("joints", name)
+    _check_named(builder, "link", pair, (*path, "prismatic"))
+    guide, slider = pair
+    points = builder.section.points_of(slider)
+    if section.point is not None:
+        _check_on_link(builder, slider, section.point, (*path, "point"))
+    elif len(points) != 1:
+        _refuse(builder, path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
+    line = _line(builder, name, section, guide)
+    angle = builder.place(f"{name}.angle", section.angle or 0.0, "angle")
+    return Prismatic(name, line, slider, section.point or points[0], angle)
+
+
+def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slot:
+    path: KeyPath = ("joints", name)
+    _check_named(builder, "link", (guide,), (*path, "slot"))
+    if section.point is None:
+        _refuse(builder, path, "a slot needs the 'point' of another link that slides in it")
+    _check_named(builder, "point", (section.point,), (*path, "point"))
+    if builder.section.owners[section.point] == [guide]:
+        message = f"point {section.point!r} is on link {guide!r} itself, which has the slot"
+        _refuse(builder, (*path, "point"), message)
+    return Slot(name, _line(builder, name, section, guide), section.point)
+
+
+def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed:
+    path: KeyPath = ("joints", name)
+    _check_named(builder, "link", pair, (*path, "fixed"))
+    shared = [point for point in builder.section.points_of(pair[0]) if point in builder.section.points_of(pair[1])]
+    if section.point is not None:
+        for link in pair:
+            _check_on_link(builder, link, section.point, (*path, "point"))
+    elif len(shared) != 1:
+        message = f"links {pair[0]!r} and {pair[1]!r} share {len(shared)} points: say which, as 'point'"
+        _refuse(builder, path, message)
+    point = section.point or shared[0]
+    if section.angle is not None:
+        return Fixed(name, pair, point, builder.place(f"{name}.angle", section.angle, "angle"))
+    one, other = (builder.link_direction(link) for link in pair)
+    if one is None or other is None:
+        lost = pair[0] if one is None else pair[1]
+        message = f"its angle is left out and so measured from the sketch, which does not show how link {lost!r} lies"
+        _refuse(builder, path, message)
+    angle = (other - one) / builder.units.angle_factor
+    return Fixed(name, pair, point, builder.place(f"{name}.angle", angle, "angle", measured=True))
+
+
+def _check_pins(builder: Builder) -> None:
+    """Note links that share two points, and slides between links that a shared point pins together."""
+    section = builder.section
+    for index, (name, link) in enumerate(builder.links.items()):
+        for other in list(builder.links.values())[:index]:
+            shared = [point for point in link.points if point in other.points]
+            if len(shared) > 1:
+                builder.report(("links", name), _shared_twice(builder, link, other, shared), at_key=True)
+    for name, joint in section.joints.items():
+        pair = joint.prismatic or ((joint.slot, joint.point) if joint.slot and joint.point else None)
+        if pair is None:
+            continue
+        points = section.points_of(pair[0])
+        pinned = [point for point in points if point in (section.points_of(pair[1]) if joint.prismatic else [pair[1]])]
+        if pinned and (joint.prismatic or section.owners[pinned[0]] != [pair[0]]):
+            what = (
+                "a point that two links name pins them together" if joint.prismatic else "a pin holds it to that link"
+            )
+            mend = "give the slider's point a name of its own" if joint.prismatic else "leave it out there"
+            message = f"point {pinned[0]!r} is on link {pair[0]!r} too, so that it cannot slide: {what}; {mend}"
+            builder.report(("joints", name), message)
+
+
+def _shared_twice(builder: Builder, link: Link, other: Link, shared: list[str]) -> str:
+    places = [[complex(*map(builder.nominal, body.points[point])) for point in shared[:2]] for body in (link, other)]
+    one, two = (abs(b - a) for a, b in places)
+    pins = f"{shared[0]!r} and {shared[1]!r}"
+    if abs(one - two) > 1e-9 * max(one, two):
+        return (
+            f"{pins} are on link {other.name!r} too, but {two:.9g} apart there and {one:.9g} here; keep one of the two"
+        )
+    mend = "leave it out" if other.name == GROUND else "make the two one link that has all their points"
+    return f"{pins} are on link {other.name!r} too: the two are one rigid body; {mend}"
+
+
+def _check_connected(builder: Builder) -> None:
+    """Note links that neither shared points nor joints lead to from the ground."""
+    section, owners = builder.section, builder.section.owners
+    ties = [set(links) for links in owners.values()]
+    for joint in section.joints.values():
+        ties.append({*(joint.prismatic or ()), *(joint.fixed or ())})
+        if joint.slot and joint.point:
+            ties.append({joint.slot, *owners.get(joint.point, ())})
+    reached, before = {GROUND}, 0
+    while len(reached) > before:
+        before = len(reached)
+        reached.update(*(tie for tie in ties if tie & reached))
+    for name in section.links:
+        if name in reached or GROUND not in section.links:
+            continue
+        points = builder.section.points_of(name)
+        mates = sorted({link for tie in ties if name in tie for link in tie} - {name})
+        if mates:
+            message = f"nothing joins it to the ground: only to {', '.join(mates)}"
+        else:
+            others = [point for point, links in owners.items() if links != [name]]
+            hint = next((text for text in (suggestion(point, others) for point in points) if text), "")
+            message = f"no other link shares a point of it ({', '.join(points)}){hint}"
+        builder.report(("links", name), message, at_key=True)
+
+
 def _drives(builder: Builder) -> dict[str, Drive]:
     """Every drive whose names are right."""
-    names = builder.names
+    mechanism = builder.section
     known: Mapping[str, tuple[str, Iterable[str]]] = {
-        "angle": ("moving link", names.moving),
-        "length": ("telescopic leg", names.legs),
-        "slide": ("slide", names.slides),
+        "angle": ("moving link", mechanism.moving),
+        "length": ("telescopic leg", mechanism.legs),
+        "slide": ("slide", mechanism.slides),
     }
     found: dict[str, Drive] = {}
-    for name, section in builder.section.drives.items():
-        kind, item = names.driven(name)
+    for name, section in mechanism.drives.items():
+        kind, item = mechanism.driven(name)
         path: KeyPath = ("drives", name) if section is None else ("drives", name, kind)
         reference = section.from_ or GROUND if section is not None else GROUND
         if section is None:
-            right = builder.check_name(name, [*names.moving, *names.slides], "link, leg or slide", path)
-        elif kind == "length" and item in names.moving and item not in names.legs:
+            right = builder.check_name(name, [*mechanism.moving, *mechanism.slides], "link, leg or slide", path)
+        elif kind == "length" and item in mechanism.moving and item not in mechanism.legs:
             builder.report(path, f"link {item!r} is not telescopic: its length is fixed")
             right = False
         else:
@@ -64,7 +239,7 @@ def _drives(builder: Builder) -> dict[str, Drive]:
 def _measures(builder: Builder) -> dict[str, Measure]:
     """Every measure whose names are right."""
     # A measure may use those above it.
-    known = [name for name in builder.names.coordinates if name not in builder.section.measures]
+    known = [name for name in builder.section.coordinates if name not in builder.section.measures]
     found: dict[str, Measure] = {}
     for name, section in builder.section.measures.items():
         path: KeyPath = ("measures", name)
@@ -95,7 +270,9 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
         right = builder.check_named(kind, items, (*path, kind))
         quantity: Quantity = "angle" if kind == "angle" else "length"
         if kind in ("drive", "measure"):
-            quantity = (builder.names.drives if kind == "drive" else builder.names.measures).get(given, "none")
+            quantity = (builder.section.driven_kinds if kind == "drive" else builder.section.measured_kinds).get(
+                given, "none"
+            )
         bounds: list[Term | None] = []
         for end, value in (("min", section.min), ("max", section.max)):
             if quantity != "none":

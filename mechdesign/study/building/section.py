@@ -6,15 +6,18 @@ long form before validation, so that no model is a union and every error has one
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Any
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Quantity
 from mechdesign.study.text import fields
-from mechdesign.study.text.numbers import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
+from mechdesign.study.text.fields import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
 from mechdesign.study.text.units import QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
@@ -60,7 +63,7 @@ class Link(fields.Model):
     length: fields.PositiveLengthValue | None = None
     telescopic: bool = False
     points: Annotated[
-        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))
+        dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
 
     @model_validator(mode="before")
@@ -119,7 +122,7 @@ class Joint(fields.Model):
     slot: fields.LinkName | None = None
     fixed: TwoLinks | None = None
     through: (
-        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort((fields.NAME_FORM,))] | None
+        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort(fields.NAME_FORM)] | None
     ) = None
     direction: fields.AngleValue | None = None
     point: fields.PointName | None = None
@@ -190,26 +193,21 @@ class Limit(fields.Model):
         return self
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """One target as it was written: an expression (a number is one without names), rows, or the name of a file."""
-
-    expression: Expression | None = None
-    rows: tuple[tuple[float, ...], ...] | None = None
-    file: str | None = None
+Wanted = Expression | tuple[tuple[float, ...], ...] | str
+"""A target as it was written: an expression (a number is one without names), rows, or the name of a file."""
 
 
 def _target(raw: Any, context: Context) -> Wanted:
     if isinstance(raw, dict) and list(raw) == ["file"] and isinstance(raw["file"], str):
-        return Wanted(file=raw["file"])
+        return raw["file"]
     if isinstance(raw, str) and raw.lower().endswith(FILES):
-        return Wanted(file=raw)
+        return raw
     if raw is None or isinstance(raw, dict):
         raise failure(f"expected {TARGET_FORMS}, not {shown(raw)}")
     if isinstance(raw, list):
         rule = "every row holds the same one, two or three numbers"
-        return Wanted(rows=read_rows(raw, context, 3, rule, "an empty list: no target"))
-    return Wanted(expression=read_expression(raw, context))
+        return read_rows(raw, context, 3, rule, "an empty list: no target")
+    return read_expression(raw, context)
 
 
 TargetValue = Annotated[
@@ -224,13 +222,82 @@ class MechanismSection(fields.Model):
     links: dict[fields.LinkName, Link]
     joints: dict[fields.JointName, Joint] = Field(default_factory=dict)
     drives: Annotated[
-        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort((fields.NAMES_FORM,))
+        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
-    branch: Annotated[str, fields.Choice(("side", "follow"))] = "side"
+    branch: Annotated[str, fields.choice(("side", "follow"))] = "side"
     sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
     measures: dict[fields.MeasureName, Measure] = Field(default_factory=dict)
     limits: tuple[Limit, ...] = ()
     targets: dict[fields.CoordinateName, TargetValue] = Field(default_factory=dict)
+
+    # What the names mean, whether or not the rest of the section is right.
+
+    def points_of(self, link: str) -> list[str]:
+        """Names of a link's points, its ends first."""
+        section = self.links.get(link)
+        if section is None:
+            return []
+        return [*(end for end in (section.from_, section.to) if end is not None), *section.points]
+
+    @cached_property
+    def owners(self) -> Mapping[str, list[str]]:
+        """Every point with the links that have it, in the order of the study."""
+        found: dict[str, list[str]] = {}
+        for link in self.links:
+            for point in self.points_of(link):
+                found.setdefault(point, []).append(link)
+        return found
+
+    def coordinates_of(self, name: str) -> tuple[str, ...]:
+        """The coordinates of a point; of what is no point, its name."""
+        return (f"{name}.x", f"{name}.y") if name in self.owners else (name,)
+
+    @cached_property
+    def moving(self) -> list[str]:
+        """Links other than the ground."""
+        return [name for name in self.links if name != GROUND]
+
+    @cached_property
+    def legs(self) -> list[str]:
+        """Telescopic links."""
+        return [name for name, link in self.links.items() if link.telescopic]
+
+    @cached_property
+    def slides(self) -> list[str]:
+        """Joints whose displacement is a coordinate."""
+        return [name for name, joint in self.joints.items() if joint.fixed is None]
+
+    def driven(self, drive: str) -> tuple[Literal["angle", "length", "slide"], str]:
+        """What a drive changes, and of which link, leg or joint."""
+        section = self.drives[drive]
+        if section is not None:
+            return section.kind, getattr(section, section.kind)
+        return "slide" if drive in self.slides else "length" if drive in self.legs else "angle", drive
+
+    @cached_property
+    def driven_kinds(self) -> Mapping[str, Quantity]:
+        """Drives and the kind of each."""
+        return {name: "angle" if self.driven(name)[0] == "angle" else "length" for name in self.drives}
+
+    @cached_property
+    def measured_kinds(self) -> Mapping[str, Quantity]:
+        """Measures and the kind of each."""
+        quantities: dict[str, Quantity] = {"angle": "angle", "distance": "length", "expression": "none"}
+        return {name: quantities[measure.kind] for name, measure in self.measures.items()}
+
+    @cached_property
+    def coordinates(self) -> Mapping[str, Quantity]:
+        """Every coordinate and its kind, measures last."""
+        found: dict[str, Quantity] = dict(self.driven_kinds)
+        for point in self.owners:
+            found[f"{point}.x"] = found[f"{point}.y"] = "length"
+        for link in self.moving:
+            found[f"{link}.angle"] = "angle"
+        for leg in self.legs:
+            found[f"{leg}.length"] = "length"
+        for slide in self.slides:
+            found[f"{slide}.slide"] = "length"
+        return found | dict(self.measured_kinds)
 
 
 def _unit_of(kind: str) -> fields.Read:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from typing import ClassVar, Self
+
 from pydantic import model_validator
 
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import failure
+from mechdesign.study.text.fields import failure
 
 
 class Load(fields.Model):
@@ -31,16 +32,18 @@ class Load(fields.Model):
 class KinematicsSection(MotionSection):
     """How does it move?"""
 
+    command: ClassVar[str] = "kinematics"
     loads: tuple[Load, ...] = ()
     characteristic_length: fields.PositiveLength | None = None
 
-
-def check(checker: Checker, section: KinematicsSection) -> None:
-    """Check the outputs, and what loads act on."""
-    checker.outputs(section.outputs, ("kinematics", "outputs"))
-    for index, load in enumerate(section.loads):
-        path: KeyPath = ("kinematics", "loads", index)
-        if load.at is not None:
-            checker.known(load.at, checker.names.owners, "point", (*path, "at"))
-        if load.link is not None:
-            checker.known(load.link, checker.names.moving, "moving link", (*path, "link"))
+    def checked(self, checker: Checker) -> Self:
+        """Check the outputs as well, and what loads act on."""
+        checker.outputs(self.outputs, ("kinematics", "outputs"))
+        for index, load in enumerate(self.loads):
+            if load.at is not None:
+                checker.known(load.at, checker.mechanism.owners, "point", ("kinematics", "loads", index, "at"))
+            if load.link is not None:
+                checker.known(
+                    load.link, checker.mechanism.moving, "moving link", ("kinematics", "loads", index, "link")
+                )
+        return super().checked(checker)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
@@ -13,7 +13,7 @@ from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import failure
+from mechdesign.study.text.fields import failure
 
 # Results of a workspace that a goal or condition may name without its command.
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
@@ -32,7 +32,7 @@ class Variable(fields.Model):
     from_: fields.Bound = Field(alias="from")
     to: fields.Bound
     step: fields.PositiveNumber | None = None
-    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
+    number: Annotated[int, fields.whole(1, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _spacing(self) -> Variable:
@@ -101,23 +101,23 @@ WeightRow = Annotated[
     tuple[fields.Pure, ...],
     BeforeValidator(_weight_row),
     AfterValidator(_weights_that_choose),
-    fields.OrShort(({"type": "object", "additionalProperties": fields.NUMBER_FORM},)),
+    fields.OrShort({"type": "object", "additionalProperties": fields.NUMBER_FORM}),
 ]
 
 
-Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.OrOne()]
+Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.OrShort()]
 
 
 class OptimizeSection(fields.Model):
     """Which dimensions are best?"""
 
-    method: Annotated[str, fields.Choice(("grid", "search", "pareto"))] = "grid"
+    method: Annotated[str, fields.choice(("grid", "search", "pareto"))] = "grid"
     variables: dict[fields.CoordinateName, Variable]
     maximize: Goals = ()
     minimize: Goals = ()
     weights: tuple[WeightRow, ...] | None = None
     subject_to: tuple[Condition, ...] = ()
-    evaluations: Annotated[int, fields.Whole(10, 10_000_000)] | None = None
+    evaluations: Annotated[int, fields.whole(10, 10_000_000)] | None = None
 
     @model_validator(mode="after")
     def _goals(self) -> OptimizeSection:
@@ -127,41 +127,41 @@ class OptimizeSection(fields.Model):
             raise failure(f"{twice[0]!r} is named twice among the goals")
         return self
 
-
-def check(checker: Checker, section: OptimizeSection) -> None:
-    """Check the variables of an optimisation, its method, and the results that its goals name."""
-    root: KeyPath = ("optimize",)
-    report = checker.report
-    if not section.variables:
-        report((*root, "variables"), "an optimisation needs at least one variable")
-    if not section.maximize and not section.minimize:
-        report(root, "say what to 'maximize' or 'minimize'", at_key=True)
-    above = [name for name in checker.parameters.nominal if name not in section.variables]
-    for name, variable in section.variables.items():
-        path: KeyPath = (*root, "variables", name)
-        checker.known(name, checker.parameters.known(), "parameter or dimension", path, at_key=True)
-        if name in checker.parameters.formulas:
-            message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
-            report(path, message, at_key=True)
-        for key, bound in (("from", variable.from_), ("to", variable.to)):
-            for unknown in sorted(bound.names - set(above)):
-                below = " above it" if unknown in section.variables else ""
-                message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
-                report((*path, key), message)
-        if name in checker.places:
-            checker.kind(path, checker.places[name].quantity)
-        above.append(name)
-        if section.method == "grid" and variable.step is None and variable.number is None:
-            report(path, "a variable of a grid needs either 'step' or 'number'")
-    if section.method == "pareto" and len(section.maximize + section.minimize) == 1:
-        report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
-    if section.method == "grid" and section.evaluations is not None:
-        report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
-    for key, goals in (("maximize", section.maximize), ("minimize", section.minimize)):
-        for index, goal in enumerate(goals):
-            check_result(checker, goal.result, (*root, key, index))
-    for index, condition in enumerate(section.subject_to):
-        check_result(checker, condition.result, (*root, "subject_to", index, "result"))
+    def checked(self, checker: Checker) -> Self:
+        """Check the variables, the method, and the results that goals name, against the mechanism."""
+        root: KeyPath = ("optimize",)
+        report = checker.report
+        if not self.variables:
+            report((*root, "variables"), "an optimisation needs at least one variable")
+        if not self.maximize and not self.minimize:
+            report(root, "say what to 'maximize' or 'minimize'", at_key=True)
+        above = [name for name in checker.parameters.nominal if name not in self.variables]
+        for name, variable in self.variables.items():
+            path: KeyPath = (*root, "variables", name)
+            checker.known(name, checker.parameters.known(), "parameter or dimension", path, at_key=True)
+            if name in checker.parameters.formulas:
+                message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
+                report(path, message, at_key=True)
+            for key, bound in (("from", variable.from_), ("to", variable.to)):
+                for unknown in sorted(bound.names - set(above)):
+                    below = " above it" if unknown in self.variables else ""
+                    message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
+                    report((*path, key), message)
+            if name in checker.places:
+                checker.kind(path, checker.places[name].quantity)
+            above.append(name)
+            if self.method == "grid" and variable.step is None and variable.number is None:
+                report(path, "a variable of a grid needs either 'step' or 'number'")
+        if self.method == "pareto" and len(self.maximize + self.minimize) == 1:
+            report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
+        if self.method == "grid" and self.evaluations is not None:
+            report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
+        for key, goals in (("maximize", self.maximize), ("minimize", self.minimize)):
+            for index, goal in enumerate(goals):
+                check_result(checker, goal.result, (*root, key, index))
+        for index, condition in enumerate(self.subject_to):
+            check_result(checker, condition.result, (*root, "subject_to", index, "result"))
+        return self
 
 
 def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:

@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.study.text import fields
-from mechdesign.study.text.numbers import FILES, Context, failure, read_rows
+from mechdesign.study.text.fields import FILES, Context, failure, read_number, read_rows
 
 # Number of poses where a study does not say it: a circle in steps of 5 deg, and both ends of a line or an arc.
 ROUND, STRAIGHT = 72, 51
@@ -28,7 +28,7 @@ _ROWS = {"type": ["array", "string", "number"]}
 
 Speed = Annotated[
     float,
-    fields.Reader("velocity", 0.0, True),
+    fields.number("velocity", 0.0, exclusive=True),
     Field(
         description="speed of the path's point along it, constant: velocities and accelerations of drives and outputs "
         "follow from the path's direction and curvature. On a polyline each segment is passed at this speed without "
@@ -39,13 +39,25 @@ Speed = Annotated[
 Point = Annotated[tuple[fields.Length, fields.Length], fields.pair_of("[x, y]")]
 
 
+def _radians(raw: Any, context: Context) -> float:
+    return read_number(raw, context, "angle").nominal * context.units.angle_factor
+
+
+Radians = Annotated[float, fields.Read(_radians, fields.NUMBER_READ)]
+
+
 class Circle(fields.Model):
     """A whole circle, counter-clockwise unless it says otherwise; it ends one step before it closes."""
 
     center: Point
     radius: fields.PositiveLength
-    from_: fields.Angle = Field(0.0, alias="from")
+    from_: Radians = Field(0.0, alias="from")
     clockwise: bool = False
+
+    @property
+    def to(self) -> float:
+        """Angle at which it closes."""
+        return self.from_ + (-2.0 if self.clockwise else 2.0) * math.pi
 
 
 class Arc(fields.Model):
@@ -53,8 +65,8 @@ class Arc(fields.Model):
 
     center: Point
     radius: fields.PositiveLength
-    from_: fields.Angle = Field(alias="from")
-    to: fields.Angle
+    from_: Radians = Field(alias="from")
+    to: Radians
 
     @model_validator(mode="after")
     def _some(self) -> Arc:
@@ -82,7 +94,7 @@ class PathSection(fields.Model):
     line: (
         Annotated[tuple[Point, Point], fields.pair_of("a line from [x, y] to [x, y], as a list of the two")] | None
     ) = None
-    points: Annotated[int, fields.Whole(2, 10_000_000)] | None = Field(
+    points: Annotated[int, fields.whole(2, 10_000_000)] | None = Field(
         None, description=f"number of poses, evenly spaced: {ROUND} on a circle, else {STRAIGHT}, where left out"
     )
     spline: bool = Field(
@@ -127,8 +139,8 @@ class Course:
     closed: bool = False  # whether the path goes on from its last place to its first
 
 
-def course(name: str, given: PathSection, folder: pathlib.Path, turn: float) -> Course | Floats:
-    """The path of a point, or the values of a coordinate; `turn` is a full turn in the study's unit.
+def course(name: str, given: PathSection, folder: pathlib.Path) -> Course | Floats:
+    """The path of a point, or the values of a coordinate.
 
     Raises
     ------
@@ -136,21 +148,14 @@ def course(name: str, given: PathSection, folder: pathlib.Path, turn: float) -> 
         Where a file cannot be read, or what is listed is no such path.
     """
     if given.circle is not None:
-        sign, count = (-1.0 if given.circle.clockwise else 1.0), given.points or ROUND
-        angles = 2 * np.pi * (given.circle.from_ / turn + sign * np.arange(count) / count)
-        return _round(given.circle, angles, sign, closed=True)
+        return _round(given.circle, given.points or ROUND, closed=True)
     if given.arc is not None:
-        begin, end = given.arc.from_, given.arc.to
-        angles = 2 * np.pi / turn * np.linspace(begin, end, given.points or STRAIGHT)
-        return _round(given.arc, angles, math.copysign(1.0, end - begin), closed=False)
+        return _round(given.arc, given.points or STRAIGHT, closed=False)
     if given.line is not None:
         start, stop = (complex(*place) for place in given.line)
         if start == stop:
             raise StudyError(f"path: the line of {name!r} needs two different places")
-        part, span = np.linspace(0.0, 1.0, given.points or STRAIGHT), stop - start
-        direction = np.full(len(part), span / abs(span))
-        places: Complexes = np.asarray(start + part * span, dtype=np.complex128)
-        return Course(places, part * abs(span), direction, np.zeros(len(part), dtype=complex))
+        return polyline(np.linspace(start, stop, given.points or STRAIGHT, dtype=np.complex128))
     point = "." not in name
     table = read_table(folder / given.file) if given.file is not None else np.array(given.through, dtype=float)
     if point and table.shape[1] == 2:
@@ -165,11 +170,13 @@ def course(name: str, given: PathSection, folder: pathlib.Path, turn: float) -> 
     raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
 
 
-def _round(given: Circle | Arc, angles: Floats, sign: float, *, closed: bool) -> Course:
+def _round(given: Circle | Arc, count: int, *, closed: bool) -> Course:
+    angles = np.linspace(given.from_, given.to, count, endpoint=not closed)
+    forward = complex(0.0, math.copysign(1.0, given.to - given.from_))
     outward = np.exp(1j * angles).astype(np.complex128)
     way = given.radius * np.abs(angles - angles[0])
     places = complex(*given.center) + given.radius * outward
-    return Course(places, way, complex(0.0, sign) * outward, outward / -given.radius, closed)
+    return Course(places, way, forward * outward, outward / -given.radius, closed)
 
 
 def polyline(places: Complexes) -> Course:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -11,7 +11,7 @@ from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import failure
+from mechdesign.study.text.fields import failure
 
 
 class Sweep(fields.Model):
@@ -21,7 +21,7 @@ class Sweep(fields.Model):
     from_: fields.Number = Field(alias="from")
     to: fields.Number
     step: fields.Number | None = None
-    number: Annotated[int, fields.Whole(1, 10_000_000)] | None = None
+    number: Annotated[int, fields.whole(1, 10_000_000)] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -54,7 +54,8 @@ class PoseSection(fields.Model):
     The list is empty where the study says ``poses: workspace``.
     """
 
-    poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort(({"const": "workspace"},))] | None = None
+    command: ClassVar[str]
+    poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort({"const": "workspace"})] | None = None
     sweep: dict[fields.CoordinateName, Sweep] | None = None
     path: dict[fields.CoordinateName, PathSection] | None = None
 
@@ -75,6 +76,22 @@ class PoseSection(fields.Model):
             raise failure(f"{' and '.join(given)} are both given; poses come from one of them")
         return self
 
+    def checked(self, checker: Checker) -> Self:
+        """The section; names and units of the coordinates that poses give are checked against the mechanism."""
+        if self.at_nodes and checker.reporter.raw(("workspace",)) is None:
+            checker.report((self.command, "poses"), "needs the workspace section, whose nodes are meant")
+        for index, pose in enumerate(self.poses or ()):
+            checker.coordinates(pose, (self.command, "poses", index))
+        checker.coordinates(self.sweep or (), (self.command, "sweep"))
+        for name, given in (self.path or {}).items():
+            if name in checker.mechanism.owners:
+                continue
+            place: KeyPath = (self.command, "path", name)
+            if checker.coordinate(name, place, at_key=True) is not None and (given.spline or given.shape is not None):
+                what = "spline" if given.spline else f"{given.shape}"
+                checker.report(place, f"{name!r} is no point: a {what} is the path of a point", at_key=True)
+        return self
+
 
 class MotionSection(PoseSection):
     """Poses, how the mechanism moves through them, and the coordinates that are asked for."""
@@ -84,36 +101,23 @@ class MotionSection(PoseSection):
     accelerations: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
     speed: Speed | None = None
 
-
-def check(checker: Checker, command: str, section: PoseSection) -> None:
-    """Check the names and units of the coordinates that poses give, and of rates and accelerations at them."""
-    if section.at_nodes and checker.reporter.raw(("workspace",)) is None:
-        checker.report((command, "poses"), "needs the workspace section, whose nodes are meant")
-    for index, pose in enumerate(section.poses or ()):
-        checker.coordinates(pose, (command, "poses", index))
-    checker.coordinates(section.sweep or (), (command, "sweep"))
-    for name, given in (section.path or {}).items():
-        if name in checker.names.owners:
-            continue
-        place: KeyPath = (command, "path", name)
-        if checker.coordinate(name, place, at_key=True) is not None and (given.spline or given.shape is not None):
-            what = "spline" if given.spline else f"{given.shape}"
-            checker.report(place, f"{name!r} is no point: a {what} is the path of a point", at_key=True)
-    if isinstance(section, MotionSection):
-        checker.coordinates(section.rates, (command, "rates"), 1)
-        checker.coordinates(section.accelerations, (command, "accelerations"), 2)
-        if section.speed is not None:
-            _speed(checker, command, section)
+    def checked(self, checker: Checker) -> Self:
+        """Check rates, accelerations and the speed as well."""
+        checker.coordinates(self.rates, (self.command, "rates"), 1)
+        checker.coordinates(self.accelerations, (self.command, "accelerations"), 2)
+        if self.speed is not None:
+            _check_speed(checker, self)
         else:
-            _rates(checker, command, section)
+            _check_rates(checker, self)
+        return super().checked(checker)
 
 
-def _rates(checker: Checker, command: str, section: MotionSection) -> None:
+def _check_rates(checker: Checker, section: MotionSection) -> None:
     """Check that rates and accelerations are those of drives, or of all coordinates that the poses give.
 
     Along a motion that other coordinates give, drives have no rates of their own: they follow from the motion.
     """
-    drives = checker.names.drives
+    drives = checker.mechanism.driven_kinds
     source = _source(checker, section)
     given = _sets(checker, source)
     one = given[0] if len(given) == 1 else set()
@@ -121,7 +125,7 @@ def _rates(checker: Checker, command: str, section: MotionSection) -> None:
     of_given = any(name in one and name not in drives for _, values in parts for name in values)
     for key, values in parts:
         for name in values:
-            if name not in checker.names.coordinates or name in (one if of_given else drives):
+            if name not in checker.mechanism.coordinates or name in (one if of_given else drives):
                 continue
             message = f"{name!r} is not a drive: {key} are those of {', '.join(drives)}"
             if of_given:
@@ -130,37 +134,39 @@ def _rates(checker: Checker, command: str, section: MotionSection) -> None:
                 message += f", or of all that the poses give, {', '.join(sorted(one))}"
             elif len(given) > 1:
                 message += " where poses give different coordinates"
-            checker.report((command, key, name), message, at_key=True)
+            checker.report((section.command, key, name), message, at_key=True)
         missing = sorted(one - set(values)) if of_given and values else []
         if missing:
             message = f"{', '.join(missing)} missing: {key} are those of all coordinates that the poses give"
-            checker.report((command, key), message, at_key=True)
+            checker.report((section.command, key), message, at_key=True)
         if values and not of_given and len(drives) > 1 and one and not one <= set(drives) and _moves(source):
             others = ", ".join(sorted(one))
             message = (
                 f"rates of drives that do not change are not those of this motion, which {others} give: say 'speed', "
                 f"of a point along its path, or the {key} of {others}; those of the drives follow from them"
             )
-            checker.report((command, key), message, at_key=True)
+            checker.report((section.command, key), message, at_key=True)
 
 
-def _speed(checker: Checker, command: str, section: MotionSection) -> None:
+def _check_speed(checker: Checker, section: MotionSection) -> None:
     for key in ("rates", "accelerations"):
         if getattr(section, key):
             checker.report(
-                (command, key), f"'speed' and {key!r} are both given; a path is passed at one of them", at_key=True
+                (section.command, key),
+                f"'speed' and {key!r} are both given; a path is passed at one of them",
+                at_key=True,
             )
     path = _source(checker, section).path
     if path is None:
         message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"
-        checker.report((command, "speed"), message, at_key=True)
+        checker.report((section.command, "speed"), message, at_key=True)
         return
-    points = [name for name in path if name in checker.names.owners]
+    points = [name for name in path if name in checker.mechanism.owners]
     points += [n[:-2] for n in path if n.endswith(".x") and f"{n[:-2]}.y" in path and n[:-2] not in points]
     if len(points) != 1:
         which = " and ".join(points) or "no point"
         message = f"a speed is that of one point along its path, and this path is that of {which}; give 'rates' instead"
-        checker.report((command, "speed"), message, at_key=True)
+        checker.report((section.command, "speed"), message, at_key=True)
 
 
 def _source(checker: Checker, section: PoseSection) -> PoseSection:
@@ -181,7 +187,4 @@ def _sets(checker: Checker, section: PoseSection) -> list[set[str]]:
         given = [(region.point, *region.at)]
     if section.poses:
         given = list(dict.fromkeys(frozenset(pose) for pose in section.poses))
-    return [
-        {part for name in names for part in ((f"{name}.x", f"{name}.y") if name in checker.names.owners else (name,))}
-        for names in given
-    ]
+    return [{part for name in names for part in checker.mechanism.coordinates_of(name)} for names in given]

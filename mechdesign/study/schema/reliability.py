@@ -1,16 +1,25 @@
-"""The reliability section of the study file."""
+"""The reliability section of the study file, and its checks against the mechanism.
+
+Where a pin has a clearance its links have that point in places of their own. The clearance moves the pin in one link;
+the point's coordinates are those of the other links. An output or a limit may name its link, ``coupler.P.x``, and then
+the pin moves in another one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple, Protocol
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from mechdesign.mechanism.graph import Graph
+from mechdesign.study.building.section import MechanismSection
+from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.numbers import Context, failure, read_number, shown
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
 PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")
@@ -19,6 +28,8 @@ DEFAULT_METHODS = ("analytic", "monte_carlo")
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
 # What the names of errors of positions, velocities and accelerations end in.
 SUFFIXES = ("", "_velocity", "_acceleration")
+# Digits of a clearance beyond which its lowest value is zero.
+_ROUNDING = 1e-9
 
 
 def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
@@ -51,22 +62,6 @@ _TOLERANCE = {
 Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
 
 
-class Spread(Protocol):
-    """How far something varies, and how."""
-
-    @property
-    def tolerance(self) -> tuple[float, float] | None:
-        """Lowest and highest deviation."""
-
-    @property
-    def sigma(self) -> float | None:
-        """Standard deviation, where there is no tolerance."""
-
-    @property
-    def distribution(self) -> str:
-        """One of `DISTRIBUTIONS`."""
-
-
 class Dimension(fields.Model):
     """A dimension's variation: nominal +- tolerance, or its standard deviation.
 
@@ -78,15 +73,15 @@ class Dimension(fields.Model):
     one_of = ("a dimension needs either 'tolerance' or 'sigma'", "tolerance", "sigma")
     tolerance: Tolerance | None = None
     sigma: fields.NonNegative | None = None
-    distribution: Annotated[str, fields.Choice(DISTRIBUTIONS)] = "normal"
+    distribution: Annotated[str, fields.choice(DISTRIBUTIONS)] = "normal"
 
 
 class PinModel(fields.Model):
     """How a pin lies in its hole, for each method."""
 
     short = ({"enum": list(PIN_MODELS)},)
-    analytic: Annotated[str, fields.Choice(PIN_MODELS)] = "normal"
-    monte_carlo: Annotated[str, fields.Choice(PIN_MODELS)] = "normal"
+    analytic: Annotated[str, fields.choice(PIN_MODELS)] = "normal"
+    monte_carlo: Annotated[str, fields.choice(PIN_MODELS)] = "normal"
 
     @model_validator(mode="before")
     @classmethod
@@ -105,10 +100,10 @@ class Clearance(fields.Model):
     radial: fields.NonNegativeLength | None = None
     diametral: fields.NonNegativeLength | None = None
     tolerance: Tolerance = (0.0, 0.0)
-    distribution: Annotated[str, fields.Choice(DISTRIBUTIONS)] = "normal"
+    distribution: Annotated[str, fields.choice(DISTRIBUTIONS)] = "normal"
     pin: PinModel = PinModel()
     link: fields.LinkName | None = None
-    effect: Annotated[str, fields.Choice(("offset", "length"))] = "offset"
+    effect: Annotated[str, fields.choice(("offset", "length"))] = "offset"
 
     @property
     def radius(self) -> float:
@@ -229,17 +224,245 @@ _CORRELATION = {
 class ReliabilitySection(MotionSection):
     """How precise is it when it is really made?"""
 
+    command: ClassVar[str] = "reliability"
     dimensions: dict[str, Dimension] = Field(default_factory=dict)
     clearances: dict[str, Clearance] = Field(default_factory=dict)
     correlation: tuple[Annotated[Correlated, fields.Read(_correlation, _CORRELATION)], ...] = ()
     limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
     load: tuple[fields.Number, ...] | None = None
     methods: Annotated[
-        tuple[Annotated[str, fields.Choice(METHODS)], ...],
-        BeforeValidator(fields.as_list),
-        fields.OrOne(),
+        tuple[Annotated[str, fields.choice(METHODS)], ...], BeforeValidator(fields.as_list), fields.OrShort()
     ] = DEFAULT_METHODS
-    samples: Annotated[int, fields.Whole(2, 10**15)] = 40_000
+    samples: Annotated[int, fields.whole(2, 10**15)] = 40_000
     precision: Precision | None = None
-    sobol: Annotated[int, fields.Whole(0, 10**9)] | None = None
+    sobol: Annotated[int, fields.whole(0, 10**9)] | None = None
     allocate: Allocate | None = None
+
+    def checked(self, checker: Checker) -> Self:
+        """Check what varies and what is limited as well; wildcards and the clearances' links are filled in."""
+        meant = _links_of_points(checker, self)
+        dimensions = _dimensions(checker, self)
+        clearances = {
+            point: right
+            for point, clearance in self.clearances.items()
+            if (right := _clearance(checker, point, clearance, meant.get(point))) is not None
+        }
+        for name, limit in self.limits.items():
+            _limit(checker, self, name, limit)
+        for index, correlated in enumerate(self.correlation):
+            for place, name in enumerate((correlated.one, correlated.other)):
+                checker.known(name, dimensions, "varying dimension", ("reliability", "correlation", index, place))
+        pairs = [frozenset(pair[:2]) for pair in self.correlation]
+        for index, pair in enumerate(pairs):
+            if pair in pairs[:index]:
+                checker.report(("reliability", "correlation", index), "this pair is given twice")
+        if not self.methods:
+            checker.report(("reliability", "methods"), "name at least one method")
+        for index, method in enumerate(self.methods):
+            if method in self.methods[:index]:
+                checker.report(("reliability", "methods", index), f"{method!r} is given twice")
+        if self.allocate is not None:
+            _allocate(checker, self, dimensions, clearances)
+        load = _load(checker, self, dimensions)
+        plain = {name: split_link(checker.mechanism, name)[1] for name in (*(self.outputs or ()), *self.limits)}
+        limits = {plain[name]: limit for name, limit in self.limits.items()}
+        if len(limits) < len(self.limits):
+            checker.report(("reliability", "limits"), "the same error is limited twice")
+        outputs = None if self.outputs is None else tuple(plain[name] for name in self.outputs)
+        checker.outputs(outputs, ("reliability", "outputs"))
+        filled = {"dimensions": dimensions, "clearances": clearances, "load": load}
+        return super().checked(checker).model_copy(update=filled | {"outputs": outputs, "limits": limits})
+
+
+def _point_of(mechanism: MechanismSection, name: str) -> str:
+    """The point that the name of an error is about; empty where it is about none."""
+    for suffix in reversed(SUFFIXES):
+        base = name.removesuffix(suffix).removesuffix(".x").removesuffix(".y")
+        if base in mechanism.owners:
+            return base
+    return ""
+
+
+def split_link(mechanism: MechanismSection, name: str) -> tuple[str, str, str]:
+    """The link that a coordinate or point is said to be of, or nothing, the name without it, and the point."""
+    link, _, rest = name.partition(".")
+    if name in mechanism.coordinates or link not in mechanism.links or not (point := _point_of(mechanism, rest)):
+        return "", name, ""
+    return link, rest, point
+
+
+def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
+    """The link that outputs and limits mean by each point, where they say; what contradicts itself is noted."""
+    found: dict[str, str] = {}
+    given: list[tuple[KeyPath, str, bool]] = [
+        *((("reliability", "outputs", k), name, False) for k, name in enumerate(section.outputs or ())),
+        *((("reliability", "limits", name), name, True) for name in section.limits),
+    ]
+    for path, name, at_key in given:
+        link, _, point = split_link(checker.mechanism, name)
+        if not link:
+            continue
+        links = checker.mechanism.owners[point]
+        if link not in links:
+            message = f"link {link!r} has no point {point!r}; it belongs to {' and '.join(links)}"
+            checker.report(path, message, at_key=at_key)
+        elif found.setdefault(point, link) != link:
+            message = f"{point!r} is that of link {found[point]!r} elsewhere; all outputs and limits mean one of them"
+            checker.report(path, message, at_key=at_key)
+        own = section.clearances.get(point)
+        if own is not None and link in links and (own.link == link or len(links) < 2):
+            message = (
+                f"the clearance of {point!r} moves its pin in link {link!r}, and the coordinates of {point!r} are "
+                "those of what else it joins; give reliability.clearances another 'link', or none"
+            )
+            checker.report(path, message, at_key=at_key)
+    return found
+
+
+def _carrier(links: list[str], meant: str | None) -> str:
+    """The link that a pin moves in where the study does not say: the last one of those that are not meant."""
+    return ([link for link in links if link != meant] or links)[-1]
+
+
+def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension]) -> tuple[float, ...] | None:
+    """The load as fx, fy, mz."""
+    path: KeyPath = ("reliability", "load")
+    report, stiffness = checker.report, checker.parts.get("stiffness")
+    random = [name for name in LOADS if name in dimensions]
+    if checker.reporter.raw(("stiffness",)) is None:
+        missing = "a load acts at the point of the stiffness section, and the study has none"
+        if section.load is not None:
+            report(path, missing)
+        for name in random:
+            report(("reliability", "dimensions", name), missing, at_key=True)
+    on_pin = stiffness is not None and stiffness.link is None
+    if on_pin and "load.mz" in random:
+        report(("reliability", "dimensions", "load.mz"), NO_MOMENT, at_key=True)
+    return None if section.load is None else checker.load(section.load, path, on_pin=on_pin)
+
+
+def _allocate(
+    checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension], clearances: dict[str, Clearance]
+) -> None:
+    assert section.allocate is not None
+    for name in section.allocate.cost:
+        known = [*dimensions, *clearances]
+        checker.known(name, known, "dimension or clearance that varies,", ("reliability", "allocate", "cost", name),
+                      at_key=True)  # fmt: skip
+    if not section.limits:
+        checker.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
+    wide = [name for name, dimension in dimensions.items() if name not in LOADS and _varies(dimension)]
+    if not wide and not section.allocate.cost:
+        message = "nothing to allocate: no dimension has a tolerance, and a clearance is held unless 'cost' names it"
+        checker.report(("reliability", "allocate"), message)
+
+
+def _varies(dimension: Dimension) -> bool:
+    return bool(dimension.sigma) if dimension.tolerance is None else dimension.tolerance[0] < dimension.tolerance[1]
+
+
+def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
+    path: KeyPath = ("reliability", "clearances", point)
+    mechanism, report = checker.mechanism, checker.report
+    if not checker.known(point, mechanism.owners, "point", path, at_key=True):
+        return None
+    links = mechanism.owners[point]
+    held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
+    if len(held) < 2:
+        report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
+    link = clearance.link or _carrier(links, meant)
+    if link not in links:
+        checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
+    elif clearance.effect == "length":
+        binary = mechanism.links[link]
+        if point not in (binary.from_, binary.to) or binary.telescopic:
+            message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
+            report((*path, "effect"), message)
+    checker.kind((*path, "tolerance"), "length")
+    spread = clearance.radius_spread
+    if spread is not None and spread.tolerance is not None and clearance.radius + spread.tolerance[0] < -_ROUNDING:
+        factor = 1.0 if clearance.radial is not None else 2.0
+        size, lowest = factor * clearance.radius, clearance.tolerance[0]
+        message = f"a clearance of {size:g} that is {-lowest:g} smaller is negative: such a pin does not go in its hole"
+        report((*path, "tolerance"), message)
+    if spread is not None and spread.distribution == "lognormal" and clearance.radius <= 0:
+        report((*path, "distribution"), "what is lognormal is positive, and so is its nominal value")
+    return clearance.model_copy(update={"link": link})
+
+
+def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: ErrorLimit) -> None:
+    path: KeyPath = ("reliability", "limits", name)
+    mechanism, report = checker.mechanism, checker.report
+    known = mechanism.owners if limit.radius is not None else {**mechanism.coordinates, **mechanism.owners}
+    name = split_link(mechanism, name)[1]
+    base, order = split_order(name, known.__contains__)
+    if order and not (section.rates or section.accelerations or section.speed):
+        report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)
+    if limit.radius is not None:
+        if checker.known(base, mechanism.owners, "point", path, at_key=True):
+            checker.kind(path, ORDERS["length"][order])
+    elif base in mechanism.owners:
+        report(path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True)
+    else:
+        quantity = checker.coordinate(base, path, at_key=True)
+        if quantity in ORDERS:
+            checker.kind(path, ORDERS[quantity][order])
+
+
+def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dimension]:
+    """Dimensions with wildcards expanded; a dimension that is named itself wins over a wildcard."""
+    found: dict[str, Dimension] = {}
+    parameters, report = checker.parameters, checker.report
+    for name, dimension in section.dimensions.items():
+        path: KeyPath = ("reliability", "dimensions", name)
+        if "*" in name or "?" in name:
+            matching = parameters.match(name)
+            if not matching:
+                report(path, f"no dimension matches {name!r}", at_key=True)
+            for place in matching:
+                _dimension(checker, place, dimension, path)
+                if place not in section.dimensions:
+                    found[place] = dimension
+            continue
+        if name in parameters.formulas:
+            message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
+            report(path, message, at_key=True)
+        known = [*parameters.known(), *checker.mechanism.driven_kinds, *LOADS]
+        if checker.known(name, known, "parameter, dimension or drive", path, at_key=True):
+            _dimension(checker, name, dimension, path)
+            found[name] = dimension
+    return found
+
+
+def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
+    if dimension.distribution == "lognormal":
+        nominal = checker.parameters.nominal.get(name)
+        if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
+            checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
+    if name in checker.parameters.nominal:
+        return
+    if name in LOADS:
+        kind = LOADS[name]
+    elif name in checker.places:
+        kind = checker.places[name].quantity
+    else:
+        kind = checker.mechanism.driven_kinds[name]
+    checker.kind(path, kind)
+
+
+def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tuple[str, list[str]]]:
+    """Of each point with a clearance the link that its pin moves in, and those whose point its coordinates are."""
+    found: dict[str, tuple[str, list[str]]] = {}
+    for point, clearance in (section.clearances if section is not None else {}).items():
+        links = [body.removesuffix(":rod") for body, name in graph.points if name == point]
+        found[point] = clearance.link or "", [link for link in dict.fromkeys(links) if link != clearance.link]
+    return found
+
+
+def in_words(section: ReliabilitySection | None, graph: Graph) -> list[str]:
+    """One line for each clearance."""
+    return [
+        f"clearance: the pin {point} moves in {link}; {point}.x and {point}.y are those of "
+        f"{' and '.join(rest) or 'the joint'}"
+        for point, (link, rest) in others(section, graph).items()
+    ]

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.building.names import GROUND
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import Context, failure, read_number
+from mechdesign.study.text.fields import Context, failure, read_number
 
 _ELASTIC = (
     "The section of each link that bends; links not named are rigid. A link given by its ends is a beam from the first "
@@ -107,6 +107,7 @@ _SERIES = {
 class StiffnessSection(PoseSection):
     """How stiff is it?"""
 
+    command: ClassVar[str] = "stiffness"
     link: fields.LinkName | None = None
     at: fields.PointName = Field(description="the point whose stiffness is asked")
     sections: dict[str, Profile] = Field(default_factory=dict)
@@ -117,45 +118,44 @@ class StiffnessSection(PoseSection):
     loads: tuple[tuple[fields.Number, ...], ...] = ()
     characteristic_length: fields.PositiveLength | None = None
 
-
-def check(checker: Checker, section: StiffnessSection) -> StiffnessSection:
-    """Check what is named, the units of stiffnesses, and the loads; returns the section with loads of three numbers."""
-    root: KeyPath = ("stiffness",)
-    right = checker.known(section.at, checker.names.owners, "point", (*root, "at"))
-    if right and section.link is None and GROUND in checker.names.owners[section.at]:
-        checker.report((*root, "at"), f"point {section.at!r} belongs to the ground and does not move")
-    if section.link is not None and checker.known(section.link, checker.names.moving, "moving link", (*root, "link")):
-        points = checker.names.points_of(section.link)
-        if right and section.at not in points:
-            message = f"link {section.link!r} has no point {section.at!r}; it has {', '.join(points)}"
-            checker.report((*root, "at"), message)
-    for link, profile in section.elastic.items():
-        path: KeyPath = (*root, "elastic", link)
-        checker.known(link, checker.names.moving, "moving link", path, at_key=True)
-        checker.known(profile, section.sections, "section", path)
-    for profile in section.sections:
-        if profile not in section.elastic.values():
-            others = [other for other in section.sections if other != profile]
-            checker.reporter.unused((*root, "sections", profile), "section", others)
-    for drive in section.actuators:
-        path = (*root, "actuators", drive)
-        if checker.known(drive, checker.names.drives, "drive", path, at_key=True):
-            checker.kind(path, _STIFFNESS_KINDS[checker.names.drives[drive]])
-    slides = [*checker.names.slides, *checker.names.legs]
-    clamped = [set(other.fixed) for other in checker.names.section.joints.values() if other.fixed is not None]
-    pins = [p for p, owners in checker.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
-    for joint, bearing in section.bearings.items():
-        path = (*root, "bearings", joint)
-        if not checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
-            continue
-        if bearing.radial is not None:
-            checker.kind((*path, "radial"), "stiffness")
-        if bearing.moment is not None:
-            checker.kind((*path, "moment"), "rotational_stiffness")
-            if joint not in slides:
-                checker.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
-    loads = [
-        checker.load(load, (*root, "loads", index), on_pin=section.link is None)
-        for index, load in enumerate(section.loads)
-    ]
-    return section.model_copy(update={"loads": tuple(loads)})
+    def checked(self, checker: Checker) -> Self:
+        """Check what is named as well, and the units of stiffnesses; loads get three numbers."""
+        root: KeyPath = ("stiffness",)
+        right = checker.known(self.at, checker.mechanism.owners, "point", (*root, "at"))
+        if right and self.link is None and GROUND in checker.mechanism.owners[self.at]:
+            checker.report((*root, "at"), f"point {self.at!r} belongs to the ground and does not move")
+        if self.link is not None and checker.known(self.link, checker.mechanism.moving, "moving link", (*root, "link")):
+            points = checker.mechanism.points_of(self.link)
+            if right and self.at not in points:
+                message = f"link {self.link!r} has no point {self.at!r}; it has {', '.join(points)}"
+                checker.report((*root, "at"), message)
+        for link, profile in self.elastic.items():
+            path: KeyPath = (*root, "elastic", link)
+            checker.known(link, checker.mechanism.moving, "moving link", path, at_key=True)
+            checker.known(profile, self.sections, "section", path)
+        for profile in self.sections:
+            if profile not in self.elastic.values():
+                others = [other for other in self.sections if other != profile]
+                checker.reporter.unused((*root, "sections", profile), "section", others)
+        for drive in self.actuators:
+            path = (*root, "actuators", drive)
+            if checker.known(drive, checker.mechanism.driven_kinds, "drive", path, at_key=True):
+                checker.kind(path, _STIFFNESS_KINDS[checker.mechanism.driven_kinds[drive]])
+        slides = [*checker.mechanism.slides, *checker.mechanism.legs]
+        clamped = [set(other.fixed) for other in checker.mechanism.joints.values() if other.fixed is not None]
+        pins = [p for p, owners in checker.mechanism.owners.items() if len(owners) > 1 and set(owners) not in clamped]
+        for joint, bearing in self.bearings.items():
+            path = (*root, "bearings", joint)
+            if not checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
+                continue
+            if bearing.radial is not None:
+                checker.kind((*path, "radial"), "stiffness")
+            if bearing.moment is not None:
+                checker.kind((*path, "moment"), "rotational_stiffness")
+                if joint not in slides:
+                    checker.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
+        loads = [
+            checker.load(load, (*root, "loads", index), on_pin=self.link is None)
+            for index, load in enumerate(self.loads)
+        ]
+        return super().checked(checker).model_copy(update={"loads": tuple(loads)})

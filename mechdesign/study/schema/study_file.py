@@ -13,11 +13,10 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.study import poses
 from mechdesign.study.building.section import MechanismSection, UnitsSection
-from mechdesign.study.schema import kinematics, optimize, reliability_checks, stiffness, targets, workspace
-from mechdesign.study.schema import poses as pose_checks
+from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.kinematics import KinematicsSection
-from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -32,7 +31,7 @@ class StudyFile(fields.Model):
 
     name: str | None = None
     units: UnitsSection = UnitsSection()
-    seed: Annotated[int, fields.Whole(0)] = 0
+    seed: Annotated[int, fields.whole(0)] = 0
     mechanism: MechanismSection
     kinematics: KinematicsSection | None = None
     workspace: WorkspaceSection | None = None
@@ -52,43 +51,23 @@ def schema() -> dict[str, Any]:
 def check(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
     found = dict(checker.parts)
-    for command in COMMANDS:
-        section = found.get(command)
-        if isinstance(section, PoseSection):
-            pose_checks.check(checker, command, section)
-        if isinstance(section, KinematicsSection):
-            kinematics.check(checker, section)
-        elif isinstance(section, WorkspaceSection):
-            workspace.check(checker, section)
-        elif isinstance(section, OptimizeSection):
-            optimize.check(checker, section)
-        elif isinstance(section, ReliabilitySection):
-            found[command] = reliability_checks.check(checker, section)
-        elif isinstance(section, StiffnessSection):
-            found[command] = stiffness.check(checker, section)
+    found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
-        optimize.check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
-    found["targets"] = targets.check(checker, checker.names.section.targets, folder)
+        check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
+    found["targets"] = targets.check(checker, checker.mechanism.targets, folder)
     return found
 
 
-def check_poses(
-    parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path, turn: float
-) -> None:
+def check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path) -> None:
     """Check that the coordinates that poses give determine the mechanism, that they are not too many, and that the
     targets fit those of kinematics.
-
-    Parameters
-    ----------
-    turn : float
-        A full turn in the study's unit.
     """
     for command in COMMANDS:
         section = parts.get(command)
         found: poses.Poses | None = None
         if isinstance(section, PoseSection) and (key := section.source) is not None:
             try:
-                found = poses.expand(section, folder, turn)
+                found = poses.expand(section, folder)
             except StudyError as error:
                 reporter.report((command, key), str(error))
                 continue
@@ -102,7 +81,7 @@ def check_poses(
                 reporter.report((command, "speed"), "the path's point does not move: it has no direction", at_key=True)
         if command == "kinematics" and parts["targets"]:
             try:
-                assumed = found or poses.default(mechanism.description, turn)
+                assumed = found or poses.default(mechanism.description)
             except StudyError:
                 continue
             targets.check_poses(parts["targets"], mechanism.drives, assumed, reporter)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,22 +62,22 @@ def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) 
     seen: dict[str, str] = {}
     for owner, value in wanted.items():
         path: KeyPath = (*ROOT, owner)
-        point = owner in checker.names.owners
+        point = owner in checker.mechanism.owners
         if not point and checker.coordinate(owner, path, at_key=True) is None:
             continue
-        coordinates = (f"{owner}.x", f"{owner}.y") if point else (owner,)
+        coordinates = checker.mechanism.coordinates_of(owner)
         for name in [name for name in coordinates if name in seen][:1]:
             checker.report(path, f"{name} has a target already, by {seen[name]!r}", at_key=True)
         seen.update(dict.fromkeys(coordinates, owner))
-        quantity = "length" if point else checker.names.coordinates[owner]
-        if value.expression is None:
+        quantity = "length" if point else checker.mechanism.coordinates[owner]
+        if not isinstance(value, Expression):
             table = _table(checker, owner, value, path, folder, len(coordinates), quantity)
             if table is not None:
                 found[owner] = Target(owner, coordinates, table=table)
-        elif _right(checker, owner, value.expression, path, point):
+        elif _right(checker, owner, value, path, point):
             if quantity != "none":
                 checker.kind(path, quantity)
-            found[owner] = Target(owner, coordinates, value.expression)
+            found[owner] = Target(owner, coordinates, value)
     return found
 
 
@@ -97,11 +98,11 @@ def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, 
 
 
 def _table(
-    checker: Checker, owner: str, value: Wanted, path: KeyPath, folder: pathlib.Path, count: int, quantity: str
+    checker: Checker, owner: str, value: Any, path: KeyPath, folder: pathlib.Path, count: int, quantity: str
 ) -> Floats | None:
     """The target's table, where its rows have `count` numbers or one more."""
     try:
-        table = np.array(value.rows) if value.file is None else read_table(folder / value.file, most=3)
+        table = read_table(folder / value, most=3) if isinstance(value, str) else np.array(value)
     except StudyError as error:
         checker.report(path, str(error))
         return None
@@ -110,7 +111,7 @@ def _table(
         what = "[x, y] or [drive, x, y]" if count == 2 else "[value] or [drive, value]"
         checker.report(path, f"a row of the target of {owner!r} is {what}, not {columns} numbers")
         return None
-    if value.file is None and quantity != "none":
+    if not isinstance(value, str) and quantity != "none":
         for index, place in np.ndindex(len(table), count):
             checker.kind((*path, index, place + columns - count), quantity)
     if columns == count:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
@@ -11,7 +11,7 @@ from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.numbers import failure
+from mechdesign.study.text.fields import failure
 
 # A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
 WHOLE = 3e-6
@@ -23,7 +23,7 @@ class Scan(fields.Model):
     about: tuple[fields.Length, fields.Length] | None = None
     from_: fields.Angle | None = Field(None, alias="from")
     to: fields.Angle | None = None
-    rays: Annotated[int, fields.Whole(2, 1_000_000)] | None = None
+    rays: Annotated[int, fields.whole(2, 1_000_000)] | None = None
 
     @field_validator("to")
     @classmethod
@@ -42,9 +42,9 @@ class Scan(fields.Model):
 class Integrate(fields.Model):
     """The rule of integration over the workspace."""
 
-    rule: Annotated[str, fields.Choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
+    rule: Annotated[str, fields.choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
     tolerance: fields.Positive = 1e-5
-    nodes: Annotated[int, fields.Whole(1, 100_000)] | None = None
+    nodes: Annotated[int, fields.whole(1, 100_000)] | None = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Integrate:
@@ -76,29 +76,28 @@ class WorkspaceSection(fields.Model):
     scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
     integrate: Integrate = Integrate()
     margin: fields.NonNegativeAngle = 0.0
-    assembly: Annotated[str, fields.Choice(("same", "any"))] = "same"
+    assembly: Annotated[str, fields.choice(("same", "any"))] = "same"
     characteristic_length: fields.PositiveLength | None = None
     indices: (
-        Annotated[tuple[Annotated[str, fields.Choice(INDEX_NAMES)], ...], BeforeValidator(fields.as_list)] | None
+        Annotated[tuple[Annotated[str, fields.choice(INDEX_NAMES)], ...], BeforeValidator(fields.as_list)] | None
     ) = None
 
-
-def check(checker: Checker, section: WorkspaceSection) -> None:
-    """Check the names, units and ranges of a workspace."""
-    root: KeyPath = ("workspace",)
-    checker.known(section.point, checker.names.owners, "point", (*root, "point"))
-    checker.coordinates(section.at, (*root, "at"))
-    ranges = [name for name, values in section.at.items() if isinstance(values, Over)]
-    if len(ranges) > 1:
-        checker.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
-    for name, values in section.at.items():
-        if isinstance(values, Over):
-            checker.range(values.from_, values.to, (*root, "at", name))
-        elif not values:
-            checker.report((*root, "at", name), "an empty list of values")
-    for index, name in enumerate(section.indices or ()):
-        checker.needs(needed_section(name), f"the index {name!r}", (*root, "indices", index))
-    scan = section.scan
-    if (scan.from_ is None) != (scan.to is None):
-        checker.report((*root, "scan"), "'from' and 'to' belong together")
-    checker.range(scan.from_, scan.to, (*root, "scan"))
+    def checked(self, checker: Checker) -> Self:
+        """Check names, units and ranges against the mechanism."""
+        root: KeyPath = ("workspace",)
+        checker.known(self.point, checker.mechanism.owners, "point", (*root, "point"))
+        checker.coordinates(self.at, (*root, "at"))
+        ranges = [name for name, values in self.at.items() if isinstance(values, Over)]
+        if len(ranges) > 1:
+            checker.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
+        for name, values in self.at.items():
+            if isinstance(values, Over):
+                checker.range(values.from_, values.to, (*root, "at", name))
+            elif not values:
+                checker.report((*root, "at", name), "an empty list of values")
+        for index, name in enumerate(self.indices or ()):
+            checker.needs(needed_section(name), f"the index {name!r}", (*root, "indices", index))
+        if (self.scan.from_ is None) != (self.scan.to is None):
+            checker.report((*root, "scan"), "'from' and 'to' belong together")
+        checker.range(self.scan.from_, self.scan.to, (*root, "scan"))
+        return self

@@ -1,15 +1,15 @@
 """YAML text as plain data with the line and column of every key and value.
 
-The reader is built on libyaml's events, so that it can stop early: nesting, aliases and the expanded size are bounded
-before anything is built. Scalars follow YAML 1.2: ``1e-3`` is a number, ``on`` and ``no`` are words.
+Nesting is bounded before anything is built, the expanded size of aliases while it is. Scalars follow YAML 1.2:
+``1e-3`` is a number, ``on`` and ``no`` are words.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -20,18 +20,19 @@ KeyPath = tuple[str | int, ...]
 MAX_DEPTH = 40
 MAX_NODES = 200_000
 MAX_BYTES = 50_000_000
-MAX_ALIASES = 1000
 
-_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
-_WORDS = {"": None, "~": None, "null": None, "Null": None, "NULL": None}
-_WORDS_BOOLEAN = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_WORDS = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
 
 
-@dataclass(frozen=True)
-class Mark:
+class Mark(NamedTuple):
     """A place in a text, counted from 1; line 0 where there is no text (an override).
 
     `start` and `end` are those of the value there, in characters of the text from 0.
@@ -86,7 +87,10 @@ def read(content: bytes, name: str) -> Document:
     except UnicodeDecodeError:
         raise StudyError([Mark(name).problem("is not a text file in UTF-8: not a study file")]) from None
     try:
-        return _Builder(name).build(text)
+        _check_events(text, name)
+        builder = _Builder(name)
+        builder.document.data = builder.value(yaml.compose(text, Loader=_Loader), ())
+        return builder.document
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         here = Mark(name, mark.line + 1, mark.column + 1) if mark else Mark(name)
@@ -108,142 +112,110 @@ def _hint(parts: Sequence[str]) -> str:
     return ""
 
 
-@dataclass
-class _Node:
-    """One node of the YAML tree; aliases share nodes until they are expanded."""
+def _check_events(text: str, name: str) -> None:
+    """Check what holds of a text before anything is built of it."""
+    begun: list[Any] = []
+    anchors: set[Any] = set()
+    documents = 0
+    event: Any
+    for event in yaml.parse(text, Loader=_Loader):
+        here = _mark(event, name)
+        if isinstance(event, yaml.DocumentStartEvent):
+            documents += 1
+            if documents > 1:
+                raise StudyError([here.problem("a second YAML document; a study file holds one")])
+        elif isinstance(event, yaml.AliasEvent):
+            if event.anchor not in anchors:
+                message = f"undefined alias *{event.anchor}; quote a word that begins with '*', as in \"*.length\""
+                raise StudyError([here.problem(message)])
+        elif isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent) and event.tag not in (None, "!"):
+            message = f"the YAML tag {event.tag!r} has no place in a study; write plain values"
+            raise StudyError([here.problem(message)])
+        if isinstance(event, yaml.CollectionStartEvent):
+            begun.append(event.anchor)
+            _check_depth(begun, here)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchors.add(begun.pop())
+        elif isinstance(event, yaml.ScalarEvent):
+            anchors.add(event.anchor)
+    if not documents:
+        raise StudyError([Mark(name).problem("is empty: nothing to study (`mechdesign new` prints a start)")])
 
-    mark: Mark
-    scalar: str | None = None
-    plain: bool = False
-    in_flow: bool = False
-    items: list[_Node] | None = None
-    pairs: list[tuple[_Node, _Node]] | None = None
+
+def _mark(part: Any, name: str) -> Mark:
+    begin = part.start_mark
+    return Mark(name, begin.line + 1, begin.column + 1, begin.index, part.end_mark.index)
+
+
+def _check_depth(path: Sequence[Any], here: Mark) -> None:
+    if len(path) > MAX_DEPTH:
+        raise StudyError([here.problem(f"nested deeper than {MAX_DEPTH} levels")])
 
 
 class _Builder:
+    """Data and marks of a tree of YAML nodes, in which aliases are the nodes that they stand for."""
+
     def __init__(self, name: str) -> None:
-        self.name = name
-        self.anchors: dict[str, _Node] = {}
-        self.aliases = 0
         self.nodes = 0
         self.document = Document(name, None)
 
-    def build(self, text: str) -> Document:
-        loader = _Loader(text)
-        try:
-            events = self._events(loader)
-            next(events)
-            if isinstance(next(events), yaml.StreamEndEvent):
-                raise StudyError(
-                    [Mark(self.name).problem("is empty: nothing to study (`mechdesign new` prints a start)")]
-                )
-            root = self._node(next(events), events, 0, False)
-            next(events)
-            extra = next(events)
-            if not isinstance(extra, yaml.StreamEndEvent):
-                raise StudyError([self._mark(extra).problem("a second YAML document; a study file holds one")])
-        finally:
-            loader.dispose()
-        self.document.data = self._expand(root, (), 0)
-        return self.document
-
-    @staticmethod
-    def _events(loader: Any) -> Iterator[Any]:
-        while loader.check_event():
-            yield loader.get_event()
-
-    def _mark(self, event: Any) -> Mark:
-        begin, end = event.start_mark, event.end_mark
-        return Mark(self.name, begin.line + 1, begin.column + 1, begin.index, end.index)
-
-    def _node(self, event: Any, events: Iterator[Any], depth: int, in_flow: bool) -> _Node:
-        mark = self._mark(event)
-        if depth > MAX_DEPTH:
-            raise StudyError([mark.problem(f"nested deeper than {MAX_DEPTH} levels")])
-        if isinstance(event, yaml.AliasEvent):
-            self.aliases += 1
-            if self.aliases > MAX_ALIASES or event.anchor not in self.anchors:
-                what = f"undefined alias *{event.anchor}" if self.aliases <= MAX_ALIASES else "too many aliases"
-                raise StudyError([mark.problem(f"{what}; quote a word that begins with '*', as in \"*.length\"")])
-            return self.anchors[event.anchor]
-        if event.tag is not None and event.tag != "!":
-            raise StudyError([mark.problem(f"the YAML tag {event.tag!r} has no place in a study; write plain values")])
-        node = _Node(mark, in_flow=in_flow)
-        if isinstance(event, yaml.ScalarEvent):
-            node.scalar, node.plain = event.value, event.style in (None, "")
-        else:
-            inside = in_flow or bool(event.flow_style)
-            children: list[_Node] = []
-            while not isinstance(child := next(events), yaml.CollectionEndEvent):
-                children.append(self._node(child, events, depth + 1, inside))
-            node.mark = replace(node.mark, end=self._mark(child).end)
-            if isinstance(event, yaml.SequenceStartEvent):
-                node.items = children
-            else:
-                node.pairs = list(zip(children[::2], children[1::2], strict=True))
-        if event.anchor is not None:
-            self.anchors[event.anchor] = node
-        return node
-
-    def _expand(self, node: _Node, path: KeyPath, depth: int) -> Any:
+    def value(self, node: Any, path: KeyPath) -> Any:
+        here = _mark(node, self.document.name)
+        _check_depth(path, here)
         self.nodes += 1
         if self.nodes > MAX_NODES:
-            raise StudyError([node.mark.problem(f"more than {MAX_NODES} values once its aliases are expanded")])
-        self.document.values[path] = node.mark
-        if node.items is not None:
-            self._check_split(node.items, path)
-            return [self._expand(item, (*path, index), depth + 1) for index, item in enumerate(node.items)]
-        if node.pairs is not None:
-            self._check_split([scalar for pair in node.pairs for scalar in pair], path)
-            return self._expand_mapping(node.pairs, path, depth)
-        return self._scalar(node, path)
-
-    def _expand_mapping(self, pairs: list[tuple[_Node, _Node]], path: KeyPath, depth: int) -> dict[str, Any]:
+            raise StudyError([here.problem(f"more than {MAX_NODES} values once its aliases are expanded")])
+        self.document.values[path] = here
+        if isinstance(node, yaml.ScalarNode):
+            return _scalar(node)
+        if isinstance(node, yaml.SequenceNode):
+            self._check_split(node, node.value, path)
+            return [self.value(item, (*path, index)) for index, item in enumerate(node.value)]
+        self._check_split(node, [entry for pair in node.value for entry in pair], path)
         mapping: dict[str, Any] = {}
-        for key_node, value_node in pairs:
-            if key_node.scalar is None:
-                self.document.problems.append(key_node.mark.problem("a key must be a word", dotted(path)))
+        for key, item in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                self._note(key, "a key must be a word", path)
                 continue
-            here: KeyPath = (*path, key_node.scalar)
-            if key_node.scalar in mapping:
-                first = self.document.keys[here]
-                message = f"duplicate key; {key_node.scalar!r} is given in line {first.line} already"
-                self.document.problems.append(key_node.mark.problem(message, dotted(here)))
+            inner: KeyPath = (*path, key.value)
+            if key.value in mapping:
+                line = self.document.keys[inner].line
+                self._note(key, f"duplicate key; {key.value!r} is given in line {line} already", inner)
                 continue
-            self.document.keys[here] = key_node.mark
-            mapping[key_node.scalar] = self._expand(value_node, here, depth + 1)
+            self.document.keys[inner] = _mark(key, self.document.name)
+            mapping[key.value] = self.value(item, inner)
         return mapping
 
-    def _check_split(self, nodes: list[_Node], path: KeyPath) -> None:
-        """Find ``{to: min(a, b)}``, which YAML splits at the comma into two entries."""
-        if path in self.document.spoiled:
-            return
-        for node in nodes:
-            text = node.scalar
-            if text is None or not (node.plain and node.in_flow) or text.count("(") == text.count(")"):
-                continue
-            message = (
-                f"{text!r} is cut off: inside braces and brackets a comma ends a value; put the expression in quotes"
-            )
-            self.document.problems.append(node.mark.problem(f'{message}, as in "min(a, b)"', dotted(path)))
-            self.document.spoiled.add(path)
-            return
+    def _note(self, node: yaml.Node, message: str, path: KeyPath) -> None:
+        self.document.problems.append(_mark(node, self.document.name).problem(message, dotted(path)))
 
-    def _scalar(self, node: _Node, path: KeyPath) -> Any:
-        text = node.scalar or ""
-        if not node.plain:
-            return text
-        if text in _WORDS:
-            return None
-        if text in _WORDS_BOOLEAN:
-            return _WORDS_BOOLEAN[text]
-        if _INTEGER.fullmatch(text) and len(text) < 300:
-            return int(text)
-        if _FLOAT.fullmatch(text):
-            return float(text)
-        if _NOT_FINITE.fullmatch(text):
-            return float(text.replace(".", ""))
+    def _check_split(self, holder: Any, entries: Sequence[Any], path: KeyPath) -> None:
+        """Find ``{to: min(a, b)}``, which YAML splits at the comma into two entries."""
+        for node in entries if holder.flow_style else ():
+            text = node.value
+            if isinstance(text, str) and not node.style and text.count("(") != text.count(")"):
+                message = (
+                    f"{text!r} is cut off: inside braces and brackets a comma ends a value; put the expression "
+                    'in quotes, as in "min(a, b)"'
+                )
+                self._note(node, message, path)
+                self.document.spoiled.add(path)
+                return
+
+
+def _scalar(node: yaml.ScalarNode) -> Any:
+    text = node.value
+    if node.style:
         return text
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INTEGER.fullmatch(text) and len(text) < 300:
+        return int(text)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    if _NOT_FINITE.fullmatch(text):
+        return float(text.replace(".", ""))
+    return text
 
 
 def parse_value(text: str, name: str) -> Document:

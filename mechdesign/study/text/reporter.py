@@ -12,8 +12,8 @@ from pydantic.fields import FieldInfo
 
 from mechdesign.errors import Problem, StudyError, nearest, suggestion
 from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
-from mechdesign.study.text.numbers import LOST, shown
-from mechdesign.study.text.units import KINDS, QUANTITY, QuantityError, describe, fits, measure
+from mechdesign.study.text.fields import LOST, shown
+from mechdesign.study.text.units import QUANTITY, QuantityError, measure
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
@@ -71,15 +71,11 @@ class Reporter:
     def kind(self, path: KeyPath, kind: str) -> None:
         """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
         for keys, raw in leaves(self.raw(path)):
-            if not isinstance(raw, str) or not QUANTITY.fullmatch(raw):
-                continue
-            try:
-                powers = measure(raw)[1]
-            except QuantityError:
-                continue
-            if not fits(powers, kind):
-                message = f"{raw!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected"
-                self.report((*path, *keys), message)
+            if isinstance(raw, str) and QUANTITY.fullmatch(raw):
+                try:
+                    measure(raw, kind)
+                except QuantityError as error:
+                    self.report((*path, *keys), str(error))
 
     def warn(self, path: Sequence[str | int], message: str) -> None:
         """Note what is likely a mistake, though the study can be answered, at a key of the data."""

@@ -147,9 +147,7 @@ class Units:
         QuantityError
             Where the unit is unknown or of another kind.
         """
-        number, powers, factor = measure(text)
-        if kind is not None and not fits(powers, kind):
-            raise QuantityError(f"{text.strip()!r} is {describe(powers)}, where {describe(KINDS[kind])} is expected")
+        number, powers, factor = measure(text, kind)
         if powers[0] and self.length == "dimensionless":
             raise QuantityError(f"{text.strip()!r} has a length in it, and this study's lengths are dimensionless")
         scale = _scale(self.length) ** powers[0] * _scale(self.time) ** powers[2] * _scale(self.force) ** powers[3]
@@ -194,13 +192,15 @@ def _scale(name: str) -> float:
     return 1.0 if name == "dimensionless" else measure(f"1 {name}")[2]
 
 
-def measure(text: str) -> tuple[float, Powers, float]:
+def measure(text: str, kind: str | None = None) -> tuple[float, Powers, float]:
     """Read a quantity: its number, the powers of its unit, and the unit's value in SI units and radians.
+
+    A rotational stiffness may leave its radian out.
 
     Raises
     ------
     QuantityError
-        Where the unit is unknown or no product of powers of length, angle, time and force.
+        Where the unit is unknown, not of the expected kind, or no product of powers of length, angle, time and force.
     """
     match = QUANTITY.fullmatch(text)
     if match is None:
@@ -210,7 +210,10 @@ def measure(text: str) -> tuple[float, Powers, float]:
         raise QuantityError(f"{unit[:MAX_LENGTH]!r}... is no unit: none is longer than {MAX_LENGTH} characters")
     powers, factor = _common(unit) or _unit(unit)
     if max(map(abs, powers)) > MAX_POWER:
-        raise QuantityError(f"{unit!r} is no unit: it is {describe(powers)}, and no power is beyond {MAX_POWER}")
+        raise QuantityError(f"{unit!r} is no unit: it is {_describe(powers)}, and no power is beyond {MAX_POWER}")
+    radian_left_out = kind == "rotational_stiffness" and powers == KINDS["moment"]
+    if kind is not None and powers != KINDS[kind] and not radian_left_out:
+        raise QuantityError(f"{text.strip()!r} is {_describe(powers)}, where {_describe(KINDS[kind])} is expected")
     return float(match["number"]), powers, factor
 
 
@@ -259,12 +262,7 @@ def _registry() -> Any:
     return registry
 
 
-def fits(powers: Powers, kind: str) -> bool:
-    """Whether a unit is one of a kind of quantity; a rotational stiffness may leave its radian out."""
-    return powers == KINDS[kind] or (kind == "rotational_stiffness" and powers == KINDS["moment"])
-
-
-def describe(powers: Powers) -> str:
+def _describe(powers: Powers) -> str:
     """Name a kind of quantity for a message."""
     for name, known in KINDS.items():
         if known == powers:

@@ -1,4 +1,9 @@
-"""Design points: where each limit is broken nearest to the mean, found from many starts at once."""
+"""Design points: where each limit is broken nearest to the mean, found from many starts at once.
+
+A direction (`Problem.circles`) is no normal variable: it costs no distance. Each is turned to where its limit is
+nearest, which of a margin that is linear in its cosine and sine is against the slope, and the nearest point is sought
+again.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.descent import alike, sizes
-from mechdesign.analyses.reliability.engine.directions import worst
 from mechdesign.analyses.reliability.engine.problem import Problem, failed
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Standard deviations of the samples that starts are taken from, and how many of each.
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
@@ -24,8 +27,19 @@ WALKS, AROUND, NEAR = 3, 60, 0.5
 # Two points in directions nearer than this (cosine), at like distances, are one.
 ALIKE = 0.95
 MOST = 24
+# How often directions are turned to the worst, and what is no turn (distance on the circle).
+TURNS, STILL = 6, 0.02
 # Starts of each limit near the mean where directions count: each has its own.
 TURNED = 6
+ITERATIONS = 30
+# Fractions of a step that are tried where the whole of it does not improve.
+FRACTIONS = np.array([0.5, 0.25, 0.0625])
+# A point is a design point where a step is shorter than this, or nothing improves, and the margin this small.
+SHORT, ZERO = 5e-3, 1e-2
+# A step that leaves more than this share of what is made smaller gains little.
+GAIN = 0.95
+# Directions farther from each other than this are two.
+APART = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +82,7 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     limits = np.arange(len(margins))
     starts = np.concatenate([np.tile(near, len(limits)), starts[:, limit >= 0]], axis=1)
     limit = np.concatenate([np.repeat(limits, near.shape[1]), limit[limit >= 0]])
-    found = worst(problem, limit, starts, sizes(problem))
+    found = _worst(problem, limit, starts, sizes(problem))
     ends = _nearer(problem, ends, rng)
     straight = np.where(problem.straight[:, None], ends, 0.0)
     length = np.linalg.norm(straight, axis=0)
@@ -169,3 +183,172 @@ def explored_weights(problem: Problem, u: Floats) -> Floats:
     logs = np.stack([half * (1 - spread**-2) - d * np.log(spread) for spread in SPREADS])
     most = logs.max(axis=0, initial=-np.inf)
     return np.asarray(len(SPREADS) * np.exp(-most) / np.exp(logs - most).sum(axis=0))
+
+
+def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats, Floats]:
+    """Descend with directions held, and turn these to the worst, one after the other until they stay.
+
+    Parameters
+    ----------
+    limit : ndarray of int, shape (starts,)
+    u : ndarray, shape (dimension, starts)
+    scale : ndarray, shape (limits,)
+        Those of `sizes`.
+
+    Returns
+    -------
+    u, limit, normal, pull
+        Of the points that were found, as in `DesignPoints`, but `u` and `normal` of shape (dimension, points). Where
+        directions alone break a limit, the point is at the mean of all else.
+    """
+    found, at, normal = _points(problem, limit, _turned(problem, limit, u)[0], scale)
+    if not len(problem.circles):
+        return found, at, normal, np.zeros((len(at), 0, 2))
+    for _ in range(TURNS):
+        turned = _turned(problem, at, found)[0]
+        moved = np.linalg.norm(turned - found, axis=0).max(initial=0.0)
+        found, at, normal = _points(problem, at, turned, scale)
+        if moved < STILL:
+            break
+    # What directions do alone, all normal variables at their means.
+    alone = np.where(problem.straight[:, None], 0.0, u)
+    for _ in range(TURNS):
+        alone, margin, _ = _turned(problem, limit, alone)
+    alone, by = alone[:, margin < 0], limit[margin < 0]
+    found, at = np.concatenate([found, alone], axis=1), np.concatenate([at, by])
+    normal = np.concatenate([normal, np.zeros_like(alone)], axis=1)
+    _, margin, slope = _turned(problem, at, found)
+    steep = np.linalg.norm(slope[problem.normals], axis=0)
+    # A direction counts by how much the logarithm of the probability changes as it turns: the slope by the direction
+    # over that by the distance, times how fast the logarithm falls with the distance.
+    away = (found * normal).sum(axis=0)
+    width = np.where(away > 0, steep / _hazard(away), steep * (1.0 - away) + np.maximum(-margin, 0.0))
+    pull = np.moveaxis(-slope[problem.circles], 2, 0) / np.where(width > 0, width, 1.0)[:, None, None]
+    return found, at, normal, pull
+
+
+def _points(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats]:
+    """Starts that came to their limits: points, limits and normals."""
+    u, normal, good = descend(problem, limit, u, scale)
+    return u[:, good], limit[good], normal[:, good]
+
+
+def _turned(problem: Problem, limit: Ints, u: Floats) -> tuple[Floats, Floats, Floats]:
+    """Points with their directions against the slope of their limits; margins and slopes before."""
+    if not len(problem.circles) or not len(limit):
+        return u, np.zeros(len(limit)), np.zeros_like(u)
+    margins, gradients = problem.gradients(u)
+    lanes = np.arange(len(limit))
+    slope = np.nan_to_num(gradients[limit, :, lanes].T, posinf=0.0, neginf=0.0)
+    turned = u.copy()
+    for pair in problem.circles:
+        size = np.hypot(*slope[pair])
+        turned[pair] = np.where(size > 0, -slope[pair] / np.where(size > 0, size, 1.0), u[pair])
+    return turned, margins[limit, lanes], slope
+
+
+def _hazard(distance: Floats) -> Floats:
+    """Derivative of -log P(a standard normal variable is beyond)."""
+    from scipy.special import log_ndtr
+
+    return np.asarray(np.exp(-0.5 * distance**2 - log_ndtr(-distance)) / np.sqrt(2.0 * np.pi))
+
+
+def sizes(problem: Problem) -> Floats:
+    """Margins at the mean as sizes by which others are large or small, shape (limits,); 1 where they are none."""
+    scale = np.abs(problem.margins(np.zeros((problem.dimension, 1))))[:, 0]
+    return np.asarray(np.where((scale > 0) & np.isfinite(scale), scale, 1.0))
+
+
+def descend(
+    problem: Problem, limit: Ints, u: Floats, scale: Floats, *, together: bool = True
+) -> tuple[Floats, Floats, Flags]:
+    """Step all starts to the nearest point of their limits; directions stay as they are.
+
+    [Hasofer & Lind, Exact and invariant second-moment code format, 1974; Zhang & Der Kiureghian, Two improved
+    algorithms for reliability analysis, 1995, whose merit function makes the iteration converge.]
+
+    Parameters
+    ----------
+    limit : ndarray of int, shape (starts,)
+    u : ndarray, shape (dimension, starts)
+    scale : ndarray, shape (limits,)
+        Those of `sizes`.
+    together : bool
+        Whether starts that have come together go on as one.
+
+    Returns
+    -------
+    u, normal : ndarray, shape (dimension, starts)
+        Points, and unit vectors into the failure.
+    good : ndarray of bool, shape (starts,)
+        Which of them came to their limit, once where several came together.
+    """
+    u = u.copy()
+    straight = problem.straight[:, None]
+    active = np.ones(len(limit), dtype=bool)
+    good = np.zeros(len(limit), dtype=bool)
+    normal = np.zeros_like(u)
+    for _ in range(ITERATIONS):
+        lanes = np.flatnonzero(active)
+        if not lanes.size:
+            break
+        margins, gradients = problem.gradients(u[:, lanes])
+        rows, k = limit[lanes], np.arange(len(lanes))
+        g, slope = margins[rows, k] / scale[rows], straight * gradients[rows, :, k].T / scale[rows]
+        size = (slope**2).sum(axis=0)
+        known = np.isfinite(g) & np.isfinite(size) & (size > 0)
+        active[lanes[~known]] = False
+        if not known.any():
+            continue
+        lanes, g, slope, size = lanes[known], g[known], slope[:, known], size[known]
+        at = u[:, lanes]
+        step = slope * (((slope * at).sum(axis=0) - g) / size) - straight * at
+        normal[:, lanes] = -slope / np.sqrt(size)
+        weight = 2 * np.linalg.norm(at, axis=0) / np.sqrt(size) + 1.0
+        before = 0.5 * (at**2).sum(axis=0) + weight * np.abs(g)
+        trial = at + step
+        merit = _merit(problem, trial, limit[lanes], scale, weight)
+        far = np.linalg.norm(step, axis=0) >= SHORT * (1 + np.linalg.norm(at, axis=0))
+        # A whole step that gains little swings about the nearest point.
+        worse = np.flatnonzero(~(merit < np.where(far, GAIN, 1.0) * before))
+        if worse.size:
+            shorter = at[:, None, worse] + FRACTIONS[:, None] * step[:, None, worse]
+            often = np.tile(worse, len(FRACTIONS))
+            merits = _merit(problem, shorter.reshape(len(at), -1), limit[lanes[often]], scale, weight[often])
+            merits = merits.reshape(len(FRACTIONS), -1)
+            best, k = np.argmin(merits, axis=0), np.arange(len(worse))
+            nearer = merits[best, k] < merit[worse]
+            worse, best, k = worse[nearer], best[nearer], k[nearer]
+            merit[worse], trial[:, worse] = merits[best, k], shorter[:, best, k]
+        done = ~far | ~(merit < before)
+        good[lanes[done]] = np.abs(g[done]) < ZERO
+        active[lanes[done]] = False
+        better = merit < before
+        u[:, lanes[better]] = trial[:, better]
+        for i, lane in enumerate(lanes if together else ()):
+            others = lanes[:i][active[lanes[:i]] | good[lanes[:i]]]
+            if active[lane] and any(limit[lane] == limit[o] and alike(problem, u[:, lane], u[:, o]) for o in others):
+                active[lane] = False
+    # Those that came near in the time that they had are good enough to sample about.
+    lanes = np.flatnonzero(active)
+    if lanes.size:
+        margins = problem.margins(u[:, lanes])
+        good[lanes] = np.abs(margins[limit[lanes], np.arange(len(lanes))] / scale[limit[lanes]]) < ZERO
+    return u, normal, good
+
+
+def _merit(problem: Problem, u: Floats, limit: Ints, scale: Floats, weight: Floats) -> Floats:
+    """What the iteration makes smaller, shape (n,); infinite where there are no margins."""
+    value = problem.margins(u)[limit, np.arange(len(limit))] / scale[limit]
+    merit = 0.5 * (u**2).sum(axis=0) + weight * np.abs(value)
+    return np.asarray(np.where(np.isfinite(merit), merit, np.inf))
+
+
+def alike(problem: Problem, one: Floats, other: Floats) -> bool:
+    """Whether two points are one."""
+    gap = one - other
+    if (np.hypot(*gap[problem.circles.T]) > APART).any():
+        return False
+    size, straight = float(np.linalg.norm(gap[problem.normals])), float(np.linalg.norm(one[problem.normals]))
+    return size < 0.3 or size < 0.2 * straight

@@ -111,12 +111,16 @@ class Problem:
         if self._gradients is not None:
             self.evaluations += u.shape[1]
             return self._gradients(u)
-        d, n = u.shape
-        steps = _STEP * np.eye(d)[:, :, None]
-        points = np.concatenate([(u + way * steps).swapaxes(0, 1).reshape(d, d * n) for way in (1, -1)], axis=1)
-        found = self.margins(np.concatenate([u, points], axis=1))
-        ahead, back = (part.reshape(len(found), d, n) for part in np.split(found[:, n:], 2, axis=1))
-        return found[:, :n], (ahead - back) / (2 * _STEP)
+        return self.margins(u), slopes(self.margins, u, _STEP)
+
+
+def slopes(function: Callable[[Floats], Floats], u: Floats, step: float) -> Floats:
+    """Difference quotients of functions, from shape (dimension, n) to (rows, n): shape (rows, dimension, n)."""
+    d, n = u.shape
+    steps = step * np.eye(d)[:, :, None]
+    points = np.concatenate([(u + way * steps).swapaxes(0, 1).reshape(d, d * n) for way in (1, -1)], axis=1)
+    ahead, back = function(points).reshape(-1, 2, d, n).swapaxes(0, 1)
+    return np.asarray((ahead - back) / (2 * step))
 
 
 def failed(margins: Floats) -> Flags:

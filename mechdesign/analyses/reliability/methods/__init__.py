@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable
 from importlib import import_module
 
 import numpy as np
 
+from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.error_limits import correlation
-from mechdesign.analyses.reliability.simulation import Setting, Sums
+from mechdesign.analyses.reliability.setting import Setting
+from mechdesign.analyses.reliability.simulation import Sums
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
@@ -31,7 +31,7 @@ def normal(name: str, task: Task, mean: Floats, covariance: Floats) -> MethodRes
 
     No interval is claimed.
     """
-    question, found = task.question, MethodResult(name)
+    question, found = task.question, MethodResult(name, normal=(mean, covariance))
     if question.limited:
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
         from mechdesign.analyses.reliability.probability import failure_probability
@@ -41,44 +41,14 @@ def normal(name: str, task: Task, mean: Floats, covariance: Floats) -> MethodRes
         found.estimates.update({
             pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)
         })  # fmt: skip
-    return _with_moments(found, task, mean, covariance)
-
-
-def sampled(name: str, task: Task, sums: Mapping[int, Sums]) -> MethodResult:
-    """Plain samples, and the estimates that they give."""
-    found = MethodResult(name, sums=dict(sums))
-    if task.question.limited:
-        found.estimates.update({pose: counted(each) for pose, each in sums.items()})
-    return of_sums(found, task)
+    return found
 
 
 def counted(sums: Sums) -> Estimate:
     """Estimate from counted failures, with the interval of Clopper and Pearson."""
-    from mechdesign.analyses.reliability.engine.intervals import binomial
-
     low, high = binomial(sums.failures, sums.samples)
     invalid = sums.samples - sums.valid
     return Estimate(sums.failures / sums.samples, low, high, sums.samples, sums.samples, sums.failures, invalid)
-
-
-def of_sums(found: MethodResult, task: Task) -> MethodResult:
-    """The same with the moments of the errors that were sampled."""
-    if not found.sums:
-        return found
-    mean = np.full(task.nominal.shape, np.nan)
-    covariance = np.full((task.poses.count, len(mean), len(mean)), np.nan)
-    for pose, sums in found.sums.items():
-        if sums.valid:
-            mean[:, pose], covariance[pose] = sums.mean, sums.covariance
-    return _with_moments(found, task, mean, covariance)
-
-
-def _with_moments(found: MethodResult, task: Task, mean: Floats, covariance: Floats) -> MethodResult:
-    rho, pair = None, task.question.pair
-    if pair is not None:
-        rho = correlation(covariance[:, pair][:, :, pair])
-    sigma = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2).T, 0.0))
-    return replace(found, mean=mean, sigma=sigma, rho=rho)
 
 
 def pose_by_pose(name: str, task: Task, work: Callable[[Setting], MethodResult]) -> MethodResult:
@@ -90,8 +60,8 @@ def pose_by_pose(name: str, task: Task, work: Callable[[Setting], MethodResult])
             found.add(part)
             task.progress.update(1)
     except KeyboardInterrupt:
-        raise Partial(of_sums(found, task)) from None
-    return of_sums(found, task)
+        raise Partial(found) from None
+    return found
 
 
 def of_limits(name: str, task: Task, work: Callable[[Setting], Estimate]) -> MethodResult:

@@ -1,19 +1,34 @@
-"""The cheapest method that reaches the precision asked; moments from its plain samples."""
+"""The cheapest method that reaches the precision asked, each step checked by those below; moments of plain samples."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib import import_module
 
-from mechdesign.analyses.reliability.engine import ladder
-from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.limit_states import problem_of
+import numpy as np
+
+from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
+from mechdesign.analyses.reliability.engine.intervals import Precision
+from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, counted, pose_by_pose
-from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, simulate_chunk
+from mechdesign.analyses.reliability.setting import Setting, problem_of
+from mechdesign.analyses.reliability.simulation import Sums, generator, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 
+# Plain samples that every rung is checked with, and up to how many of them need no other method.
+PILOT, FEW = 4000, 40_000
+# So many failures tell their probability well enough to plan by.
+MANY = 30
+# A step beyond plain samples: from the problem, its design points, a generator, the most samples and the precision.
+# None says nothing; an estimate without samples claims no interval, and checks those that do.
+Rung = Callable[[Problem, DesignPoints, np.random.Generator, int, Precision], Estimate | None]
+# Two methods disagree where their intervals are farther apart than this factor.
+FACTOR = 1.5
 
-def rungs() -> dict[str, ladder.Rung]:
+
+def rungs() -> dict[str, Rung]:
     """Of the methods that are declared as steps, in their order."""
     steps = sorted((method for method in METHODS.values() if method.step), key=lambda method: method.step)
     return {method.name: import_module(method.place).rung for method in steps}
@@ -29,18 +44,94 @@ def run(task: Task) -> MethodResult:
         def plain(count: int) -> Estimate:
             while (have := sum(part.samples for part in drawn)) < count:
                 # The first chunk is the pilot, the following ones are whole.
-                size = min(ladder.PILOT if not drawn else ladder.FEW, count - have)
+                size = min(PILOT if not drawn else FEW, count - have)
                 drawn.append(simulate_chunk(setting, task.sources, task.seed, len(drawn), size))
             return counted(Sums.total(drawn))
 
         if not task.question.limited:
-            plain(min(ladder.FEW, task.most))
+            plain(min(FEW, task.most))
             return MethodResult("auto", sums={setting.pose: Sums.total(drawn)})
         rng = generator(task.seed, setting.pose, SEARCH, 2)
         # Where nothing else helps, plain samples are as many all told.
-        problem, shared = problem_of(setting, task.sources), max(ladder.FEW, task.most // task.poses.count)
-        estimate, used, said = ladder.climb(problem, task.precision, plain, steps, rng, task.most, shared)
+        problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
+        estimate, used, said = climb(problem, task.precision, plain, steps, rng, task.most, shared)
         pose = setting.pose
         return MethodResult("auto", {pose: estimate}, {pose: Sums.total(drawn)}, {pose: used}, {pose: said})
 
     return pose_by_pose("auto", task, work)
+
+
+def climb(
+    problem: Problem,
+    precision: Precision,
+    plain: Callable[[int], Estimate],
+    rungs: Mapping[str, Rung],
+    rng: np.random.Generator,
+    most: int,
+    most_plain: int,
+) -> tuple[Estimate, str, dict[str, Estimate]]:
+    """Probability of failure to a precision.
+
+    Parameters
+    ----------
+    plain : callable
+        Monte Carlo with so many samples all told; keeps what it has drawn before.
+    rungs : mapping of str to Rung
+        The methods that are tried in this order where plain samples do not do.
+    most, most_plain : int
+        Samples that are drawn at most by any method, and by Monte Carlo.
+
+    Returns
+    -------
+    estimate : Estimate
+        Its evaluations are those of all rungs.
+    used : str
+        The method that it comes from.
+    said : dict of str to Estimate
+        What each method that was tried says.
+    """
+    said = {"monte_carlo": plain(min(PILOT, most, most_plain))}
+
+    def plainly(count: float) -> Estimate:
+        said["monte_carlo"] = plain(int(min(most, most_plain, max(count, PILOT))))
+        return said["monte_carlo"]
+
+    def precise(estimate: Estimate) -> bool:
+        return precision.reached(estimate.failure, estimate.low, estimate.high)
+
+    def enough(estimate: Estimate) -> float:
+        # Few failures say little about how many there are; the interval's end leaves their number in doubt no longer.
+        share = estimate.failure if estimate.failures >= MANY else estimate.high
+        return 1.1 * precision.needed(share, share * (1.0 - share))
+
+    found, used = said["monte_carlo"], "monte_carlo"
+    if not precise(found) and enough(found) <= FEW:
+        found = plainly(enough(found))
+    if not precise(found):
+        points = find(problem, rng)
+        candidates: dict[str, Estimate] = {}
+        for name, rung in rungs.items():
+            tried = rung(problem, points, rng, most, precision)
+            if tried is None:
+                continue
+            said[name] = tried
+            # Plain samples see every failure: what they exclude has missed some of them.
+            if tried.failures and tried.high >= found.low:
+                candidates[name] = tried
+                if precise(tried):
+                    break
+        if not any(map(precise, candidates.values())):
+            found = plainly(enough(found) if found.failures >= MANY else np.inf)
+        for name, tried in candidates.items():
+            if precise(tried) or tried.high - tried.low < found.high - found.low:
+                found, used = tried, name
+    total = problem.evaluations + said["monte_carlo"].evaluations
+    return replace(found, evaluations=total), used, said
+
+
+def disagree(one: Estimate, other: Estimate) -> float:
+    """How many times two estimates are apart beyond their intervals; 1 where these overlap."""
+    low, high = max(one.low, other.low), min(one.high, other.high)
+    if not low > high:
+        return 1.0
+    return low / high if high > 0 else float("inf")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mechdesign.analyses.reliability.methods import sampled
+from mechdesign.analyses.reliability.methods import counted
 from mechdesign.analyses.reliability.simulation import Sums, simulate
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 
@@ -14,5 +14,10 @@ def run(task: Task) -> MethodResult:
     try:
         simulate(task.settings, task.sources, task.seed, task.samples, sums, task.jobs, task.progress)
     except KeyboardInterrupt:
-        raise Partial(sampled("monte_carlo", task, sums)) from None
-    return sampled("monte_carlo", task, sums)
+        raise Partial(_found(task, sums)) from None
+    return _found(task, sums)
+
+
+def _found(task: Task, sums: dict[int, Sums]) -> MethodResult:
+    estimates = {pose: counted(each) for pose, each in sums.items()} if task.question.limited else {}
+    return MethodResult("monte_carlo", estimates, sums)

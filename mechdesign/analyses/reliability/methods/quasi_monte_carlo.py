@@ -1,20 +1,34 @@
-"""Scrambled Sobol points, in replicates that give the interval."""
+"""Scrambled Sobol points, in replicates that give the interval.
+
+[Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Joe & Kuo, Constructing Sobol sequences with better
+two-dimensional projections, 2008 (scipy.stats.qmc).]
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from mechdesign.analyses.reliability.engine import quasi
+import numpy as np
+
+from mechdesign.analyses.reliability.engine.intervals import binomial, replicated
+from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate
 from mechdesign.analyses.reliability.methods import QUASI, pose_by_pose
-from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, sums_of
+from mechdesign.analyses.reliability.setting import Setting
+from mechdesign.analyses.reliability.simulation import Sums, generator, sums_of
 from mechdesign.analyses.reliability.task import MethodResult, Task
+from mechdesign.numerics.arrays import Floats
 
 NAME = "quasi_monte_carlo"
+REPLICATES = 16
+# Beyond so few failures the means of the replicates are far from normal, and the interval is that of plain samples,
+# which is wider: the variance of a scrambled net is hardly ever above theirs.
+FEW = 200
 
 
 def run(task: Task) -> MethodResult:
     """About as many points as asked at each pose."""
-    sources, counts = task.sources, quasi.replicates(task.samples)
+    sources, counts = task.sources, replicates(task.samples)
 
     def work(setting: Setting) -> MethodResult:
         seeds = generator(task.seed, setting.pose, QUASI, 0).integers(2**62, size=len(counts))
@@ -23,14 +37,41 @@ def run(task: Task) -> MethodResult:
             begun = sum(map(len, parts))
             parts.append([
                 sums_of(replace(setting, scale=None), sources.made(sources.at(u)), u.shape[1], begun + block)
-                for block, u in enumerate(quasi.points(len(sources.owners), count, seed))
+                for block, u in enumerate(points(len(sources.owners), count, seed))
             ])  # fmt: skip
         total = Sums.total([part for replicate in parts for part in replicate])
         # Points that are spread evenly have no trend.
         found = MethodResult(NAME, sums={setting.pose: replace(total, trend=total.trend[:0])})
         if task.question.limited:
             broken = [sum(part.failures for part in replicate) for replicate in parts]
-            found.estimates[setting.pose] = quasi.estimate(broken, counts[0], total.samples - total.valid)
+            found.estimates[setting.pose] = estimate(broken, counts[0], total.samples - total.valid)
         return found
 
     return pose_by_pose(NAME, task, work)
+
+
+def replicates(samples: int) -> list[int]:
+    """Points of each replicate: powers of two, about as many as asked all told."""
+    each = max(1, round(np.log2(max(samples / REPLICATES, 2))))
+    return [2**each] * REPLICATES
+
+
+def points(dimension: int, count: int, seed: int) -> Iterator[Floats]:
+    """Scrambled Sobol points as standard normal variables, in blocks of shape (dimension, n)."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    sequence = qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(seed))
+    for begin in range(0, count, BLOCK):
+        # The scrambling leaves points at 0 a chance of one in 2^30.
+        yield ndtri(np.clip(sequence.random(min(BLOCK, count - begin)), 2.0**-32, 1 - 2.0**-32)).T
+
+
+def estimate(broken: Sequence[int], count: int, invalid: int) -> Estimate:
+    """Estimate from the failures of each replicate of `count` points."""
+    failures, total = sum(broken), count * len(broken)
+    if failures < FEW or total - failures < FEW:
+        low, high = binomial(failures, total)
+    else:
+        low, high = replicated(np.array(broken) / count)
+    return Estimate(failures / total, low, high, total, total, failures, invalid)

@@ -6,22 +6,42 @@ error = f0 + a z + z H z / 2 for deviations z of all that varies; mean and covar
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
-from mechdesign.analyses.reliability.cumulants import Cumulants, cumulants
+from mechdesign.analyses.reliability.laws import PIN_LAWS, Normal, pair_nodes
 from mechdesign.analyses.reliability.methods import normal
-from mechdesign.analyses.reliability.simulation import Setting, errors_of
-from mechdesign.analyses.reliability.sources import Drawn, Sources
+from mechdesign.analyses.reliability.setting import Setting, errors_of
+from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Task
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.parallel import map_chunks
 
 # Longest and shortest steps of the differences, as a part of the mechanism's size or in radians, and between them as a
 # part of the standard deviation: the longest is the fourth root of rounding, at which a second derivative has about
 # seven digits; what is made finely is often small itself, so that a shorter step is needed, and fewer digits count.
 _LONGEST, _SHORTEST, _PART = 1e-4, 1e-6, 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Cumulants:
+    """Joint cumulants of the components: the scalars, then x and y of each pin's offset.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (components,)
+    covariance : ndarray, shape (components, components)
+    third, fourth : (ndarray of int, shape (terms, 3 or 4), ndarray, shape (terms,))
+        Cumulants that are not zero, with their components; every order of unlike components is a term.
+    """
+
+    mean: Floats
+    covariance: Floats
+    third: tuple[Ints, Floats]
+    fourth: tuple[Ints, Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,22 +91,18 @@ def run(task: Task) -> MethodResult:
 
 
 def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
-    """Second differences of the exact errors of mechanisms made beside the nominal one; nan where one is not assembled.
-
-    Parameters
-    ----------
-    steps : ndarray, shape (components,)
-    """
+    """Second differences of the exact errors, of `steps` (components,); nan where a mechanism is not assembled."""
     count = len(steps)
     i, j = np.triu_indices(count, 1)
     single, pairs = np.diag(steps), np.zeros((count, len(i)))
     places = np.arange(len(i))
     pairs[i, places], pairs[j, places] = steps[i], steps[j]
     z = np.concatenate([np.zeros((count, 1)), single, -single, pairs, -pairs], axis=1)
-    errors, valid = errors_of(setting, sources.made(_drawn(sources, z)), z.shape[1])
+    # A pin's place is counted as that of a radial clearance of 1.
+    drawn = np.insert(z, range(len(sources.scalars), count, 2), 1.0, axis=0)
+    errors, valid = errors_of(setting, sources.made(drawn), z.shape[1])
     found = np.where(valid, errors, np.nan)
-    ends = np.cumsum([1, count, count, len(i)])
-    value, ahead, back, both_ahead, both_back = np.split(found, ends, axis=1)
+    value, ahead, back, both_ahead, both_back = np.split(found, np.cumsum([1, count, count, len(i)]), axis=1)
     hessian = np.empty((len(found), count, count))
     diagonal = np.arange(count)
     hessian[:, diagonal, diagonal] = (ahead + back - 2.0 * value) / steps**2
@@ -111,7 +127,57 @@ def step_sizes(sources: Sources, sigma: Floats) -> Floats:
     return steps
 
 
-def _drawn(sources: Sources, z: Floats) -> Drawn:
-    count = len(sources.scalars)
-    pins = z[count:].reshape(-1, 2, z.shape[1])
-    return Drawn(list(z[:count]), [1.0] * len(pins), [(x, y) for x, y in pins])
+def cumulants(sources: Sources) -> Cumulants:
+    """Cumulants with the pins' laws of the analytic method.
+
+    A clearance's radius R multiplies its pin's place of unit clearance (x, y), which is isotropic: E[(R x)^2] =
+    E[R^2] E[x^2], E[(R x)^4] = E[R^4] E[x^4], E[R^4 x^2 y^2] = E[R^4] E[x^4]/3, and all odd moments are zero. Of
+    correlated dimensions that are not normal the cumulants of two are counted, those of three and more together not.
+    """
+    laws = [scalar.law.moments for scalar in sources.scalars]
+    count = len(laws)
+    size = count + 2 * len(sources.pins)
+    mean, covariance = np.zeros(size), np.zeros((size, size))
+    third: dict[tuple[int, ...], float] = {}
+    fourth: dict[tuple[int, ...], float] = {}
+    for k, (middle, second, skew, flat) in enumerate(laws):
+        mean[k], covariance[k, k] = middle, second
+        third[k, k, k] = skew
+        fourth[k, k, k, k] = flat - 3.0 * second**2
+    if sources.correlation is not None:
+        sigma = np.sqrt(np.diagonal(covariance)[:count])
+        covariance[:count, :count] = sources.correlation.coefficients * np.outer(sigma, sigma)
+        for places, value in _of_pairs(sources, covariance):
+            (third if len(places) == 3 else fourth)[places] = value
+    for k, pin in enumerate(sources.pins):
+        law, (radius, second, skew, flat) = PIN_LAWS[pin.analytic], pin.moments
+        squared = law.variance * (radius**2 + second)
+        quartic = law.fourth * (radius**4 + 6.0 * radius**2 * second + 4.0 * radius * skew + flat)
+        x, y = count + 2 * k, count + 2 * k + 1
+        covariance[x, x] = covariance[y, y] = squared
+        fourth[x, x, x, x] = fourth[y, y, y, y] = quartic - 3.0 * squared**2
+        fourth[x, x, y, y] = quartic / 3.0 - squared**2
+    return Cumulants(mean, covariance, _terms(third, 3), _terms(fourth, 4))
+
+
+def _of_pairs(sources: Sources, covariance: Floats) -> Iterator[tuple[tuple[int, ...], float]]:
+    assert sources.correlation is not None
+    behind = sources.correlation.root @ sources.correlation.root.T
+    laws = [scalar.law for scalar in sources.scalars]
+    for i, j in np.argwhere(np.triu(sources.correlation.coefficients, 1)).tolist():
+        if isinstance(laws[i], Normal) and isinstance(laws[j], Normal):
+            continue
+        u, v, weight = pair_nodes(float(behind[i, j]))
+        x, y = laws[i].at(u) - laws[i].moments[0], laws[j].at(v) - laws[j].moments[0]
+        a, b, c = covariance[i, i], covariance[j, j], covariance[i, j]
+        yield (i, i, j), float((weight * x * x * y).sum())
+        yield (i, j, j), float((weight * x * y * y).sum())
+        yield (i, i, i, j), float((weight * x**3 * y).sum() - 3.0 * a * c)
+        yield (i, i, j, j), float((weight * x * x * y * y).sum() - a * b - 2.0 * c * c)
+        yield (i, j, j, j), float((weight * x * y**3).sum() - 3.0 * b * c)
+
+
+def _terms(found: dict[tuple[int, ...], float], order: int) -> tuple[Ints, Floats]:
+    terms = [(each, value) for places, value in found.items() if value for each in sorted(set(permutations(places)))]
+    index = np.array([each for each, _ in terms], dtype=np.intp).reshape(-1, order)
+    return index, np.array([value for _, value in terms], dtype=float)

@@ -18,8 +18,8 @@ def prepare(study: Study) -> Evaluate:
     """sqrt(var x + var y), the drives held [S2, eq. 9]."""
     from mechdesign.analyses.kinematics.rates import DriveRates
     from mechdesign.analyses.reliability.deflection import elasticity
-    from mechdesign.analyses.reliability.error_limits import Channel
     from mechdesign.analyses.reliability.first_order import linear_errors
+    from mechdesign.analyses.reliability.question import Channel
     from mechdesign.analyses.reliability.sources import find_sources
 
     assert study.workspace is not None

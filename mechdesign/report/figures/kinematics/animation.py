@@ -22,10 +22,10 @@ from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
 from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Result
 
-FRAMES = 72
+FRAMES = 60
 _COLORS, _WHITE = 128, 244
 _CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and of a frame
-_DPI = 100  # 800 pixels wide
+_DPI = 80  # 640 pixels wide
 
 
 def animation(result: Result) -> bytes:

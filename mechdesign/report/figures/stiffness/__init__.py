@@ -62,11 +62,13 @@ def _springs(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
 def _coils(study: Study, drawn: Drawn, scene: Scene) -> list[Coil]:
     legs, length = drawn.body.legs or (), _COIL * scene.span
     coils = []
-    for spring in drawn.springs:
-        leg, angle = legs[int(spring.leg[0])], float(spring.angle[0])
+    own = drawn.springs
+    for k, place, angle, stiffness in zip(
+        own.leg.tolist(), own.place.tolist(), own.angle.tolist(), own.stiffness.tolist(), strict=True
+    ):
         if np.isnan(angle):
             continue
-        place, along = complex(spring.place[0]), complex(np.exp(1j * angle))
+        leg, along = legs[k], complex(np.exp(1j * angle))
         base, tip = scene.points[leg.base], scene.points[leg.tip]
         inward = ((base - place) * along.conjugate()).real
         grounded = abs(inward) > length and abs(base - place - inward * along) < 1e-6 * scene.span
@@ -76,7 +78,7 @@ def _coils(study: Study, drawn: Drawn, scene: Scene) -> list[Coil]:
             # Its line passes the leg's base: away from the body.
             body = scene.points[drawn.body.section.at]
             anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
-        text = quantity(float(spring.stiffness[0]), study.units.label("stiffness"))
+        text = quantity(stiffness, study.units.label("stiffness"))
         coils.append(Coil(text, place, anchor, tip, length, grounded))
     return coils
 

@@ -1,0 +1,354 @@
+"""Laws of what varies: deviations from nominal, places of pins in their holes, and correlation.
+
+Every law maps standard normal variables onto what varies, so that all methods share one space of independent standard
+normal variables. [Rosenblatt, Remarks on a multivariate transformation, 1952.]
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar, Self
+
+import numpy as np
+
+from mechdesign.errors import StudyError
+from mechdesign.numerics.arrays import Floats
+from mechdesign.study.schema.reliability import Dimension
+
+# A tolerance is three standard deviations of a normal law, which `truncated_normal` is cut at [S2, eq. 5].
+SIGMAS = 3.0
+# Nodes of the integrals over normal variables behind correlated laws.
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+# Largest correlation of the normal variables behind two laws.
+_MOST = 0.999999
+
+
+@dataclass(frozen=True)
+class Marginal(ABC):
+    """The law of one deviation from its nominal value.
+
+    Parameters
+    ----------
+    low, high : float
+        Its tolerance, which a worst case counts with: of unbounded laws three standard deviations about the middle.
+    nominal : float
+        What is lognormal is nominal + deviation.
+    """
+
+    low: float
+    high: float
+    nominal: float = 0.0
+
+    # Half the width of the tolerance in standard deviations; central moments of the law of standard deviation 1.
+    reach: ClassVar[float] = SIGMAS
+    second: ClassVar[float] = 1.0
+    fourth: ClassVar[float] = 3.0
+
+    @property
+    def mean(self) -> float:
+        """The middle of the tolerance; of a triangular law, which may lean, `moments` has the mean."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation, of a truncated law before the cut; of a triangular law, where it does not lean."""
+        return 0.5 * (self.high - self.low) / self.reach
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        """Mean, and second to fourth central moment."""
+        return self.mean, self.second * self.sigma**2, 0.0, self.fourth * self.sigma**4
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        """Independent deviations, shape (count,)."""
+        return self.at(rng.standard_normal(count))
+
+    @abstractmethod
+    def at(self, u: Floats) -> Floats:
+        """Deviations at values of a standard normal variable, increasing, in the shape of `u`."""
+
+    def widened(self, factor: float) -> Self:
+        """The law of a tolerance as many times as wide, about the same middle."""
+        half = 0.5 * factor * (self.high - self.low)
+        return replace(self, low=self.mean - half, high=self.mean + half)
+
+    def scaled(self, factor: float) -> Self:
+        """The law of so many times nominal + deviation, less so many times the nominal value."""
+        return replace(self, low=factor * self.low, high=factor * self.high, nominal=factor * self.nominal)
+
+
+def marginal(spread: Dimension, nominal: float, factor: float = 1.0) -> Marginal:
+    """The law that a study gives.
+
+    Parameters
+    ----------
+    spread : Dimension
+        Tolerance or sigma, and distribution; in the study's units.
+    nominal : float
+        Nominal value in the core's units.
+    factor : float
+        The core's units in one of the study's.
+    """
+    law = LAWS[spread.distribution]
+    low, high = spread.tolerance or (0.0, 0.0)
+    if spread.sigma is not None:
+        low, high = -law.reach * spread.sigma, law.reach * spread.sigma
+    return law(factor * low, factor * high, nominal)
+
+
+class Normal(Marginal):
+    """Normal."""
+
+    def at(self, u: Floats) -> Floats:
+        return np.asarray(self.mean + self.sigma * u)
+
+
+# What the tails of a normal variable that is cut at `SIGMAS` have of its variance.
+_TAIL = 2.0 * SIGMAS * math.exp(-0.5 * SIGMAS**2) / math.sqrt(2.0 * math.pi) / math.erf(SIGMAS / math.sqrt(2.0))
+
+
+class TruncatedNormal(Marginal):
+    """Normal, cut at three standard deviations of what is cut: nothing lies outside the tolerance."""
+
+    second = 1.0 - _TAIL
+    fourth = 3.0 * second - SIGMAS**2 * _TAIL
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        drawn = rng.standard_normal(count)
+        outside = np.flatnonzero(np.abs(drawn) > SIGMAS)
+        while len(outside):
+            again = rng.standard_normal(len(outside))
+            drawn[outside] = again
+            outside = outside[np.abs(again) > SIGMAS]
+        return np.asarray(self.mean + self.sigma * drawn)
+
+    def at(self, u: Floats) -> Floats:
+        from scipy.special import ndtr, ndtri
+
+        # In the lower tail, where small probabilities keep their digits.
+        tail = ndtr(-SIGMAS)
+        below = ndtri(tail + ndtr(-np.abs(u)) * (1.0 - 2.0 * tail))
+        return np.asarray(self.mean + self.sigma * np.copysign(below, u))
+
+
+class Uniform(Marginal):
+    """Uniform over the tolerance."""
+
+    reach = math.sqrt(3.0)
+    fourth = 1.8
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        return self.low + (self.high - self.low) * rng.random(count)
+
+    def at(self, u: Floats) -> Floats:
+        from scipy.special import ndtr
+
+        inward = (self.high - self.low) * ndtr(-np.abs(u))
+        return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
+
+
+class Triangular(Marginal):
+    """Triangular over the tolerance, most likely at the nominal value where the tolerance has it."""
+
+    reach = math.sqrt(6.0)
+
+    @property
+    def mode(self) -> float:
+        """The deviation that is most likely."""
+        return min(max(0.0, self.low), self.high)
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        a, b, c = self.low, self.high, self.mode
+        second = (a * a + b * b + c * c - a * b - a * c - b * c) / 18.0
+        third = (a + b - 2 * c) * (2 * a - b - c) * (a - 2 * b + c) / 270.0
+        return (a + b + c) / 3.0, second, third, 2.4 * second**2
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        if self.high == self.low:
+            return np.full(count, self.low)
+        return rng.triangular(self.low, self.mode, self.high, count)
+
+    def at(self, u: Floats) -> Floats:
+        from scipy.special import ndtr
+
+        width, rise = self.high - self.low, self.mode - self.low
+        below, above = ndtr(u), ndtr(-u)
+        climb = self.low + np.sqrt(below * width * rise)
+        fall = self.high - np.sqrt(above * width * (width - rise))
+        return np.asarray(np.where(below * width < rise, climb, fall))
+
+
+class Lognormal(Marginal):
+    """nominal + deviation is lognormal, and positive."""
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        second = self.sigma**2
+        w = 1.0 + second / (self.nominal + self.mean) ** 2
+        third = second**1.5 * (w + 2.0) * math.sqrt(w - 1.0)
+        return self.mean, second, third, second**2 * (w**4 + 2 * w**3 + 3 * w**2 - 3.0)
+
+    def at(self, u: Floats) -> Floats:
+        size = self.nominal + self.mean
+        # Standard deviation of the logarithm.
+        s = math.sqrt(math.log1p((self.sigma / size) ** 2))
+        return np.asarray(self.mean + size * np.expm1(s * u - 0.5 * s * s))
+
+
+LAWS: dict[str, type[Marginal]] = {
+    "normal": Normal,
+    "truncated_normal": TruncatedNormal,
+    "uniform": Uniform,
+    "triangular": Triangular,
+    "lognormal": Lognormal,
+}
+
+
+@dataclass(frozen=True)
+class PinLaw:
+    """Law of a pin's place in its hole for a radial clearance of 1, alike in all directions [S2, eqs. 6, 12, 13].
+
+    Parameters
+    ----------
+    variance, fourth : float
+        Of each coordinate: E[x^2] and E[x^4]; E[x^2 y^2] is a third of the latter.
+    draw : callable
+        ``draw(rng, count)``: x and y, each of shape (count,).
+    stretch : callable
+        Ratio of the offset's length to that of two standard normal variables, of half their squared length.
+    """
+
+    variance: float
+    fourth: float
+    draw: Callable[[np.random.Generator, int], tuple[Floats, Floats]]
+    stretch: Callable[[Floats], Floats]
+
+    def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """The place at values of two independent standard normal variables, which is not turned."""
+        ratio = self.stretch(0.5 * (u * u + v * v))
+        return ratio * u, ratio * v
+
+
+# Half the squared radius, in standard deviations, at which a normal pin of sigma 1/3 reaches the unit circle, and the
+# share of the normal law that lies outside.
+_CUT = 4.5
+_OUTSIDE = math.exp(-_CUT)
+
+
+def _normal(rng: np.random.Generator, count: int, cut: float = math.inf) -> tuple[Floats, Floats]:
+    """Of sigma 1/3, drawn anew where half the squared radius is beyond `cut`."""
+    x, y = rng.standard_normal((2, count))
+    outside = np.flatnonzero(x * x + y * y > 2.0 * cut) if math.isfinite(cut) else np.zeros(0, dtype=np.intp)
+    while len(outside):
+        again_x, again_y = rng.standard_normal((2, len(outside)))
+        x[outside], y[outside] = again_x, again_y
+        outside = outside[again_x * again_x + again_y * again_y > 2.0 * cut]
+    x *= 1.0 / 3.0
+    y *= 1.0 / 3.0
+    return x, y
+
+
+def _turned(rng: np.random.Generator, count: int, *, inside: bool) -> tuple[Floats, Floats]:
+    """Anywhere in the disc, or on its rim."""
+    radius = np.sqrt(rng.random(count)) if inside else 1.0
+    angle = rng.random(count)
+    angle *= 2.0 * np.pi
+    return radius * np.cos(angle), radius * np.sin(angle)
+
+
+def _stretch(squared: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
+    """The ratio from the squared offset; the limit of small ones follows from its own series by a small floor."""
+
+    def ratio(half: Floats) -> Floats:
+        half = np.maximum(half, 1e-290)
+        return np.asarray(np.sqrt(squared(half) / (2.0 * half)))
+
+    return ratio
+
+
+def _squared_in_disc(half: Floats) -> Floats:
+    # P(offset > s) = (exp(-9 s^2/2) - outside)/(1 - outside) is that of the Rayleigh variable, exp(-half).
+    return -np.log1p((1.0 - _OUTSIDE) * np.expm1(-half)) / _CUT
+
+
+# Mean squared offset, in units of 1/_CUT, of the exponential law cut at _CUT, and its mean square.
+_FIRST = (1.0 - (1.0 + _CUT) * _OUTSIDE) / (1.0 - _OUTSIDE)
+_SECOND = (2.0 - (_CUT**2 + 2.0 * _CUT + 2.0) * _OUTSIDE) / (1.0 - _OUTSIDE)
+
+# In `normal_in_disc` the variance is that of the cut law, which S2 draws but does not use in its formula.
+PIN_LAWS: Mapping[str, PinLaw] = {
+    "normal": PinLaw(1.0 / 9.0, 3.0 / 81.0, _normal, lambda half: np.full_like(half, 1.0 / 3.0)),
+    "normal_in_disc": PinLaw(
+        0.5 * _FIRST / _CUT, 0.375 * _SECOND / _CUT**2, partial(_normal, cut=_CUT), _stretch(_squared_in_disc)
+    ),
+    "uniform": PinLaw(1 / 4, 1 / 8, partial(_turned, inside=True), _stretch(lambda half: -np.expm1(-half))),
+    "contact": PinLaw(1 / 2, 3 / 8, partial(_turned, inside=False), _stretch(np.ones_like)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """Correlated deviations: normal variables behind them whose mixing gives the asked coefficients.
+
+    [Der Kiureghian & Liu, Structural reliability under incomplete probability information, 1986.]
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (laws, laws)
+        Of the deviations, as the study gives them.
+    root : ndarray, shape (laws, laws)
+        Lower triangular; ``root @ u`` are the correlated normal variables of independent ones.
+    """
+
+    coefficients: Floats
+    root: Floats
+
+    @staticmethod
+    def of(laws: Sequence[Marginal], pairs: Mapping[tuple[int, int], float]) -> Correlation:
+        """Correlation where these pairs of laws have these coefficients, and all others none.
+
+        Raises
+        ------
+        StudyError
+            If no random variables of these laws have these coefficients.
+        """
+        wanted, behind = np.eye(len(laws)), np.eye(len(laws))
+        for (i, j), coefficient in pairs.items():
+            wanted[i, j] = wanted[j, i] = coefficient
+            behind[i, j] = behind[j, i] = _behind(laws[i], laws[j], coefficient)
+        try:
+            return Correlation(wanted, np.asarray(np.linalg.cholesky(behind), dtype=np.float64))
+        except np.linalg.LinAlgError:
+            raise StudyError(
+                "reliability.correlation: these coefficients contradict each other (their matrix is not positive "
+                "definite)"
+            ) from None
+
+
+def pair_nodes(rho: float) -> tuple[Floats, Floats, Floats]:
+    """Nodes of two standard normal variables of this correlation, and their weights, each of shape (nodes, nodes)."""
+    first = np.broadcast_to(_NODES[:, None], (len(_NODES), len(_NODES)))
+    return first, rho * first + np.sqrt(1 - rho * rho) * _NODES, np.outer(_WEIGHTS, _WEIGHTS)
+
+
+def _behind(one: Marginal, other: Marginal, coefficient: float) -> float:
+    """Correlation of the normal variables behind two laws."""
+    from scipy.optimize import brentq
+
+    (m, v, *_), (n, w, *_) = one.moments, other.moments
+    if v == 0 or w == 0 or (isinstance(one, Normal) and isinstance(other, Normal)):
+        return coefficient
+
+    def excess(rho: float) -> float:
+        x, y, weight = pair_nodes(rho)
+        return float((weight * (one.at(x) - m) * (other.at(y) - n)).sum() / math.sqrt(v * w)) - coefficient
+
+    if excess(-_MOST) > 0 or excess(_MOST) < 0:
+        raise StudyError(f"reliability.correlation: two dimensions of these distributions cannot have {coefficient:g}")
+    return float(brentq(excess, -_MOST, _MOST, xtol=1e-12))
