@@ -16,8 +16,7 @@ import numpy as np
 
 from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.setting import Setting, errors_of
-from mechdesign.analyses.reliability.simulation import CHUNK, generator
+from mechdesign.analyses.reliability.simulation import CHUNK, Setting, errors_of, generator
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Ints

@@ -9,8 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.setting import Setting
-from mechdesign.analyses.reliability.simulation import Sums
+from mechdesign.analyses.reliability.simulation import Setting, Sums
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks

@@ -12,8 +12,7 @@ from mechdesign.analyses.reliability.engine.design_points import DesignPoints, f
 from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, counted, pose_by_pose
-from mechdesign.analyses.reliability.setting import Setting, problem_of
-from mechdesign.analyses.reliability.simulation import Sums, generator, simulate_chunk
+from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 

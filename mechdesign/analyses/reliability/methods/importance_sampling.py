@@ -16,8 +16,7 @@ from mechdesign.analyses.reliability.engine.intervals import Precision, weighted
 from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Problem, failed
 from mechdesign.analyses.reliability.methods import SEARCH, counted, of_limits
-from mechdesign.analyses.reliability.setting import Setting, problem_of
-from mechdesign.analyses.reliability.simulation import Sums, generator, simulate
+from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 
