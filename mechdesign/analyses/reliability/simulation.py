@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.engine.problem import Problem, slopes
+from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, counted, slopes
 from mechdesign.analyses.reliability.first_order import derivatives, nominal_values
 from mechdesign.analyses.reliability.question import Question
 from mechdesign.analyses.reliability.sources import Made, Sources
@@ -89,12 +89,13 @@ def forward_plan(mechanism: Mechanism, configuration: Configuration) -> Plan:
     modes = list(forward.modes)
     for index, group in enumerate(forward.structure.groups):
         errors = {}
-        for mode in {forward.modes[index]: 0, -forward.modes[index]: 0}:
+        for mode in (modes[index], -modes[index]) if modes[index] else ():
             modes[index] = mode
             found = Plan(mechanism, forward.structure, modes).solve(drives, start=configuration, limits=False)
             errors[mode] = sum(abs(found.rotations[k] - configuration.rotations[k]) for k in group.angles)
             errors[mode] += sum(abs(found.slides[k] - configuration.slides[k]) for k in group.slides)
-        modes[index] = min(errors, key=lambda mode: np.nan_to_num(errors[mode], nan=np.inf))
+        # A pose that is not found is as far as can be.
+        modes[index] = min(errors, key=lambda mode: np.nan_to_num(errors[mode], nan=np.inf), default=modes[index])
     return forward if tuple(modes) == forward.modes else Plan(mechanism, forward.structure, modes)
 
 
@@ -207,6 +208,11 @@ class Sums:
             return np.full(self.products.shape, np.nan)
         centred = self.products - np.outer(self.errors, self.errors) / self.valid
         return np.asarray(centred / (self.valid - 1))
+
+    @property
+    def estimate(self) -> Estimate:
+        """Estimate from counted failures."""
+        return counted(self.failures, self.samples, self.samples - self.valid, self.samples)
 
     @staticmethod
     def total(parts: Sequence[Sums]) -> Sums:
