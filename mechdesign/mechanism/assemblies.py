@@ -12,10 +12,9 @@ import numpy as np
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Value, wrap
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.structure import Group
+from mechdesign.mechanism.sketch import deciding_joints
 
 # Bound of the assemblies that are listed and followed.
 MOST = 256
@@ -43,13 +42,6 @@ class Assembly:
     label: str
     mechanism: Mechanism
     drawn: bool
-
-
-def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
-    """Names of the joints whose place the assembly mode of a group chooses; those of slides where it has no other."""
-    ends = {graph.nodes[node] for loop in group.loops for node in (loop.start, loop.end)}
-    names = [name for name in graph.joined(group.edges) if name not in ends]
-    return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)
 
 
 def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, ...]:

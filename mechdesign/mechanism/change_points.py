@@ -1,6 +1,6 @@
 """Change points: where two assemblies of a group meet and the motion may go on in either.
 
-A closure (see `mechdesign.mechanism.dyads`) touches zero there without crossing it. Under ``branch: follow`` a motion
+A closure (see `mechdesign.mechanism.solve`) touches zero there without crossing it. Under ``branch: follow`` a motion
 goes on smoothly, which means that the group's assembly mode changes its sign.
 """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.assemblies import assemblies, deciding_joints
+from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.diagnosis import joints_in_words
 from mechdesign.mechanism.four_bars import describe_loops
@@ -13,6 +13,7 @@ from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Prismatic, Term
 from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.sketch import deciding_joints
 from mechdesign.mechanism.structure import Group, Structure
 
 # What stands for everything that is placed before a group.

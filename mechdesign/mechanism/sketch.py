@@ -97,22 +97,6 @@ def _fit(graph: Graph, geometry: Geometry, nodes: Sequence[complex | None], fram
     return total
 
 
-def _span(graph: Graph, sketch: Sketch, edges: Sequence[tuple[int, int]], structure: Structure) -> complex:
-    total = 0j
-    for k, sign in edges:
-        edge = structure.edges[k]
-        ends = []
-        for node in (edge.tail, edge.head):
-            place = sketch.nodes[node]
-            if place is None:
-                raise MechanismError(
-                    f"point '{graph.nodes[node]}' is needed to choose the assembly; add it to the sketch", KEY
-                )
-            ends.append(place)
-        total += sign * (ends[1] - ends[0])
-    return total
-
-
 def assembly_modes(graph: Graph, geometry: Geometry, structure: Structure, sketch: Sketch) -> tuple[int, ...]:
     """Assembly mode (+1 or -1) of each group of a structure as drawn; 0 for groups that have none.
 
@@ -127,58 +111,47 @@ def assembly_modes(graph: Graph, geometry: Geometry, structure: Structure, sketc
 def _mode(graph: Graph, geometry: Geometry, structure: Structure, group: Group, sketch: Sketch) -> int:
     if group.form in ("place", "newton", "two slides"):
         return 0
-    edges = group.loops[0].edges
-    parts: dict[int, list[tuple[int, int]]] = {root: [] for root in group.angles}
-    slide: tuple[int, int] | None = None
-    for k, sign in edges:
+    (loop,) = group.loops
+    spans = dict.fromkeys(group.angles, 0j)
+    for k, sign in loop.edges:
         edge = structure.edges[k]
         root = structure.ties[edge.frame].root
-        if edge.slide is not None and edge.slide in group.slides:
-            slide = (k, sign)
-        if root in parts:
-            parts[root].append((k, sign))
+        if root in spans:
+            tail, head = (_drawn(graph, sketch, node) for node in (edge.tail, edge.head))
+            spans[root] += sign * (head - tail)
     if group.form == "two angles":
-        first, second = (_span(graph, sketch, path, structure) for path in parts.values())
+        first, second = spans.values()
         side, size = cross(first + second, first), abs(first + second) * min(abs(first), abs(second))
-        ends = [graph.nodes[node] for node in (group.loops[0].start, group.loops[0].end)]
+        ends = [graph.nodes[node] for node in (loop.start, loop.end)]
         line = f"the line {'-'.join(ends)}" if ends[0] != ends[1] and ":" not in "".join(ends) else "the line"
-        return _decide(graph, structure, group, side, size, parts[group.angles[0]], line)
-    assert slide is not None
-    k, sign = slide
-    name = graph.slides[structure.edges[k].slide or 0]
-    turn = sketch.rotations[structure.edges[k].frame]
-    along = _span(graph, sketch, [slide], structure)
-    # Unknown only where the whole link is drawn at one place, which decides nothing whatever the direction.
-    direction = complex(geometry.nominal.d[k]) * (1.0 if turn is None else turn)
-    if group.form == "angle and fixed slide":
-        radius = _span(graph, sketch, parts[group.angles[0]], structure)
-        side = -dot(radius, sign * direction)
-        line = f"the perpendicular to slide '{name}'"
-        return _decide(graph, structure, group, side, abs(radius), parts[group.angles[0]], line)
-    rest = [(e, s) for e, s in parts[group.angles[0]] if e != k]
-    whole = along + _span(graph, sketch, rest, structure)
-    line = f"the perpendicular to slide '{name}'"
-    return _decide(graph, structure, group, sign * dot(whole, direction), abs(whole), [slide], line)
-
-
-def _decide(
-    graph: Graph,
-    structure: Structure,
-    group: Group,
-    side: float,
-    size: float,
-    path: Sequence[tuple[int, int]],
-    line: str,
-) -> int:
+    else:
+        (span,), (slide,) = spans.values(), group.slides
+        k, sign = next((k, sign) for k, sign in loop.edges if structure.edges[k].slide == slide)
+        turn = sketch.rotations[structure.edges[k].frame]
+        # Unknown only where the whole link is drawn at one place, which decides nothing whatever the direction.
+        direction = sign * complex(geometry.nominal.d[k]) * (1.0 if turn is None else turn)
+        side, size = dot(span, direction if group.form == "angle and turning slide" else -direction), abs(span)
+        line = f"the perpendicular to slide '{graph.slides[slide]}'"
     if abs(side) <= UNDECIDED * size:
-        ends = {node for k, _ in path for node in (structure.edges[k].tail, structure.edges[k].head)}
-        inner = ends - {group.loops[0].start, group.loops[0].end} or ends
-        joints = [graph.nodes[node] for node in sorted(inner) if ":" not in graph.nodes[node]]
-        names = " or ".join(f"'{name}'" for name in joints or [graph.slides[slide] for slide in group.slides])
+        names = " or ".join(f"'{name}'" for name in deciding_joints(graph, group))
         raise MechanismError(
             f"{names} lies within 1 % of {line} that divides the two assemblies; draw it clearly on one side", KEY
         )
     return 1 if side > 0 else -1
+
+
+def _drawn(graph: Graph, sketch: Sketch, node: int) -> complex:
+    place = sketch.nodes[node]
+    if place is None:
+        raise MechanismError(f"point '{graph.nodes[node]}' is needed to choose the assembly; add it to the sketch", KEY)
+    return place
+
+
+def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
+    """Names of the joints whose place the assembly mode of a group chooses; those of slides where it has no other."""
+    ends = {graph.nodes[node] for loop in group.loops for node in (loop.start, loop.end)}
+    names = [name for name in graph.joined(group.edges) if name not in ends]
+    return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)
 
 
 def drawn_value(graph: Graph, geometry: Geometry, sketch: Sketch, coordinate: Coordinate) -> float | None:

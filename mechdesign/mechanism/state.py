@@ -25,9 +25,9 @@ class State:
     Parameters
     ----------
     beyond : bool
-        Whether groups with a closed form are told beyond their reach (see `mechdesign.mechanism.dyads`).
+        Whether groups with a closed form are told beyond their reach (see `mechdesign.mechanism.solve`).
     closures : list
-        Of the groups with a closed form: positive where they close (see `mechdesign.mechanism.dyads`).
+        Of the groups with a closed form: positive where they close (see `mechdesign.mechanism.solve`).
     unknowns, converged, determinants
         Of the others, in their order: what was found, whether each pose converged, and the determinant of
         the group's equations.

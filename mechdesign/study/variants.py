@@ -17,9 +17,9 @@ import numpy as np
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Expression, ExpressionError, Number
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study.building.names import GROUND
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document

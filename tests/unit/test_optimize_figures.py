@@ -7,11 +7,12 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.analyses.optimize.goals import Goal
+from mechdesign.analyses.optimize.judge import JudgedDesigns
+from mechdesign.analyses.optimize.tables import Comparison
 from mechdesign.report.figures import style
 from mechdesign.report.figures.optimize import figures
-from mechdesign.report.figures.optimize.designs import Designs
-from mechdesign.report.figures.optimize.fronts import front_figure
-from mechdesign.report.figures.optimize.parallel import MOST, convergence, parallel_axes
+from mechdesign.report.figures.optimize.many import MOST, convergence, front_figure, parallel_axes
 from mechdesign.results import Column, Table
 
 ARM = """
@@ -71,15 +72,13 @@ def test_a_single_goal_is_shown_in_its_own_unit() -> None:
     assert line[:, 1] == pytest.approx(result.tables["designs"]["kinematics.P.x"])
 
 
-def many(count: int = 500) -> Designs:
-    rng = np.random.default_rng(0)
-    x, y, z = rng.random((3, count))
-    designs = table(x=x, y=y, z=z, cost=x + y, mass=1 - x + z, feasible=np.arange(count) != 3)
-    best = int(np.argmin(np.where(np.arange(count) != 3, x + y, np.inf)))
-    optimum = table(
-        w_cost=[1.0], w_mass=[0.0], **{name: designs[name][[best]] for name in ("x", "y", "z", "cost", "mass")}
-    )
-    return Designs(designs, optimum, ["x", "y", "z"], {"cost": True, "mass": True}, np.asarray(designs["feasible"]))
+def many(count: int = 500) -> Comparison:
+    x, y, z = np.random.default_rng(0).random((3, count))
+    goals = Goal("cost", "", "", smallest=True), Goal("mass", "", "", smallest=True)
+    values = dict(zip(goals, (x + y, 1 - x + z), strict=True))
+    codes = (np.arange(count) == 3).astype(np.int32)
+    designs = JudgedDesigns({"x": x, "y": y, "z": z}, goals, (), values, {}, codes, ["", "wrong"])
+    return Comparison(study_of(ARM), designs, np.array([[1.0, 0.0]]), {})
 
 
 def test_parallel_axes_of_many_designs_show_some_and_always_the_best() -> None:
@@ -88,7 +87,7 @@ def test_parallel_axes_of_many_designs_show_some_and_always_the_best() -> None:
         axes = parallel_axes(designs).axes[0]
     lines = axes.collections[0].get_segments()
     assert len(lines) == MOST
-    cost = designs["cost"][designs.feasible]
+    cost = designs.values[designs.designs.feasible, 0]
     best = axes.lines[0].get_xydata()
     assert best[3, 1] == 0
     assert {text.get_text() for text in axes.texts} >= {f"{cost.min():.4g}", f"{cost.max():.4g}"}

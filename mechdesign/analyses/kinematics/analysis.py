@@ -8,14 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.kinematics import targets
-from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.extremes import extremes, needed
+from mechdesign.analyses.kinematics.boundaries import Boundary, motion_limits
 from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
-from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, characteristic_length, entry, motion_question
-from mechdesign.analyses.kinematics.motion_limits import motion_limits
-from mechdesign.analyses.kinematics.moving import move
+from mechdesign.analyses.kinematics.motion import (
+    Motion,
+    MotionQuestion,
+    characteristic_length,
+    entry,
+    motion_question,
+    move,
+)
+from mechdesign.analyses.kinematics.peaks import extremes, needed
 from mechdesign.analyses.poses import judge_failures, pose_in_words
 from mechdesign.analyses.shown import Keeper, Shown
 from mechdesign.errors import Problem, StudyError
@@ -201,7 +207,7 @@ def jacobian_table(motion: Motion) -> Table:
             name = entry(output, drive)
             meaning = f"derivative of {output.name} by {drive.name}, angles in radians"
             columns.append(Column(name, motion.arrays[name], _per(question.study, output, drive), meaning))
-    columns.append(Column("valid", motion.valid, meaning="1 where the pose is assembled and within its limits"))
+    columns += shared(question.study.units, valid=motion.valid)
     return Table("jacobian", tuple(columns), "derivatives of the listed outputs by the drives, per radian")
 
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.motion import Motion
-from mechdesign.analyses.kinematics.moving import NEAR
+from mechdesign.analyses.kinematics.motion import NEAR, Motion, thinned
 from mechdesign.analyses.kinematics.rates import drive_velocities
 from mechdesign.analyses.poses import CHUNK, dimensions, in_study_units, radians, starts
 from mechdesign.mechanism import Configuration
@@ -29,9 +28,6 @@ ROUNDS = 14
 # Where a pose has no slopes (a dead centre, from which functions start as a root does), looks beside it: parts of the
 # step to the next pose.
 GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
-# Poses of a design's sweep that a line begins with, about: of a finer sweep some are left out, but no step becomes
-# longer than so many radians, or so much of the mechanism's size.
-ENOUGH, LONGEST = 4096, 0.02
 # A range below this part of a function's size is rounding.
 STILL = 1e-12
 # A limit this near to a pose of the sweep, in rows, is that pose.
@@ -73,22 +69,6 @@ def function_of(study: Study, coordinate: Coordinate) -> Function:
 def _frame(k: int) -> Function:
     """The angle of a class of bodies that turn together."""
     return Function(lambda configuration: np.angle(configuration.rotations[k]), lambda _, v: v.angles[k], radian=1.0)
-
-
-def thinned(motion: Motion, swept: str) -> Flags:
-    """Poses of a sweep that tell the motion: its ends, those where it ceases to be valid, and enough between."""
-    study, poses = motion.question.study, motion.question.poses
-    coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
-    steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
-    longest = LONGEST * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
-    stride = min(-(-each // ENOUGH), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
-    taken: Flags = np.arange(each) % max(stride, 1) == 0
-    taken[-1] = True
-    taken = np.tile(taken, poses.designs)
-    change = valid[1:] != valid[:-1]
-    taken[1:] |= change
-    taken[:-1] |= change
-    return taken
 
 
 class PoseLine:

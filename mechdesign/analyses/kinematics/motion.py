@@ -1,17 +1,29 @@
-"""One motion of a mechanism: every pose of its kinematics solved, and the columns that say how it moves."""
+"""One motion of a mechanism: every pose of its kinematics solved, and the columns that say how it moves.
+
+Poses at a change point that the motion follows are told from those on both sides.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
-from mechdesign.analyses.kinematics.targets import Error, needed
-from mechdesign.analyses.poses import SolvedPoses, expand_outputs, in_study_units, pose_columns, study_poses
+from mechdesign.analyses.kinematics.targets import Error, errors, needed
+from mechdesign.analyses.poses import (
+    SolvedPoses,
+    expand_outputs,
+    in_study_units,
+    pose_columns,
+    radians,
+    solve_poses,
+    study_poses,
+)
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -21,12 +33,26 @@ from mechdesign.mechanism.jacobians import Jacobian, mixes
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column
-from mechdesign.study import Poses, Study
+from mechdesign.study import Study
+from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.kinematics import KinematicsSection
 
 # A place this near to a pose or to zero, as a part of the sweep, is there.
 AT_POSE = 1e-12
+# Poses with a conditioning below this have lost digits.
+NEAR = 1e-3
+# h: radians, or parts of the mechanism's size. What the formula leaves out is about 1e-12, what accelerations lose of
+# their digits this near to a change point about 1e-10.
+DISTANCE = 1e-2
+STEPS = DISTANCE * np.array([-3, -2, -1, 1, 2, 3])
+WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
+
+
+# Poses of a design's sweep that tell of it between them, about: of a finer sweep some are left out, but no step becomes
+# longer than so many radians, or so much of the mechanism's size.
+ENOUGH, LONGEST = 4096, 0.02
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
@@ -239,8 +265,7 @@ class Motion:
             if name in arrays:
                 unit = label("moment" if drive.quantity == "angle" else "force")
                 columns.append(Column(name, arrays[name], unit, "drive effort that balances the loads"))
-        columns.append(Column("valid", self.valid, meaning="1 where the pose is assembled and within its limits"))
-        return columns
+        return [*columns, *shared(self.question.study.units, valid=self.valid)]
 
     def pose_columns(self) -> list[Column]:
         """The drives, and the coordinates that the study gives."""
@@ -257,6 +282,22 @@ class Motion:
         far = error.output in study.mechanism.points
         meaning = f"distance of {error.output} from its target" if far else f"{error.output} less its target"
         return Column(error.name, error.values, study.units.label(error.quantity), meaning)
+
+
+def thinned(motion: Motion, swept: str) -> Flags:
+    """Poses of a sweep that tell the motion: its ends, those where it ceases to be valid, and enough between."""
+    study, poses = motion.question.study, motion.question.poses
+    coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
+    steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
+    longest = LONGEST * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
+    stride = min(-(-each // ENOUGH), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
+    taken: Flags = np.arange(each) % max(stride, 1) == 0
+    taken[-1] = True
+    taken = np.tile(taken, poses.designs)
+    change = valid[1:] != valid[:-1]
+    taken[1:] |= change
+    taken[:-1] |= change
+    return taken
 
 
 def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> Floats:
@@ -290,3 +331,73 @@ _RATES: Mapping[tuple[Quantity, str], str] = {
 def entry(output: Coordinate, drive: Coordinate) -> str:
     """Name of an entry of the Jacobian: ``C.x_by_theta``."""
     return f"{output.name}_by_{drive.name}"
+
+
+def move(
+    question: MotionQuestion,
+    progress: Progress = NULL,
+    jobs: int | None = 1,
+    *,
+    also: Callable[[SolvedPoses], object] | None = None,
+) -> Motion:
+    """Solve every pose; one that fails is nan, with its reason.
+
+    Parameters
+    ----------
+    also : callable, optional
+        Called with the solved poses, so that who needs more of them does not solve them again.
+
+    Raises
+    ------
+    MechanismError
+        If a pose's coordinates do not determine the mechanism.
+    """
+    study, poses = question.study, question.poses
+    motion = Motion(question, reason=np.zeros(poses.count, dtype=np.int8))
+    for solved in solve_poses(study, poses, question.watched, jobs):
+        motion.fill(solved)
+        if also is not None:
+            also(solved)
+        progress.update(len(solved.rows))
+    _through_change_points(motion)
+    motion.errors = list(errors(study, poses, motion.arrays, np.arange(poses.count)))
+    return motion
+
+
+def _through_change_points(motion: Motion) -> None:
+    """Set the columns of a motion at its change points, where the study follows them; note which in `smooth`.
+
+    Where two assemblies meet, the equations of the velocities have no one solution, and those of the positions half of
+    the digits; but the motion that is followed is smooth there. With S_k = f(k h) + f(-k h) from both sides
+
+        f(0) = (15 S_1 - 6 S_2 + S_3) / 20  + O(h^6).
+    """
+    question = motion.question
+    study, group = question.study, question.poses.groups[0]
+    plan = study.mechanism.plan(group.names)
+    motion.smooth = np.zeros(question.poses.count, dtype=bool)
+    if plan.change_points is None or len(question.poses.groups) > 1:
+        return
+    rows = np.flatnonzero(motion.valid & (motion.arrays["conditioning"] < NEAR))
+    if not len(rows):
+        return
+    (name,) = group.names
+    coordinate = plan.structure.given[0]
+    scale = 1.0 if coordinate.quantity == "angle" else study.mechanism.size
+    steps = in_study_units(study, coordinate, scale * STEPS)
+    values = (group.values[name][rows][:, None] + steps).ravel()
+    beside = Poses((PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),))
+    around = Motion(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
+    each = np.repeat(rows, len(STEPS))
+    for solved in solve_poses(study, beside):
+        near = {angle: radians(study, c, motion.arrays[angle][each[solved.rows]])
+                for angle, c in angles_of(question.watched).items() if angle != name}  # fmt: skip
+        configuration = replace(solved.configuration, near={**solved.configuration.near, **near})
+        around.fill(replace(solved, configuration=configuration))
+    good = around.valid.reshape(-1, len(STEPS)).all(axis=1)
+    for column, array in motion.arrays.items():
+        if column in (name, "conditioning"):
+            continue
+        table = around.arrays[column].reshape(-1, len(STEPS))
+        array[rows[good]] = (table @ WEIGHTS)[good]
+    motion.smooth[rows[good]] = True

@@ -10,11 +10,16 @@ from mechdesign.analyses.optimize import pareto
 from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer
-from mechdesign.analyses.optimize.files import optimum_files
+from mechdesign.analyses.optimize.files import best_design, optimum_files
 from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns, judged_of
-from mechdesign.analyses.optimize.sensitivity import active_bounds, sensitivity_table
-from mechdesign.analyses.optimize.shown import best_design
-from mechdesign.analyses.optimize.tables import Comparison, best_table, bounds_table, designs_table, optimum_table
+from mechdesign.analyses.optimize.tables import (
+    Comparison,
+    best_table,
+    bounds_table,
+    designs_table,
+    optimum_table,
+    sensitivity_table,
+)
 from mechdesign.analyses.optimize.variables import grid, in_words
 from mechdesign.analyses.workspace.analysis import index_meanings
 from mechdesign.errors import AssemblyError, Interrupted, StudyError
@@ -87,7 +92,7 @@ def optimize(
             if not designs.feasible.any():
                 raise AssemblyError(_none_feasible(designs))
             compared = Comparison(study, designs, weights, meanings)
-            sensitivity = sensitivity_table(study, compared, judge)
+            sensitivity = sensitivity_table(compared, judge)
         except KeyboardInterrupt:
             if journal is not None:
                 journal.save()
@@ -96,7 +101,7 @@ def optimize(
                 raise
             raise Interrupted(_finished_part(study, partial, meanings)) from None
     tables = [
-        optimum_table(compared, active_bounds(study, compared)), designs_table(compared), bounds_table(compared),
+        optimum_table(compared), designs_table(compared), bounds_table(compared),
         best_table(compared), sensitivity,
     ]  # fmt: skip
     marked: dict[str, int] = {}
@@ -106,7 +111,7 @@ def optimize(
     files, wrong = optimum_files(study, compared, marked)
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
     warnings = (*doubts, *_warnings(study, evaluator, designs), *wrong)
-    drawn = {"best": lambda: best_design(compared)}
+    drawn = {"compared": compared, "best": lambda: best_design(compared)}
     return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files, drawn=drawn)
 
 

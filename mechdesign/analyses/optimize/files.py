@@ -1,8 +1,10 @@
-"""Study files of the designs found best, which run as they are."""
+"""The designs found best, as study files which run as they are, and with their own answer, which a picture shows."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,10 @@ import yaml
 
 from mechdesign.analyses.optimize.tables import Comparison
 from mechdesign.analyses.optimize.variables import in_words
+from mechdesign.analyses.shown import solve_shown
+from mechdesign.analyses.workspace.analysis import workspace
 from mechdesign.errors import MechdesignError
+from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
 from mechdesign.study.rewriting import rewritten
@@ -29,11 +34,9 @@ def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int])
     goals = [each.name for each in compared.designs.goals]
     wanted = {}
     for row, winner in enumerate(compared.winners.tolist()):
-        weights = ", ".join(f"{name} {weight:g}" for name, weight in zip(goals, compared.weights[row], strict=True))
-        wanted[f"optimum{f'_{row + 1}' if row else ''}"] = (
-            winner,
-            f"Optimum of {study.name} for the weights {weights}",
-        )
+        weights = ", ".join(f"{each} {weight:g}" for each, weight in zip(goals, compared.weights[row], strict=True))
+        name = f"optimum_{row + 1}" if row else "optimum"
+        wanted[name] = winner, f"Optimum of {study.name} for the weights {weights}"
     wanted |= {name: (k, f"{name.capitalize()} of the Pareto front of {study.name}") for name, k in marked.items()}
     files: dict[str, str] = {}
     doubts = []
@@ -69,3 +72,19 @@ def _drawn_anew(study: Study, numbers: Mapping[str, float]) -> dict[str, Any]:
     points = {name: np.asarray(assembled.point(name)).item() for name in data["mechanism"]["sketch"]}
     data["mechanism"]["sketch"] = {name: [point.real, point.imag] for name, point in points.items()}
     return data
+
+
+def best_design(compared: Comparison) -> tuple[Study, Result]:
+    """The design that is best on the whole as a study, and its workspace where that was judged, or else its motion."""
+    numbers = {name: float(column[compared.best]) for name, column in compared.designs.variables.items()}
+    best = variant(compared.study, numbers)
+    if best.workspace is not None and any(each.command == "workspace" for each in compared.designs.goals):
+        # The region is drawn, not its indices.
+        plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))
+        result = workspace(plain)
+        if "local" in result.tables:
+            return plain, result
+    drawn = {}
+    with suppress(MechdesignError):
+        drawn["motion"] = solve_shown(best)
+    return best, Result("kinematics", {}, drawn=drawn)

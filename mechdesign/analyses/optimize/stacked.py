@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.analyses.kinematics import analysis as kinematics
-from mechdesign.analyses.kinematics.motion import Motion, motion_question
-from mechdesign.analyses.kinematics.moving import move
+from mechdesign.analyses.kinematics.motion import Motion, motion_question, move
 from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness

@@ -1,27 +1,25 @@
-"""Tables of an optimisation: the optimum, every design, the bounds of normalisation, the best distinct designs."""
+"""Tables of an optimisation: the optimum, every design, bounds of normalisation, the best designs, sensitivity."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.goals import Goal
-from mechdesign.analyses.optimize.judge import JudgedDesigns
-from mechdesign.analyses.optimize.variables import steps
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
+from mechdesign.analyses.optimize.variables import ROUNDING, Batch, bounds, steps
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
 # Best designs that are told for each row of weights, and how far apart they are in parts of each variable's range.
 MOST_BEST = 10
 APART = 0.05
-
-
-def normalised(values: Floats, low: float, high: float, *, smallest: bool) -> Floats:
-    """Values as fractions of a range, 1 the best [S1, eq. 27]; 0 where there is none."""
-    share = (values - low) / (high - low) if high > low else np.zeros_like(values)
-    return np.asarray(1 - share if smallest and high > low else share)
+# How near a bound is at it, as a fraction of the variable's range, or of a condition's bound.
+AT_BOUND = 1e-4
 
 
 class Comparison:
@@ -64,13 +62,32 @@ class Comparison:
         Each goal counts as the fraction of its range over the feasible designs.
         """
         total = np.zeros(len(values))
-        for k, each in enumerate(self.designs.goals):
-            if row[k]:
-                total += row[k] * normalised(values[:, k], self._low[k], self._high[k], smallest=each.smallest)
+        for k in np.flatnonzero(row).tolist():
+            total += row[k] * self._normalised(values, k)
         return total
 
+    def share(self, k: int) -> Floats:
+        """A goal of every design as a fraction of its range over the feasible ones; nan where it is not feasible."""
+        return np.where(self.designs.feasible, self._normalised(self.values, k), np.nan)
+
+    def _normalised(self, values: Floats, k: int) -> Floats:
+        """A goal as a fraction of its range, 1 the best [S1, eq. 27]; 0 where there is none."""
+        low, high = self._low[k], self._high[k]
+        if not high > low:
+            return np.zeros(len(values))
+        share = (values[:, k] - low) / (high - low)
+        return np.asarray(1 - share if self.designs.goals[k].smallest else share)
+
+    @property
+    def best(self) -> int:
+        """The optimum that is best on the whole."""
+        return int(self.winners[np.argmax(self.cpi[self.winners])])
+
     def unit_of(self, name: str) -> str:
-        """Unit of a variable: of a place of the geometry; none for a parameter."""
+        """Unit of a goal, or of a variable that is a place of the geometry; none for a parameter."""
+        for each in self.designs.goals:
+            if each.name == name:
+                return self._unit_and_meaning(each)[0]
         place = self.study.mechanism.description.places.get(name)
         return self.study.units.label(place.quantity) if place is not None else ""
 
@@ -86,14 +103,14 @@ class Comparison:
             if each in designs.errors:
                 meaning = f"estimated error of {each.name}"
                 yield Column(f"{each.name}_error", designs.errors[each][rows], told[each][0], meaning)
-        yield Column("CPI", self.cpi[rows], "", "sum of the normalised indices")
+        yield from shared(self.study.units, CPI=self.cpi[rows])
 
     def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
         worst = ("", f"worst row of {judged.name}")
         return self.meanings.get(judged.column, worst) if judged.regional else worst
 
 
-def optimum_table(compared: Comparison, active: Sequence[str]) -> Table:
+def optimum_table(compared: Comparison) -> Table:
     """The best design for each row of weights."""
     study, rows, variables = compared.study, compared.winners, compared.designs.variables
     scores = [compared.score(row)[winner] for row, winner in zip(compared.weights, rows, strict=True)]
@@ -109,9 +126,11 @@ def optimum_table(compared: Comparison, active: Sequence[str]) -> Table:
             for each, column in zip(compared.designs.goals, compared.weights.T, strict=True)
         ),
         *compared.columns(rows),
-        Column("score", np.array(scores), "", "weighted sum of the normalised indices"),
+        *shared(study.units, score=scores),
         *(Column(name, value, "", "parameter that follows from the variables") for name, value in following.items()),
-        Column("active", np.array(active, dtype=object), "", "bounds and conditions that the optimum lies at"),
+        Column(
+            "active", np.array(_active(compared), dtype=object), "", "bounds and conditions that the optimum lies at"
+        ),
     )
     return Table("optimum", columns, "the best design for each set of weights")
 
@@ -170,6 +189,77 @@ def best_table(compared: Comparison) -> Table:
         Column("optimum", row_numbers, "", "row of optimum.csv whose weights are taken"),
         Column("rank", ranks, "", "1 is the optimum"),
         *compared.columns(picked),
-        Column("score", scores, "", "weighted sum of the normalised indices"),
+        *shared(compared.study.units, score=scores),
     )
     return Table("best", columns, "the best designs for each set of weights, none of them next to a better one")
+
+
+def _active(compared: Comparison) -> NDArray[np.object_]:
+    """Which bounds and conditions each optimum lies at, in words: ``l_a from, workspace.area at least 4``.
+
+    On a grid an upper bound holds a design that it leaves no further step.
+    """
+    study, designs, rows = compared.study, compared.designs, compared.winners
+    assert study.optimize is not None
+    at = {name: column[rows] for name, column in designs.variables.items()}
+    step = steps(study, at)
+    held: list[list[str]] = [[] for _ in rows]
+    for name in at:
+        low, high = bounds(study, at, name, len(rows))
+        near = AT_BOUND * (high - low) + ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        above = np.maximum(near, step[name] * (1 - 1e-6)) if study.optimize.method == "grid" else near
+        for k, words in enumerate(held):
+            sides = ["from"] * bool(at[name][k] - low[k] <= near[k]) + ["to"] * bool(high[k] - at[name][k] <= above[k])
+            words += [f"{name} {' and '.join(sides)}"] if sides else []
+    for each in designs.conditions:
+        values = designs.values[each]
+        far = AT_BOUND * max(abs(each.bound), np.ptp(values[designs.feasible]))
+        for words, value in zip(held, values[rows].tolist(), strict=True):
+            words += [each.name] if abs(value - each.bound) <= far else []
+    return np.array([", ".join(words) for words in held], dtype=object)
+
+
+def sensitivity_table(compared: Comparison, judge: Judge) -> Table:
+    """How the score changes a step down and a step up each variable, the others held."""
+    study, names = compared.study, list(compared.designs.variables)
+    at = {name: column[compared.winners] for name, column in compared.designs.variables.items()}
+    step = np.stack([*steps(study, at).values()], axis=1)
+    optima = np.stack([*at.values()], axis=1)
+    # By optimum, variable and direction.
+    moves = np.array([-1.0, 1.0])[:, None] * np.eye(len(names))[:, None]
+    moved = optima[:, None, None] + moves * step[:, None, None]
+    inside = _inside(study, dict(zip(names, moved.reshape(-1, len(names)).T, strict=True))).reshape(moved.shape[:-1])
+    inside &= (moved != optima[:, None, None]).any(axis=-1)
+    asked, back = np.unique(moved[inside], axis=0, return_inverse=True)
+    judge.progress.start(len(asked), "neighbours of the optimum")
+    found, layout = judge.evaluate(dict(zip(names, asked.T, strict=True))), judge.layout
+    values, feasible = found[:, layout.values], found[:, layout.code] == 0
+    for each in judge.conditions:
+        feasible &= each.met(values[:, layout.column[each]])
+    which = np.full(inside.shape, len(asked))
+    which[inside] = back.ravel()
+    changes = np.empty(inside.shape)
+    for row, (weights, winner) in enumerate(zip(compared.weights, compared.winners, strict=True)):
+        gained = compared.score_of(values, weights) - compared.score_of(compared.values[[winner]], weights)
+        changes[row] = np.append(np.where(feasible, gained, np.nan), np.nan)[which[row]]
+    down, up = changes.reshape(-1, 2).T
+    meaning = "change of the score one step {}, nan where that leaves the bounds or is infeasible"
+    columns = (
+        Column("optimum", np.repeat(np.arange(len(optima)) + 1, len(names)), "", "row of optimum.csv"),
+        Column("variable", np.array(names * len(optima)), "", "design variable; the others are held"),
+        Column("value", optima.ravel(), "", "at the optimum"),
+        Column("step", step.ravel(), "", "the grid's, else a hundredth of the range"),
+        Column("score_down", down, "", meaning.format("down")),
+        Column("score_up", up, "", meaning.format("up")),
+    )
+    return Table("sensitivity", columns, "how the score changes a step from each optimum")
+
+
+def _inside(study: Study, designs: Batch) -> Flags:
+    """Which designs lie inside all bounds."""
+    found = np.ones(len(next(iter(designs.values()))), dtype=bool)
+    for name, values in designs.items():
+        low, high = bounds(study, designs, name, len(values))
+        slack = ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        found &= (low - slack <= values) & (values <= high + slack)
+    return found

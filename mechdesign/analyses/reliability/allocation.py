@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.reliability import methods
 from mechdesign.analyses.reliability.cheapest import (
     DIGITS,
@@ -204,7 +205,7 @@ def _confirmation(last: _Round, reliability: float) -> Table:
         Column("low", 1.0 - high, meaning="lower end of its interval, 99.7 %"),
         Column("high", 1.0 - low, meaning="upper end of its interval, 99.7 %"),
         Column("method", np.full(len(rows), last.method), meaning="how it was simulated"),
-        Column("evaluations", np.array([e.evaluations for e in said]), meaning="mechanisms that were solved for it"),
+        *shared(last.model.task.study.units, evaluations=[e.evaluations for e in said]),
         Column("met", ~last.missed(1.0 - reliability), meaning="1 where the interval holds the reliability asked, or "
                "all of it is above"),
     ]  # fmt: skip

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.reliability import methods
 from mechdesign.analyses.reliability.engine.intervals import binomial
@@ -28,16 +29,13 @@ _UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
 
 def at_poses(task: Task, rows: Ints) -> list[Column]:
     """Columns of the poses of these rows."""
-    return [replace(column, values=column.values[rows]) for column in pose_columns(task.study, task.poses)]
+    return [column.take(rows) for column in pose_columns(task.study, task.poses)]
 
 
 def of_channels(task: Task, channels: Ints) -> list[Column]:
     """Columns of the names of these channels."""
     output, order, _ = task.labels
-    return [
-        Column("output", output[channels], meaning="coordinate"),
-        Column("order", order[channels], meaning="position, velocity or acceleration"),
-    ]
+    return shared(task.study.units, output=output[channels], order=order[channels])
 
 
 def moments(task: Task, found: Sequence[MethodResult]) -> Table:
@@ -54,7 +52,7 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
     low, high = linear.worst_ends()
     columns = [
         *at_poses(task, pose),
-        Column("method", np.array([each.method for each in known])[method], meaning="how it was computed"),
+        *shared(task.study.units, method=np.array([each.method for each in known])[method]),
         *of_channels(task, channel),
         Column("nominal", nominal, meaning="value of the nominal mechanism, in `unit`"),
         Column("mean", nominal + mean, meaning="mean over made mechanisms, in `unit`"),
@@ -65,7 +63,7 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("worst_high", (high * scale)[channel, pose],
                meaning="highest error that the tolerances allow, in `unit`"),
         Column("unit", task.labels[2][channel], meaning="unit of the six columns before"),
-        Column("valid", task.reason[pose] == 0, meaning="1 where the nominal pose is assembled, within its limits"),
+        *shared(task.study.units, valid=task.reason[pose] == 0),
     ]  # fmt: skip
     return Table("moments", tuple(columns), "mean and standard deviation of outputs per pose and method")
 
@@ -91,7 +89,7 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("scope", np.where(whole, "cycle", "pose"),
                meaning="a pose by itself, or one made mechanism at all poses, the steps between unseen"),
         *(replace(c, values=np.where(whole, np.nan, c.values)) for c in at_poses(task, pose)),
-        Column("method", np.array([each.method for _, each, _ in entries + cycles]), meaning="how it was computed"),
+        *shared(task.study.units, method=[each.method for _, each, _ in entries + cycles]),
         Column("reliability", 1.0 - failure, meaning="probability that every limit is kept"),
         Column("low", 1.0 - high, meaning=f"lower end of its interval, {kind}"),
         Column("high", 1.0 - low, meaning=f"upper end of its interval, {kind}"),
@@ -103,7 +101,7 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
                meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),
         Column("samples", samples, meaning="samples that the value is taken from; 0: none"),
         Column("invalid", invalid, meaning="samples that cannot be assembled; they are failures"),
-        Column("evaluations", evaluations, meaning="mechanisms that were solved for it"),
+        *shared(task.study.units, evaluations=evaluations),
         Column("used", np.array(used), meaning="where the value comes from: of auto, the method it used"),
     ]  # fmt: skip
     if task.question.pair is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import Held, directional, principal
 from mechdesign.analyses.stiffness.force_method import Effects, joints_of, points_of
@@ -81,7 +82,7 @@ def stiffness_table(
     for name, values, per in free:
         columns.append(Column(name, values, per, "the free twist, per radian where it turns; nan where none is free"))
     how = "serial legs: reciprocal screws [S4]; force method: any other"
-    columns.append(Column("valid", valid, "", "1 where the pose is assembled and within its limits"))
+    columns += shared(units, valid=valid)
     columns.append(Column("method", np.full(poses.count, method), "", how))
     return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
 

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.analyses.columns import SHARED, shared
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.panels import SINGLE
 from mechdesign.analyses.region.regions import RAYS
 from mechdesign.analyses.workspace.index import determinant_power, power_of_length, prepare
-from mechdesign.analyses.workspace.inscribed import NO_CIRCLE, NO_RECTANGLE, Circle, Rectangle, inscribed
+from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
@@ -27,7 +28,6 @@ from mechdesign.analyses.workspace.question import (
 from mechdesign.analyses.workspace.shown import poses_along
 from mechdesign.analyses.workspace.singularities import singular_everywhere
 from mechdesign.analyses.workspace.tables import (
-    PIECE,
     held_columns,
     inscribed_columns,
     left_out,
@@ -38,6 +38,7 @@ from mechdesign.analyses.workspace.tables import (
 )
 from mechdesign.errors import AssemblyError
 from mechdesign.indices import index
+from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -77,7 +78,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     answers: list[Evaluation] = []
     local: list[list[Column]] = []
     regions: list[tuple[Study, Question, list[Patch]]] = []
-    shapes: list[tuple[Circle, Rectangle]] = []
+    shapes: list[Floats] = []
     pieces: list[list[Column]] = []
     several = False
     warnings: list[str] = []
@@ -100,7 +101,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             others = [patch for patch in found if patch not in counted]
             shapes.append(inscribed(question.field, question.about, question.scan, counted, others))
             regions.append((study, question, found))
-            if not np.isfinite([shapes[-1][0].radius, shapes[-1][1].width]).all():
+            if not np.isfinite(shapes[-1]).all():
                 warnings.append(
                     f"the largest circle or rectangle inside the region{where(question)} was not found: where a limit "
                     "jumps (an angle's turn ends there) no slope leads along the boundary"
@@ -111,7 +112,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             if others:
                 warnings.append(left_out(study, question, areas, drawn))
         else:
-            shapes.append((NO_CIRCLE, NO_RECTANGLE))
+            shapes.append(np.full(len(INSCRIBED), np.nan))
         progress.update(1)
     if not local:
         raise AssemblyError(_unreachable(study, asked))
@@ -184,14 +185,11 @@ def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluati
 
 def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str]]:
     """Unit and meaning of each column of the answer."""
-    area = study.units.label("area")
     found = {
         "GII": ("", "mean of the inverse condition number over the region"),
         "GRI": (index("resistivity").unit(study, question.field), "mean of 1/abs(det J) over the region"),
-        "SUI": ("", "area of the region over that of the rectangle around it"),
-        "area": (area, "area of the region"),
-        "box_area": (area, "area of the rectangle around the region"),
     }
+    found |= {name: (study.units.label(SHARED[name][0]), SHARED[name][1]) for name in ("SUI", "area", "box_area")}
     for name in (name for name in question.wanted if name not in COLUMNS):
         declared, kind = index(split(name)[0]), split(name)[1]
         unit = declared.unit(study, question.field)
@@ -210,7 +208,7 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     node = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)) for grid in grids])
     ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
     patch = np.repeat(np.arange(len(grids)), [grid.size for grid in grids])
-    length, per_area = study.units.label("length"), power_of_length(study, determinant_power(question.field))
+    per_area = power_of_length(study, determinant_power(question.field))
     determinant = np.broadcast_to(local.determinant, z.shape)
     if question.field.same_assembly:
         # It has one sign all over a patch; at a tip where no node is off the boundary rounding would choose another.
@@ -223,13 +221,12 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     ]  # fmt: skip
     return [
         *held_columns(study, question, len(z)),
-        Column("x", z.real, length, "place of the point"),
-        Column("y", z.imag, length, "place of the point"),
+        *shared(study.units, x=z.real, y=z.imag),
         *columns[:2],
         Column("det_J", determinant, per_area, "determinant of the Jacobian, per radian"),
         *columns[2:],
         Column("patch", patch, "", "part of the region between two boundary curves"),
         Column("ray", ray, "", "ray of the patch's grid"),
         Column("node", node, "", "node along the ray, from the inner to the outer boundary"),
-        Column("piece", np.repeat([patch.piece for patch in found], [grid.size for grid in grids]), "", PIECE),
+        *shared(study.units, piece=np.repeat([patch.piece for patch in found], [grid.size for grid in grids])),
     ]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.panels import Effort, Panels, find_panels
@@ -17,7 +18,7 @@ from mechdesign.analyses.workspace.quadrature import FINEST_AREA, Integral, inte
 from mechdesign.analyses.workspace.question import Question, questions
 from mechdesign.analyses.workspace.ranged import Every, Ranged, Some, SomeDesigns
 from mechdesign.analyses.workspace.singularities import causes
-from mechdesign.analyses.workspace.tables import PIECE, held_columns, left_out, piece_columns, stacked
+from mechdesign.analyses.workspace.tables import held_columns, left_out, piece_columns, stacked
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.progress import Progress
 from mechdesign.results import Column, Result, Table
@@ -84,9 +85,7 @@ def reachable(study: Study, progress: Progress) -> Result:
         use = np.array([area / box if box else np.nan for _, area, _, box in rows])
     indices = (
         *stacked([held_columns(study, question, 1) for question in asked]),
-        Column("SUI", use, "", "area of the region over that of the rectangle around it"),
-        Column("area", np.array([row[1] for row in rows]), square, "area of the region"),
-        Column("box_area", np.array([row[3] for row in rows]), square, "area of the rectangle around the region"),
+        *shared(study.units, SUI=use, area=[row[1] for row in rows], box_area=[row[3] for row in rows]),
         Column("area_error", np.array([row[2] for row in rows]), square, "estimated error of area"),
     )
     tables = [
@@ -153,18 +152,17 @@ def _outline(study: Study, question: Question, name: str, found: Sequence[Patch]
     told = [*single * 3, *(f"{a} and {b}" for a in single for b in single)]
     which = [curve[3] for curve in curves]
     kinds = ["limit" if question.field.labels[k][0] == "limit" else "singularity" for k in which]
-    length, coordinate = study.units.label("length"), study.mechanism.coordinate(name)
+    coordinate = study.mechanism.coordinate(name)
     shown = np.asarray(in_study_units(study, coordinate, value))
     return [
         *held_columns(study, question, len(z)),
-        Column("x", z.real, length, "place of the point"),
-        Column("y", z.imag, length, "place of the point"),
-        Column("kind", np.repeat(kinds, lengths), "", "what ends the region: limit or singularity"),
+        *shared(study.units, x=z.real, y=z.imag, kind=np.repeat(kinds, lengths)),
         Column(name, shown, study.units.label(coordinate.quantity), "value of the range that decides there"),
-        Column("at", np.repeat([told[k] for k in which], lengths), "", "which limit or singularity"),
-        Column(
-            "side", np.repeat([side for _, _, side, _, _ in curves], lengths), "", "which end of the ray's interval"
+        *shared(
+            study.units,
+            at=np.repeat([told[k] for k in which], lengths),
+            side=np.repeat([curve[2] for curve in curves], lengths),
+            curve=np.repeat(np.arange(len(curves)), lengths),
+            piece=np.repeat([curve[4] for curve in curves], lengths),
         ),
-        Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth piece of the boundary"),
-        Column("piece", np.repeat([curve[4] for curve in curves], lengths), "", PIECE),
     ]

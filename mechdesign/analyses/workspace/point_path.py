@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.kinematics.boundaries import Boundary, boundaries
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.errors import AssemblyError, Problem, StudyError
@@ -128,8 +129,7 @@ def point_path(study: Study) -> Result:
     path_columns = (
         Column("piece", piece.astype(int), "", "row of the indices"),
         Column(drive, shown(at), label, "drive"),
-        Column("x", x, length, "place of the point"),
-        Column("y", y, length, "place of the point"),
+        *shared(study.units, x=x, y=y),
         Column("speed_ratio", ratio, power, "speed of the point over the drive's rate, per radian"),
         Column("resistivity", inverse, f"1/{power}" if power else "", "1/speed_ratio"),
         Column("arc", arc, length, "length of the path from its beginning"),

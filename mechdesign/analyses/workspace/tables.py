@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch
-from mechdesign.analyses.workspace.inscribed import Circle, Rectangle
+from mechdesign.analyses.workspace.inscribed import INSCRIBED
 from mechdesign.analyses.workspace.question import Question
 from mechdesign.analyses.workspace.singularities import around, causes, inside
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
@@ -18,7 +20,6 @@ from mechdesign.study import Study
 
 # So far inside the boundary (as a part of the radius) the drives are read where rounding opens the mechanism.
 BESIDE = 1e-12
-PIECE = "piece of the region: 1 is the sketch's, or else the largest"
 
 
 def where(question: Question) -> str:
@@ -49,10 +50,9 @@ def held_columns(study: Study, question: Question, rows: int) -> list[Column]:
 def stacked(parts: Sequence[Sequence[Column]]) -> tuple[Column, ...]:
     """Columns of several regions below each other."""
     return tuple(
-        Column(columns[0].name, np.concatenate([column.values for column in columns]), columns[0].unit,
-               columns[0].meaning)
+        replace(columns[0], values=np.concatenate([column.values for column in columns]))
         for columns in zip(*parts, strict=True)
-    )  # fmt: skip
+    )
 
 
 def boundary_columns(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
@@ -73,24 +73,22 @@ def boundary_columns(study: Study, question: Question, found: Sequence[Patch]) -
                               for n, curve in zip(lengths, curves, strict=True)])  # fmt: skip
     within = np.asarray(question.about + radius * (1 + BESIDE * inwards) * np.exp(1j * theta))
     drives = _drives(question, z, within, np.flatnonzero(np.diff(inwards)) + 1)
-    length, angle = study.units.label("length"), study.units.label("angle")
     kinds = [field.labels[curve[2]][0] for curve in curves]
     columns = [
         *held_columns(study, question, len(z)),
-        Column("x", z.real, length, "place of the point"),
-        Column("y", z.imag, length, "place of the point"),
-        Column("kind", np.repeat(kinds, lengths), "", "what ends the region: limit or singularity"),
+        *shared(study.units, x=z.real, y=z.imag, kind=np.repeat(kinds, lengths)),
     ]
     for drive, value in zip(field.mechanism.forward.structure.given, drives, strict=True):
         shown = np.asarray(in_study_units(study, drive, value))
         columns.append(Column(drive.name, shown, study.units.label(drive.quantity), "drive's value there"))
     return [
         *columns,
-        Column("at", np.repeat([told[curve[2]][1] for curve in curves], lengths), "", "which limit or singularity"),
-        Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
-        Column("side", np.repeat([curve[3] for curve in curves], lengths), "", "which end of the ray's interval"),
-        Column("curve", np.repeat(np.arange(len(curves)), lengths), "", "smooth part of the boundary"),
-        Column("piece", np.repeat([curve[4] for curve in curves], lengths), "", PIECE),
+        *shared(study.units, at=np.repeat([told[curve[2]][1] for curve in curves], lengths)),
+        Column("theta", theta / study.units.angle_factor, study.units.label("angle"),
+               "angle of the ray about the centre of the scan"),
+        *shared(study.units, side=np.repeat([curve[3] for curve in curves], lengths),
+                curve=np.repeat(np.arange(len(curves)), lengths),
+                piece=np.repeat([curve[4] for curve in curves], lengths)),
     ]  # fmt: skip
 
 
@@ -105,7 +103,7 @@ def piece_columns(
     z = np.array([patch.middle(question.about) for patch in widest])
     return [
         *held_columns(study, question, len(z)),
-        Column("piece", number, "", PIECE),
+        *shared(study.units, piece=number),
         Column("area", np.array(areas), study.units.label("area"), "area of the piece"),
         Column("x", z.real, length, "a place inside the piece"),
         Column("y", z.imag, length, "a place inside the piece"),
@@ -118,7 +116,6 @@ def singularity_columns(study: Study, question: Question, found: Sequence[Patch]
     loci = [*inside(question.field, question.about, found), *around(question.field, question.about, found)]
     lengths = [len(locus.points) for locus in loci]
     z = np.concatenate([np.zeros(0, dtype=complex), *(locus.points for locus in loci)])
-    length = study.units.label("length")
 
     def each(values: Sequence[str]) -> NDArray[np.str_]:
         return np.repeat(np.array(values, dtype=str), lengths)
@@ -128,25 +125,21 @@ def singularity_columns(study: Study, question: Question, found: Sequence[Patch]
         Column("curve", np.repeat(np.arange(len(loci)), lengths), "", "points of one curve, in order"),
         Column("kind", each([locus.kind for locus in loci]), "",
                "forward: the drives do not hold the mechanism; inverse: a leg is stretched or folded"),
-        Column("x", z.real, length, "place of the point"),
-        Column("y", z.imag, length, "place of the point"),
+        *shared(study.units, x=z.real, y=z.imag),
         Column("cause", each([locus.cause for locus in loci]), "", "which links, and what they do there"),
     ]  # fmt: skip
 
 
-def inscribed_columns(study: Study, shapes: Sequence[tuple[Circle, Rectangle]]) -> list[Column]:
-    """The largest circle and rectangle inside each region; nan where it is empty."""
+def inscribed_columns(study: Study, shapes: Sequence[Floats]) -> list[Column]:
+    """The largest circle and rectangle inside each region, as `inscribed` gives them; nan where it is empty."""
     length = study.units.label("length")
-    circles, rectangles = [shape[0] for shape in shapes], [shape[1] for shape in shapes]
-    circle, rectangle = "the largest circle inside the region", "the largest axis-parallel rectangle inside the region"
+    shape = {"circle": "the largest circle", "rectangle": "the largest axis-parallel rectangle"}
+    told = {"x": "centre", "y": "centre", "radius": "radius", "width": "width", "height": "height"}
     return [
-        Column("circle_x", np.array([c.centre.real for c in circles]), length, f"centre of {circle}"),
-        Column("circle_y", np.array([c.centre.imag for c in circles]), length, f"centre of {circle}"),
-        Column("circle_radius", np.array([c.radius for c in circles]), length, f"radius of {circle}"),
-        Column("rectangle_x", np.array([r.centre.real for r in rectangles]), length, f"centre of {rectangle}"),
-        Column("rectangle_y", np.array([r.centre.imag for r in rectangles]), length, f"centre of {rectangle}"),
-        Column("rectangle_width", np.array([r.width for r in rectangles]), length, f"width of {rectangle}"),
-        Column("rectangle_height", np.array([r.height for r in rectangles]), length, f"height of {rectangle}"),
+        Column(
+            name, values, length, f"{told[name.partition('_')[2]]} of {shape[name.partition('_')[0]]} inside the region"
+        )
+        for name, values in zip(INSCRIBED, np.transpose(shapes), strict=True)
     ]
 
 

@@ -66,6 +66,7 @@ def windows(
     gap: float = LEFT,
     above: float = ABOVE,
     top: float = 0.0,
+    below: float = BELOW,
 ) -> tuple[Figure, list[Axes]]:
     """A figure of `count` windows in rows.
 
@@ -73,23 +74,19 @@ def windows(
     ----------
     gap : float
         Inches between columns; with room for it each has an axis label of its own, or else the first one.
-    above, top : float
-        Inches above each window and above all of them, for titles.
+    above, top, below : float
+        Inches above each window, above all of them for titles, and below all of them.
     """
-    rows = -(-count // columns)
-    outer = BELOW + rows * (window.height + above) + top
-    figure = style.new_figure(style.WIDTH, outer, layout=None)
-    panels = []
-    for k in range(count):
-        row, column = divmod(k, columns)
-        left, low = LEFT + column * (window.width + gap), BELOW + (rows - 1 - row) * (window.height + above)
-        axes = figure.add_axes((left / style.WIDTH, low / outer, window.width / style.WIDTH, window.height / outer))
+    rest = style.WIDTH - LEFT - columns * window.width - (columns - 1) * gap
+    figure, panels = style.page(
+        count, columns, window.height, left=LEFT, right=rest, top=top + above, bottom=below, across=gap, down=above
+    )
+    for k, axes in enumerate(panels):
         window.limit(axes)
-        lowest, first = k + columns >= count, column == 0 or gap >= LEFT
+        lowest, first = k + columns >= count, k % columns == 0 or gap >= LEFT
         axes.tick_params(labelleft=first, labelbottom=lowest)
         axes.set_xlabel(style.axis_label("x", unit) if lowest else "")
         axes.set_ylabel(style.axis_label("y", unit) if first else "")
-        panels.append(axes)
     return figure, panels
 
 

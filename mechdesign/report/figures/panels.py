@@ -1,10 +1,9 @@
-"""Panels over a common axis, framed without a layout engine, which would take twice as long as drawing."""
+"""What pictures with an abscissa share: what a sweep runs over, panels below one another, titles and legends."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,24 +22,29 @@ _TALL = 1.75
 # Below the lowest panel: its axis alone, and with a legend of one or two rows.
 BARE, WITH_LEGEND = 0.6, 0.95
 _LETTER = 0.56  # mean width of a letter in font sizes
+# Steps of ticks that are parts of a turn in degrees.
+TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
 
 
-@dataclass(frozen=True, eq=False)
-class Along:
+class Along(NamedTuple):
     """What a sweep or a path runs over."""
 
     values: Floats
     label: str
+    name: str = ""
 
 
 def along(study: Study, poses: Poses) -> Along | None:
     """The abscissa of a sweep or path; None for listed poses, grids and what is too short to be a curve."""
-    if poses.listed or len(poses.grid) != 1 or poses.count < 3:
-        return None
+    return None if poses.listed or len(poses.grid) != 1 or poses.count < 3 else abscissa(study, poses)
+
+
+def abscissa(study: Study, poses: Poses) -> Along:
+    """The one coordinate that moves, always the same way, or else the number of the pose."""
     moving = moving_names(poses)
-    if len(moving) != 1:
+    if len(moving) != 1 or np.ptp(np.sign(np.diff(poses.values[moving[0]]))):
         return Along(np.arange(1.0, poses.count + 1), "pose along the path")
-    return Along(poses.values[moving[0]], coordinate_label(study, moving[0]))
+    return Along(poses.values[moving[0]], coordinate_label(study, moving[0]), moving[0])
 
 
 def moving_names(poses: Poses) -> list[str]:
@@ -51,17 +55,6 @@ def moving_names(poses: Poses) -> list[str]:
 def coordinate_label(study: Study, name: str) -> str:
     """A coordinate's name and unit."""
     return style.axis_label(name, study.units.label(study.mechanism.quantity(name)))
-
-
-def framed(
-    height: float, *, left: float, right: float, top: float, bottom: float, apart: tuple[float, float] = (0.0, 0.0)
-) -> Figure:
-    """A figure with fixed margins (inches) and gaps down and across (parts of a panel)."""
-    figure = style.new_figure(style.WIDTH, height, layout=None)
-    figure.subplots_adjust(
-        left / style.WIDTH, bottom / height, 1 - right / style.WIDTH, 1 - top / height, apart[1], apart[0]
-    )
-    return figure
 
 
 def title(figure: Figure, text: str, note: str = "", left: float = _LEFT) -> None:
@@ -78,11 +71,11 @@ def stack(
     panels: int, heading: str, label: str, *, note: str = "", tall: float = _TALL, bottom: float = WITH_LEGEND
 ) -> tuple[Figure, list[Axes]]:
     """Panels one below the other over one labelled axis, with this much room (inches) below for a legend."""
-    extra = 0.1 if note else 0.0
-    height = _TOP + extra + panels * tall + (panels - 1) * _APART + bottom
-    figure = framed(height, left=_LEFT, right=_RIGHT, top=_TOP + extra, bottom=bottom, apart=(_APART / tall, 0.0))
+    top = _TOP + 0.1 * bool(note)
+    figure, axes = style.page(
+        panels, 1, tall, left=_LEFT, right=_RIGHT, top=top, bottom=bottom, down=_APART, sharex=True
+    )
     title(figure, heading, note)
-    axes = list(figure.subplots(panels, 1, sharex=True, squeeze=False)[:, 0])
     for axis in axes:
         # Given places: to find them from the tick labels would take as long as the rest of the picture.
         axis.set_title("", y=1.02)
@@ -97,8 +90,7 @@ def stack(
 def tick_abscissa(axis: Axes, swept: Along) -> None:
     """Places for the ticks of a sweep: degrees of much of a turn are told in parts of a turn."""
     turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
-    steps = [1, 3, 4.5, 6, 9, 10] if turning else [1, 2, 2.5, 5, 10]
-    axis.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=steps))
+    axis.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=TURNS if turning else [1, 2, 2.5, 5, 10]))
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.panels import coordinate_label, framed, moving_names, title
+from mechdesign.report.figures.panels import coordinate_label, moving_names, title
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.poses import PoseSection
@@ -80,22 +80,21 @@ def map_sheet(
     spans = np.ptp(over.x[np.isfinite(over.x)]), np.ptp(over.y[np.isfinite(over.y)])
     tall = min(_TALLEST / lines, wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
     tall = max(tall, 1.2)
-    height = _TOP + lines * (tall + _BELOW) + (lines - 1) * _GAP
-    figure = framed(height, left=0, right=0, top=0, bottom=0)
+    figure, grid = style.page(
+        len(parts), columns, tall, left=_LEFT, right=_BAR + 0.1, top=_TOP, bottom=_BELOW, across=_LEFT + _BAR,
+        down=_BELOW + _GAP,
+    )  # fmt: skip
     title(figure, heading, note, left=_LEFT)
-    for k, (name, values) in enumerate(parts):
-        left = _LEFT + (k % columns) * (wide + _LEFT + _BAR)
-        low = height - _TOP - tall - (k // columns) * (tall + _BELOW + _GAP)
-        axes = figure.add_axes((left / style.WIDTH, low / height, wide / style.WIDTH, tall / height))
-        bar = figure.add_axes(((left + wide + 0.12) / style.WIDTH, low / height, 0.14 / style.WIDTH, tall / height))
-        _map(axes, bar, over, values, logarithmic)
+    for axes, (name, values) in zip(grid, parts, strict=True):
+        bar = axes.inset_axes((1 + 0.12 / wide, 0, 0.14 / wide, 1))
+        _map(figure, axes, bar, over, values, logarithmic)
         axes.set_title(name, loc="left", fontsize=9.5)
         axes.set_xlabel(coordinate_label(study, over.names[0]))
         axes.set_ylabel(coordinate_label(study, over.names[1]))
     return figure
 
 
-def _map(axes: Axes, bar: Axes, over: Plane, values: Floats, logarithmic: bool) -> None:
+def _map(figure: Figure, axes: Axes, bar: Axes, over: Plane, values: Floats, logarithmic: bool) -> None:
     known = np.isfinite(values) & ((values > 0) | (not logarithmic))
     axes.grid(visible=False)
     axes.set_facecolor("#EEEEEE")
@@ -121,13 +120,10 @@ def _map(axes: Axes, bar: Axes, over: Plane, values: Floats, logarithmic: bool) 
         if over.equal:
             for end in (0, -1):
                 axes.plot(over.x[patch, end], over.y[patch, end], color=style.INK, linewidth=1.2)
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    colors = figure.colorbar(ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
+    style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
     if logarithmic:
         bar.set_yticks(levels, [_power(10.0**level) for level in levels])
     bar.tick_params(labelsize=8)
-    colors.outline.set_visible(False)
 
 
 def _round(values: Floats) -> Floats:

@@ -9,7 +9,10 @@ from typing import Any, Literal
 
 import matplotlib
 from cycler import cycler
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -19,16 +22,8 @@ DEFLATE_LEVEL = 8
 WIDTH = 8.0  # inches; 960 pixels, which a README shows at about 800
 
 # Okabe and Ito: told apart with every kind of colour vision, and in grey by their order of brightness.
-BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = (
-    "#0072B2",
-    "#E69F00",
-    "#009E73",
-    "#D55E00",
-    "#CC79A7",
-    "#56B4E9",
-    "#F0E442",
-)
-PALETTE = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW)
+PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#F0E442")
+BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = PALETTE
 INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
@@ -73,13 +68,40 @@ def context() -> Iterator[None]:
         yield
 
 
-def new_figure(
-    width: float = WIDTH, height: float = 5.0, *, layout: Literal["constrained", "tight"] | None = "constrained"
-) -> Figure:
-    """An empty figure (inches) with the Agg canvas; use inside `context`."""
-    figure = Figure(figsize=(width, height), dpi=DPI, layout=layout)
+def new_figure(height: float, *, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
     return figure
+
+
+def page(
+    count: int, columns: int, tall: float, *, left: float, right: float, top: float, bottom: float,
+    across: float = 0.0, down: float = 0.0, **shared: Any,
+) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    """Some panels of a height in rows; heights, margins and the gaps between columns and rows in inches.
+
+    Without a layout engine, which would take twice as long as drawing.
+    """
+    rows = -(-count // columns)
+    height = top + rows * tall + (rows - 1) * down + bottom
+    wide = (WIDTH - left - right - (columns - 1) * across) / columns
+    figure = new_figure(height, layout=None)
+    figure.subplots_adjust(
+        left / WIDTH, bottom / height, 1 - right / WIDTH, 1 - top / height, across / wide, down / tall
+    )
+    panels = figure.subplots(rows, columns, squeeze=False, **shared).ravel()
+    for surplus in panels[count:]:
+        surplus.remove()
+    return figure, list(panels[:count])
+
+
+def color_bar(figure: Figure, drawn: ScalarMappable, label: str = "", **options: Any) -> Colorbar:
+    """A bar of colours without a frame."""
+    bar = figure.colorbar(drawn, **options)
+    bar.set_label(label)
+    bar.outline.set_visible(False)
+    return bar
 
 
 def axis_label(name: str, unit: str = "") -> str:

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Link, Place, Quantity, Term
 from mechdesign.study.building import section as models
-from mechdesign.study.building.names import GROUND, Names
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import StudyNumber
@@ -27,7 +27,6 @@ class Builder:
         self, section: models.MechanismSection, units: Units, parameters: Iterable[str], reporter: Reporter
     ) -> None:
         self.section = section
-        self.names = Names(section)
         self.parameter_names = tuple(parameters)
         self.units = units
         self.reporter = reporter
@@ -71,7 +70,7 @@ class Builder:
         `what` may be the quantity that they give: an angle is that of links, a distance that of points.
         """
         what = {"angle": "link", "distance": "point"}.get(what, what)
-        known: Iterable[str] = self.names.owners if what == "point" else getattr(self.section, f"{what}s")
+        known: Iterable[str] = self.section.owners if what == "point" else getattr(self.section, f"{what}s")
         # All of them are looked up, so that every mistake is told.
         found = [self.check_name(name, known, what, (*path, k)) for k, name in enumerate(names)]
         return all(found)
@@ -85,7 +84,7 @@ class Builder:
         groups: list[tuple[str, str, Iterable[str]]] = [
             ("parameter", "parameters", self.parameter_names),
             ("link", "links", section.links),
-            ("point", "", self.names.owners),
+            ("point", "", self.section.owners),
             ("joint", "joints", section.joints),
             ("measure", "measures", section.measures),
         ]
@@ -107,7 +106,7 @@ class Builder:
                 self.report(("drives", name), message, at_key=True)
 
     def _where(self, point: str) -> KeyPath:
-        link = self.names.owners[point][0]
+        link = self.section.owners[point][0]
         section = self.section.links[link]
         end = {section.from_: "from", section.to: "to"}.get(point)
         return ("links", link, end) if end else ("links", link, "points", point)
@@ -115,13 +114,13 @@ class Builder:
     def check_sketch(self) -> None:
         """Points of the sketch are points of links."""
         for name in self.section.sketch:
-            if name not in self.names.owners:
-                hint = suggestion(name, self.names.owners)
+            if name not in self.section.owners:
+                hint = suggestion(name, self.section.owners)
                 self.report(("sketch", name), f"no link has a point {name!r}{hint}", at_key=True)
 
     def build_links(self) -> None:
         """Links with their points, and places for all their numbers."""
-        order = [GROUND] * (GROUND in self.section.links) + self.names.moving
+        order = [GROUND] * (GROUND in self.section.links) + self.section.moving
         for name in order:
             self.links[name] = self._link(name, self.section.links[name])
             if name == GROUND:
@@ -140,7 +139,7 @@ class Builder:
         if section.from_ is not None and section.to is not None and not drawn:
             ends = (section.from_, section.to)
             points = self._ends(name, section, ends)
-        own = [*section.points] if ends else self.names.points_of(name)
+        own = [*section.points] if ends else self.section.points_of(name)
         given = {point: place for point, place in section.points.items() if place is not None}
         left_out = [point for point in own if point not in given]
         local = self._measured(name, left_out, given, ends) if left_out else {}

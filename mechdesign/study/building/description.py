@@ -10,6 +10,7 @@ import numpy as np
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import (
     Description,
     Drive,
@@ -26,7 +27,6 @@ from mechdesign.mechanism.model import (
 )
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
-from mechdesign.study.building.names import GROUND
 from mechdesign.study.text.document import KeyPath
 
 
@@ -73,7 +73,7 @@ def _check_named(builder: Builder, what: str, names: Sequence[str], path: KeyPat
 
 
 def _check_on_link(builder: Builder, link: str, point: str, path: KeyPath) -> None:
-    points = builder.names.points_of(link)
+    points = builder.section.points_of(link)
     if point not in points:
         hint = suggestion(point, points) or f"; it has {', '.join(points)}"
         _refuse(builder, path, f"link {link!r} has no point {point!r}{hint}")
@@ -102,7 +102,7 @@ def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[s
     path: KeyPath = ("joints", name)
     _check_named(builder, "link", pair, (*path, "prismatic"))
     guide, slider = pair
-    points = builder.names.points_of(slider)
+    points = builder.section.points_of(slider)
     if section.point is not None:
         _check_on_link(builder, slider, section.point, (*path, "point"))
     elif len(points) != 1:
@@ -118,7 +118,7 @@ def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slo
     if section.point is None:
         _refuse(builder, path, "a slot needs the 'point' of another link that slides in it")
     _check_named(builder, "point", (section.point,), (*path, "point"))
-    if builder.names.owners[section.point] == [guide]:
+    if builder.section.owners[section.point] == [guide]:
         message = f"point {section.point!r} is on link {guide!r} itself, which has the slot"
         _refuse(builder, (*path, "point"), message)
     return Slot(name, _line(builder, name, section, guide), section.point)
@@ -127,7 +127,7 @@ def _slot(builder: Builder, name: str, section: models.Joint, guide: str) -> Slo
 def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, str]) -> Fixed:
     path: KeyPath = ("joints", name)
     _check_named(builder, "link", pair, (*path, "fixed"))
-    shared = [point for point in builder.names.points_of(pair[0]) if point in builder.names.points_of(pair[1])]
+    shared = [point for point in builder.section.points_of(pair[0]) if point in builder.section.points_of(pair[1])]
     if section.point is not None:
         for link in pair:
             _check_on_link(builder, link, section.point, (*path, "point"))
@@ -148,7 +148,7 @@ def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, 
 
 def _check_pins(builder: Builder) -> None:
     """Note links that share two points, and slides between links that a shared point pins together."""
-    section, names = builder.section, builder.names
+    section = builder.section
     for index, (name, link) in enumerate(builder.links.items()):
         for other in list(builder.links.values())[:index]:
             shared = [point for point in link.points if point in other.points]
@@ -158,9 +158,9 @@ def _check_pins(builder: Builder) -> None:
         pair = joint.prismatic or ((joint.slot, joint.point) if joint.slot and joint.point else None)
         if pair is None:
             continue
-        points = names.points_of(pair[0])
-        pinned = [point for point in points if point in (names.points_of(pair[1]) if joint.prismatic else [pair[1]])]
-        if pinned and (joint.prismatic or names.owners[pinned[0]] != [pair[0]]):
+        points = section.points_of(pair[0])
+        pinned = [point for point in points if point in (section.points_of(pair[1]) if joint.prismatic else [pair[1]])]
+        if pinned and (joint.prismatic or section.owners[pinned[0]] != [pair[0]]):
             what = (
                 "a point that two links name pins them together" if joint.prismatic else "a pin holds it to that link"
             )
@@ -183,7 +183,7 @@ def _shared_twice(builder: Builder, link: Link, other: Link, shared: list[str]) 
 
 def _check_connected(builder: Builder) -> None:
     """Note links that neither shared points nor joints lead to from the ground."""
-    section, owners = builder.section, builder.names.owners
+    section, owners = builder.section, builder.section.owners
     ties = [set(links) for links in owners.values()]
     for joint in section.joints.values():
         ties.append({*(joint.prismatic or ()), *(joint.fixed or ())})
@@ -196,7 +196,7 @@ def _check_connected(builder: Builder) -> None:
     for name in section.links:
         if name in reached or GROUND not in section.links:
             continue
-        points = builder.names.points_of(name)
+        points = builder.section.points_of(name)
         mates = sorted({link for tie in ties if name in tie for link in tie} - {name})
         if mates:
             message = f"nothing joins it to the ground: only to {', '.join(mates)}"
@@ -209,20 +209,20 @@ def _check_connected(builder: Builder) -> None:
 
 def _drives(builder: Builder) -> dict[str, Drive]:
     """Every drive whose names are right."""
-    names = builder.names
+    mechanism = builder.section
     known: Mapping[str, tuple[str, Iterable[str]]] = {
-        "angle": ("moving link", names.moving),
-        "length": ("telescopic leg", names.legs),
-        "slide": ("slide", names.slides),
+        "angle": ("moving link", mechanism.moving),
+        "length": ("telescopic leg", mechanism.legs),
+        "slide": ("slide", mechanism.slides),
     }
     found: dict[str, Drive] = {}
-    for name, section in builder.section.drives.items():
-        kind, item = names.driven(name)
+    for name, section in mechanism.drives.items():
+        kind, item = mechanism.driven(name)
         path: KeyPath = ("drives", name) if section is None else ("drives", name, kind)
         reference = section.from_ or GROUND if section is not None else GROUND
         if section is None:
-            right = builder.check_name(name, [*names.moving, *names.slides], "link, leg or slide", path)
-        elif kind == "length" and item in names.moving and item not in names.legs:
+            right = builder.check_name(name, [*mechanism.moving, *mechanism.slides], "link, leg or slide", path)
+        elif kind == "length" and item in mechanism.moving and item not in mechanism.legs:
             builder.report(path, f"link {item!r} is not telescopic: its length is fixed")
             right = False
         else:
@@ -239,7 +239,7 @@ def _drives(builder: Builder) -> dict[str, Drive]:
 def _measures(builder: Builder) -> dict[str, Measure]:
     """Every measure whose names are right."""
     # A measure may use those above it.
-    known = [name for name in builder.names.coordinates if name not in builder.section.measures]
+    known = [name for name in builder.section.coordinates if name not in builder.section.measures]
     found: dict[str, Measure] = {}
     for name, section in builder.section.measures.items():
         path: KeyPath = ("measures", name)
@@ -270,7 +270,9 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
         right = builder.check_named(kind, items, (*path, kind))
         quantity: Quantity = "angle" if kind == "angle" else "length"
         if kind in ("drive", "measure"):
-            quantity = (builder.names.drives if kind == "drive" else builder.names.measures).get(given, "none")
+            quantity = (builder.section.driven_kinds if kind == "drive" else builder.section.measured_kinds).get(
+                given, "none"
+            )
         bounds: list[Term | None] = []
         for end, value in (("min", section.min), ("max", section.max)):
             if quantity != "none":

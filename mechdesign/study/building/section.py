@@ -6,12 +6,16 @@ long form before validation, so that no model is a union and every error has one
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Quantity
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
 from mechdesign.study.text.units import QuantityError, check_unit
@@ -225,6 +229,75 @@ class MechanismSection(fields.Model):
     measures: dict[fields.MeasureName, Measure] = Field(default_factory=dict)
     limits: tuple[Limit, ...] = ()
     targets: dict[fields.CoordinateName, TargetValue] = Field(default_factory=dict)
+
+    # What the names mean, whether or not the rest of the section is right.
+
+    def points_of(self, link: str) -> list[str]:
+        """Names of a link's points, its ends first."""
+        section = self.links.get(link)
+        if section is None:
+            return []
+        return [*(end for end in (section.from_, section.to) if end is not None), *section.points]
+
+    @cached_property
+    def owners(self) -> Mapping[str, list[str]]:
+        """Every point with the links that have it, in the order of the study."""
+        found: dict[str, list[str]] = {}
+        for link in self.links:
+            for point in self.points_of(link):
+                found.setdefault(point, []).append(link)
+        return found
+
+    def coordinates_of(self, name: str) -> tuple[str, ...]:
+        """The coordinates of a point; of what is no point, its name."""
+        return (f"{name}.x", f"{name}.y") if name in self.owners else (name,)
+
+    @cached_property
+    def moving(self) -> list[str]:
+        """Links other than the ground."""
+        return [name for name in self.links if name != GROUND]
+
+    @cached_property
+    def legs(self) -> list[str]:
+        """Telescopic links."""
+        return [name for name, link in self.links.items() if link.telescopic]
+
+    @cached_property
+    def slides(self) -> list[str]:
+        """Joints whose displacement is a coordinate."""
+        return [name for name, joint in self.joints.items() if joint.fixed is None]
+
+    def driven(self, drive: str) -> tuple[Literal["angle", "length", "slide"], str]:
+        """What a drive changes, and of which link, leg or joint."""
+        section = self.drives[drive]
+        if section is not None:
+            return section.kind, getattr(section, section.kind)
+        return "slide" if drive in self.slides else "length" if drive in self.legs else "angle", drive
+
+    @cached_property
+    def driven_kinds(self) -> Mapping[str, Quantity]:
+        """Drives and the kind of each."""
+        return {name: "angle" if self.driven(name)[0] == "angle" else "length" for name in self.drives}
+
+    @cached_property
+    def measured_kinds(self) -> Mapping[str, Quantity]:
+        """Measures and the kind of each."""
+        quantities: dict[str, Quantity] = {"angle": "angle", "distance": "length", "expression": "none"}
+        return {name: quantities[measure.kind] for name, measure in self.measures.items()}
+
+    @cached_property
+    def coordinates(self) -> Mapping[str, Quantity]:
+        """Every coordinate and its kind, measures last."""
+        found: dict[str, Quantity] = dict(self.driven_kinds)
+        for point in self.owners:
+            found[f"{point}.x"] = found[f"{point}.y"] = "length"
+        for link in self.moving:
+            found[f"{link}.angle"] = "angle"
+        for leg in self.legs:
+            found[f"{leg}.length"] = "length"
+        for slide in self.slides:
+            found[f"{slide}.slide"] = "length"
+        return found | dict(self.measured_kinds)
 
 
 def _unit_of(kind: str) -> fields.Read:

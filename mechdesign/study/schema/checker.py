@@ -22,7 +22,7 @@ class Checker:
     """Looks names and units up, and notes what is wrong with them."""
 
     def __init__(self, builder: Builder, parameters: Parameters, parts: Mapping[str, Any]) -> None:
-        self.names, self.places, self.reporter = builder.names, builder.places, builder.reporter
+        self.mechanism, self.places, self.reporter = builder.section, builder.places, builder.reporter
         self.parameters = parameters
         self.parts = parts
         self.known, self.kind = builder.reporter.known, builder.reporter.kind
@@ -35,15 +35,15 @@ class Checker:
 
         `others` are names that might have stood there as well.
         """
-        quantity = self.names.coordinates.get(name)
+        quantity = self.mechanism.coordinates.get(name)
         if quantity is None:
-            if name in self.names.owners:
+            if name in self.mechanism.owners:
                 self.report(path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key)
-            elif name in self.names.moving:
+            elif name in self.mechanism.moving:
                 self.report(path, f"{name!r} is a link; its coordinate is {name}.angle", at_key=at_key)
             else:
                 what = "coordinate or parameter" if others else "coordinate"
-                self.known(name, [*self.names.coordinates, *others], what, path, at_key=at_key)
+                self.known(name, [*self.mechanism.coordinates, *others], what, path, at_key=at_key)
         return quantity
 
     def coordinates(self, names: Iterable[str], path: KeyPath, order: int = 0) -> None:
@@ -57,8 +57,8 @@ class Checker:
         """Check a list of coordinates and points that are asked for."""
         seen: set[str] = set()
         for index, name in enumerate(outputs or ()):
-            parts = [f"{name}.x", f"{name}.y"] if name in self.names.owners else [name]
-            if name not in self.names.owners:
+            parts = self.mechanism.coordinates_of(name)
+            if name not in self.mechanism.owners:
                 self.coordinate(name, (*path, index))
             if seen.intersection(parts):
                 self.report((*path, index), f"{name!r} is listed twice")

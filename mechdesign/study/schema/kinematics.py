@@ -41,7 +41,9 @@ class KinematicsSection(MotionSection):
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         for index, load in enumerate(self.loads):
             if load.at is not None:
-                checker.known(load.at, checker.names.owners, "point", ("kinematics", "loads", index, "at"))
+                checker.known(load.at, checker.mechanism.owners, "point", ("kinematics", "loads", index, "at"))
             if load.link is not None:
-                checker.known(load.link, checker.names.moving, "moving link", ("kinematics", "loads", index, "link"))
+                checker.known(
+                    load.link, checker.mechanism.moving, "moving link", ("kinematics", "loads", index, "link")
+                )
         return super().checked(checker)

@@ -84,7 +84,7 @@ class PoseSection(fields.Model):
             checker.coordinates(pose, (self.command, "poses", index))
         checker.coordinates(self.sweep or (), (self.command, "sweep"))
         for name, given in (self.path or {}).items():
-            if name in checker.names.owners:
+            if name in checker.mechanism.owners:
                 continue
             place: KeyPath = (self.command, "path", name)
             if checker.coordinate(name, place, at_key=True) is not None and (given.spline or given.shape is not None):
@@ -117,7 +117,7 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
 
     Along a motion that other coordinates give, drives have no rates of their own: they follow from the motion.
     """
-    drives = checker.names.drives
+    drives = checker.mechanism.driven_kinds
     source = _source(checker, section)
     given = _sets(checker, source)
     one = given[0] if len(given) == 1 else set()
@@ -125,7 +125,7 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
     of_given = any(name in one and name not in drives for _, values in parts for name in values)
     for key, values in parts:
         for name in values:
-            if name not in checker.names.coordinates or name in (one if of_given else drives):
+            if name not in checker.mechanism.coordinates or name in (one if of_given else drives):
                 continue
             message = f"{name!r} is not a drive: {key} are those of {', '.join(drives)}"
             if of_given:
@@ -161,7 +161,7 @@ def _check_speed(checker: Checker, section: MotionSection) -> None:
         message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"
         checker.report((section.command, "speed"), message, at_key=True)
         return
-    points = [name for name in path if name in checker.names.owners]
+    points = [name for name in path if name in checker.mechanism.owners]
     points += [n[:-2] for n in path if n.endswith(".x") and f"{n[:-2]}.y" in path and n[:-2] not in points]
     if len(points) != 1:
         which = " and ".join(points) or "no point"
@@ -187,7 +187,4 @@ def _sets(checker: Checker, section: PoseSection) -> list[set[str]]:
         given = [(region.point, *region.at)]
     if section.poses:
         given = list(dict.fromkeys(frozenset(pose) for pose in section.poses))
-    return [
-        {part for name in names for part in ((f"{name}.x", f"{name}.y") if name in checker.names.owners else (name,))}
-        for names in given
-    ]
+    return [{part for name in names for part in checker.mechanism.coordinates_of(name)} for names in given]

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from mechdesign.mechanism.graph import Graph
-from mechdesign.study.building.names import Names
+from mechdesign.study.building.section import MechanismSection
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.poses import MotionSection
@@ -264,7 +264,7 @@ class ReliabilitySection(MotionSection):
         if self.allocate is not None:
             _allocate(checker, self, dimensions, clearances)
         load = _load(checker, self, dimensions)
-        plain = {name: split_link(checker.names, name)[1] for name in (*(self.outputs or ()), *self.limits)}
+        plain = {name: split_link(checker.mechanism, name)[1] for name in (*(self.outputs or ()), *self.limits)}
         limits = {plain[name]: limit for name, limit in self.limits.items()}
         if len(limits) < len(self.limits):
             checker.report(("reliability", "limits"), "the same error is limited twice")
@@ -274,19 +274,19 @@ class ReliabilitySection(MotionSection):
         return super().checked(checker).model_copy(update=filled | {"outputs": outputs, "limits": limits})
 
 
-def _point_of(names: Names, name: str) -> str:
+def _point_of(mechanism: MechanismSection, name: str) -> str:
     """The point that the name of an error is about; empty where it is about none."""
     for suffix in reversed(SUFFIXES):
         base = name.removesuffix(suffix).removesuffix(".x").removesuffix(".y")
-        if base in names.owners:
+        if base in mechanism.owners:
             return base
     return ""
 
 
-def split_link(names: Names, name: str) -> tuple[str, str, str]:
+def split_link(mechanism: MechanismSection, name: str) -> tuple[str, str, str]:
     """The link that a coordinate or point is said to be of, or nothing, the name without it, and the point."""
     link, _, rest = name.partition(".")
-    if name in names.coordinates or link not in names.section.links or not (point := _point_of(names, rest)):
+    if name in mechanism.coordinates or link not in mechanism.links or not (point := _point_of(mechanism, rest)):
         return "", name, ""
     return link, rest, point
 
@@ -299,10 +299,10 @@ def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str,
         *((("reliability", "limits", name), name, True) for name in section.limits),
     ]
     for path, name, at_key in given:
-        link, _, point = split_link(checker.names, name)
+        link, _, point = split_link(checker.mechanism, name)
         if not link:
             continue
-        links = checker.names.owners[point]
+        links = checker.mechanism.owners[point]
         if link not in links:
             message = f"link {link!r} has no point {point!r}; it belongs to {' and '.join(links)}"
             checker.report(path, message, at_key=at_key)
@@ -363,18 +363,18 @@ def _varies(dimension: Dimension) -> bool:
 
 def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
     path: KeyPath = ("reliability", "clearances", point)
-    names, report = checker.names, checker.reporter.report
-    if not checker.known(point, names.owners, "point", path, at_key=True):
+    mechanism, report = checker.mechanism, checker.report
+    if not checker.known(point, mechanism.owners, "point", path, at_key=True):
         return None
-    links = names.owners[point]
-    held = [*links, *(j.slot for j in names.section.joints.values() if j.slot and j.point == point)]
+    links = mechanism.owners[point]
+    held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
     if len(held) < 2:
         report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
     link = clearance.link or _carrier(links, meant)
     if link not in links:
         checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
     elif clearance.effect == "length":
-        binary = names.section.links[link]
+        binary = mechanism.links[link]
         if point not in (binary.from_, binary.to) or binary.telescopic:
             message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
             report((*path, "effect"), message)
@@ -392,16 +392,16 @@ def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | 
 
 def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: ErrorLimit) -> None:
     path: KeyPath = ("reliability", "limits", name)
-    names, report = checker.names, checker.reporter.report
-    known = names.owners if limit.radius is not None else {**names.coordinates, **names.owners}
-    name = split_link(names, name)[1]
+    mechanism, report = checker.mechanism, checker.report
+    known = mechanism.owners if limit.radius is not None else {**mechanism.coordinates, **mechanism.owners}
+    name = split_link(mechanism, name)[1]
     base, order = split_order(name, known.__contains__)
     if order and not (section.rates or section.accelerations or section.speed):
         report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)
     if limit.radius is not None:
-        if checker.known(base, names.owners, "point", path, at_key=True):
+        if checker.known(base, mechanism.owners, "point", path, at_key=True):
             checker.kind(path, ORDERS["length"][order])
-    elif base in names.owners:
+    elif base in mechanism.owners:
         report(path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True)
     else:
         quantity = checker.coordinate(base, path, at_key=True)
@@ -412,7 +412,7 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
 def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dimension]:
     """Dimensions with wildcards expanded; a dimension that is named itself wins over a wildcard."""
     found: dict[str, Dimension] = {}
-    parameters, report = checker.parameters, checker.reporter.report
+    parameters, report = checker.parameters, checker.report
     for name, dimension in section.dimensions.items():
         path: KeyPath = ("reliability", "dimensions", name)
         if "*" in name or "?" in name:
@@ -427,7 +427,7 @@ def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dime
         if name in parameters.formulas:
             message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
             report(path, message, at_key=True)
-        known = [*parameters.known(), *checker.names.drives, *LOADS]
+        known = [*parameters.known(), *checker.mechanism.driven_kinds, *LOADS]
         if checker.known(name, known, "parameter, dimension or drive", path, at_key=True):
             _dimension(checker, name, dimension, path)
             found[name] = dimension
@@ -437,7 +437,7 @@ def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dime
 def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
     if dimension.distribution == "lognormal":
         nominal = checker.parameters.nominal.get(name)
-        if name in checker.names.drives or name in LOADS or (nominal is not None and nominal <= 0):
+        if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
             checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
     if name in checker.parameters.nominal:
         return
@@ -446,7 +446,7 @@ def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath)
     elif name in checker.places:
         kind = checker.places[name].quantity
     else:
-        kind = checker.names.drives[name]
+        kind = checker.mechanism.driven_kinds[name]
     checker.kind(path, kind)
 
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.building.names import GROUND
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
@@ -121,17 +121,17 @@ class StiffnessSection(PoseSection):
     def checked(self, checker: Checker) -> Self:
         """Check what is named as well, and the units of stiffnesses; loads get three numbers."""
         root: KeyPath = ("stiffness",)
-        right = checker.known(self.at, checker.names.owners, "point", (*root, "at"))
-        if right and self.link is None and GROUND in checker.names.owners[self.at]:
+        right = checker.known(self.at, checker.mechanism.owners, "point", (*root, "at"))
+        if right and self.link is None and GROUND in checker.mechanism.owners[self.at]:
             checker.report((*root, "at"), f"point {self.at!r} belongs to the ground and does not move")
-        if self.link is not None and checker.known(self.link, checker.names.moving, "moving link", (*root, "link")):
-            points = checker.names.points_of(self.link)
+        if self.link is not None and checker.known(self.link, checker.mechanism.moving, "moving link", (*root, "link")):
+            points = checker.mechanism.points_of(self.link)
             if right and self.at not in points:
                 message = f"link {self.link!r} has no point {self.at!r}; it has {', '.join(points)}"
                 checker.report((*root, "at"), message)
         for link, profile in self.elastic.items():
             path: KeyPath = (*root, "elastic", link)
-            checker.known(link, checker.names.moving, "moving link", path, at_key=True)
+            checker.known(link, checker.mechanism.moving, "moving link", path, at_key=True)
             checker.known(profile, self.sections, "section", path)
         for profile in self.sections:
             if profile not in self.elastic.values():
@@ -139,11 +139,11 @@ class StiffnessSection(PoseSection):
                 checker.reporter.unused((*root, "sections", profile), "section", others)
         for drive in self.actuators:
             path = (*root, "actuators", drive)
-            if checker.known(drive, checker.names.drives, "drive", path, at_key=True):
-                checker.kind(path, _STIFFNESS_KINDS[checker.names.drives[drive]])
-        slides = [*checker.names.slides, *checker.names.legs]
-        clamped = [set(other.fixed) for other in checker.names.section.joints.values() if other.fixed is not None]
-        pins = [p for p, owners in checker.names.owners.items() if len(owners) > 1 and set(owners) not in clamped]
+            if checker.known(drive, checker.mechanism.driven_kinds, "drive", path, at_key=True):
+                checker.kind(path, _STIFFNESS_KINDS[checker.mechanism.driven_kinds[drive]])
+        slides = [*checker.mechanism.slides, *checker.mechanism.legs]
+        clamped = [set(other.fixed) for other in checker.mechanism.joints.values() if other.fixed is not None]
+        pins = [p for p, owners in checker.mechanism.owners.items() if len(owners) > 1 and set(owners) not in clamped]
         for joint, bearing in self.bearings.items():
             path = (*root, "bearings", joint)
             if not checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):

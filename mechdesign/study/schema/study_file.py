@@ -54,7 +54,7 @@ def check(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
     found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
-    found["targets"] = targets.check(checker, checker.names.section.targets, folder)
+    found["targets"] = targets.check(checker, checker.mechanism.targets, folder)
     return found
 
 

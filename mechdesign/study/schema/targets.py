@@ -62,14 +62,14 @@ def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) 
     seen: dict[str, str] = {}
     for owner, value in wanted.items():
         path: KeyPath = (*ROOT, owner)
-        point = owner in checker.names.owners
+        point = owner in checker.mechanism.owners
         if not point and checker.coordinate(owner, path, at_key=True) is None:
             continue
-        coordinates = (f"{owner}.x", f"{owner}.y") if point else (owner,)
+        coordinates = checker.mechanism.coordinates_of(owner)
         for name in [name for name in coordinates if name in seen][:1]:
             checker.report(path, f"{name} has a target already, by {seen[name]!r}", at_key=True)
         seen.update(dict.fromkeys(coordinates, owner))
-        quantity = "length" if point else checker.names.coordinates[owner]
+        quantity = "length" if point else checker.mechanism.coordinates[owner]
         if not isinstance(value, Expression):
             table = _table(checker, owner, value, path, folder, len(coordinates), quantity)
             if table is not None:

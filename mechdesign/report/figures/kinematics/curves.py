@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
+from mechdesign.report.figures.panels import abscissa, moving_names, tick_abscissa
 from mechdesign.report.figures.sweep import ranks
 from mechdesign.results import Column, Result
 from mechdesign.study import Study, Units
@@ -26,7 +25,6 @@ MOST_PANELS = 12
 _COLORS = (*style.PALETTE[:6], style.INK)  # yellow is lost on white
 _ORDERS = ("velocity", "acceleration", "error", "effort")
 _RANKS = ("position", "velocity", "acceleration", "error", "effort", "det_J", "inverse_condition")
-_TURN = 180  # degrees from which on ticks stand at parts of a turn
 _MANY = 7  # panels from which on they are lower
 _LETTERS = 26  # longest name in a legend
 _STILL = 1e-9  # part of its size by which a column changes that does not change
@@ -52,19 +50,20 @@ class _Curve:
 def curves_figure(study: Study, result: Result) -> Figure | None:
     """Every output over the swept coordinate, or along the path; None where nothing changes."""
     table = result.tables["motion"]
-    poses = result.drawn["poses"]
-    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
-    if not moving:
+    if not moving_names(result.drawn["poses"]):
         return None
-    steps = np.diff(poses.values[moving[0]])
-    swept = moving[0] if len(moving) == 1 and ((steps > 0).all() or (steps < 0).all()) else None
-    x = poses.values[swept] if swept else np.arange(1.0, poses.count + 1)
+    over = abscissa(study, result.drawn["poses"])
+    swept, x = over.name, over.values
     panels = _panels(study, [column for column in table.columns if column.name != "valid"], swept, x)
     if not panels:
         return None
     marks = list(_limits(result, swept)) if swept else []
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
-    figure, axes = _stack([curve for panel in panels for curve in panel[:MOST_CURVES]], len(panels), bool(marks))
+    longest = min(max(len(curve.of) for panel in panels for curve in panel[:MOST_CURVES]), _LETTERS)
+    figure, axes = style.page(
+        len(panels), 1, 1.57 if len(panels) <= _MANY else 1.23, left=1.0, right=0.6 + 0.08 * longest,
+        top=0.4 if marks else 0.15, bottom=0.5, down=0.2, sharex=True,
+    )  # fmt: skip
     colors: dict[tuple[str, str], str] = {}
     for axis, panel in zip(axes, panels, strict=True):
         for begin, end in invalid:
@@ -73,16 +72,12 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     _draw_limits(figure, axes, marks, bool(invalid))
     axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
     axes[-1].margins(x=0.02)
-    if swept is None:
-        axes[-1].set_xlabel("pose along the path")
-        return figure
-    axes[-1].set_xlabel(style.axis_label(swept, study.units.label(study.mechanism.quantity(swept))))
-    if study.mechanism.quantity(swept) == "angle" and study.units.label("angle") == "deg" and np.ptp(x) >= _TURN:
-        axes[-1].xaxis.set_major_locator(MaxNLocator(9, steps=[1, 1.5, 3, 4.5, 6, 9, 10]))
+    axes[-1].set_xlabel(over.label)
+    tick_abscissa(axes[-1], over)
     return figure
 
 
-def _panels(study: Study, columns: list[Column], swept: str | None, x: Floats) -> list[list[_Curve]]:
+def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
     """Columns by kind and unit, in the order of `_RANKS`, what tells most first."""
     section = study.kinematics
     asked = section.outputs if section is not None and section.outputs is not None else ()
@@ -149,20 +144,6 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
     return found
 
 
-def _stack(curves: list[_Curve], count: int, marked: bool) -> tuple[Figure, NDArray[np.object_]]:
-    """Panels over one another; margins in inches, for a layout engine would draw everything twice."""
-    top = 0.4 if marked else 0.15
-    height = 0.55 + top + (1.75 if count <= _MANY else 1.4) * count
-    longest = min(max(len(curve.of) for curve in curves), _LETTERS)
-    figure = style.new_figure(style.WIDTH, height, layout=None)
-    margins = {
-        "left": 1.0 / style.WIDTH, "right": 1 - (0.6 + 0.08 * longest) / style.WIDTH, "bottom": 0.5 / height,
-        "top": 1 - top / height, "hspace": 0.14,
-    }  # fmt: skip
-    axes = figure.subplots(count, 1, sharex=True, squeeze=False, gridspec_kw=margins)[:, 0]
-    return figure, axes
-
-
 def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
     shown: list[Floats] = []
     for curve in panel[:MOST_CURVES]:
@@ -198,7 +179,7 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=note, title_fontsize=9, alignment="left")
 
 
-def _draw_limits(figure: Figure, axes: NDArray[np.object_], marks: list[tuple[float, str]], shaded: bool) -> None:
+def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, str]], shaded: bool) -> None:
     kinds = list(dict.fromkeys(kind for _, kind in marks))
     looks: dict[str, dict[str, Any]] = {
         kind: {"color": _LIMITS[k % len(_LIMITS)], "linestyle": (0, (6, 2 + k))} for k, kind in enumerate(kinds)

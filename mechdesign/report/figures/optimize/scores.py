@@ -10,61 +10,63 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from matplotlib.tri import Triangulation
 
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.analyses.optimize.tables import Comparison
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.optimize.designs import Designs
 
 LEVELS = 14
 MARKERS = "osD^vP*X<>"
 
 
-def score_curves(designs: Designs) -> Figure:
+def label(compared: Comparison, name: str) -> str:
+    """Name and unit of a variable or a goal, for an axis."""
+    return style.axis_label(name, compared.unit_of(name))
+
+
+def in_words(compared: Comparison, row: int) -> str:
+    """``l_a = 1, l_b = 2.15`` of a design."""
+    return ", ".join(f"{name} = {values[row]:.4g}" for name, values in compared.designs.variables.items())
+
+
+def score_curves(compared: Comparison) -> Figure:
     """The best score for each value of each variable, with the goals of that design [S1, Fig. 3(a)].
 
     Of scattered designs each is a dot.
     """
-    names, many = designs.names, len(designs.goals) > 1
-    across = min(len(names), 3) if len(names) > 2 else 1
-    down = -(-len(names) // across)
-    figure = style.new_figure(style.WIDTH, 0.9 + (2.9 if across == 1 else 2.5) * down)
-    winner = designs.chosen()
-    score = designs.total() if many else designs[next(iter(designs.goals))]
-    column = "CPI" if many else next(iter(designs.goals))
-    for number, name in enumerate(names):
+    designs, winner = compared.designs, compared.best
+    many, count, one = len(designs.goals) > 1, len(designs.variables), designs.goals[0]
+    across = min(count, 3) if count > 2 else 1
+    down = -(-count // across)
+    figure = style.new_figure(0.9 + (2.9 if across == 1 else 2.5) * down)
+    score, told = (compared.cpi, "CPI") if many else (compared.values[:, 0], one.name)
+    for number, (name, column) in enumerate(designs.variables.items()):
         axes = figure.add_subplot(down, across, number + 1)
-        where = float(designs.optimum[name][winner])
-        values = np.unique(designs[name][designs.feasible])
-        if len(names) > 1 and 2 * len(values) > designs.feasible.sum():
-            axes.plot(designs[name][designs.feasible], score[designs.feasible], ".", color=style.FAINT, markersize=4,
-                      markeredgewidth=0, label="designs")  # fmt: skip
+        inside = column[designs.feasible]
+        values = np.unique(inside)
+        if count > 1 and 2 * len(values) > len(inside):
+            axes.plot(inside, score[designs.feasible], ".", color=style.FAINT, markersize=4, markeredgewidth=0,
+                      label="designs")  # fmt: skip
         else:
-            best = _best_each(designs, name, values)
-            axes.plot(values, score[best], color=style.INK, linewidth=2.0, label=column)
-            for goal, color in zip(designs.goals if many else (), style.PALETTE, strict=False):
-                axes.plot(values, designs.share(goal)[best], color=color, label=f"{goal}, normalised")
-        height = float(designs.optimum[column][winner])
-        axes.plot(where, height, "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
-        axes.set_title(f"best: {name} = {where:.4g}", loc="right", fontsize=9, color=style.VERMILION)
-        axes.set_xlabel(designs.label(name))
-        axes.set_ylabel("" if number % across else "index" if many else designs.label(column))
+            order = np.lexsort([-np.where(designs.feasible, compared.cpi, -np.inf), column])
+            best = order[np.searchsorted(column[order], values)]
+            axes.plot(values, score[best], color=style.INK, linewidth=2.0, label=told)
+            for k, color in zip(range(len(designs.goals)) if many else (), style.PALETTE, strict=False):
+                shown = f"{designs.goals[k].name}, normalised"
+                axes.plot(values, compared.share(k)[best], color=color, label=shown)
+        axes.plot(column[winner], score[winner], "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
+        axes.set_title(f"best: {name} = {column[winner]:.4g}", loc="right", fontsize=9, color=style.VERMILION)
+        axes.set_xlabel(label(compared, name))
+        axes.set_ylabel("" if number % across else "index" if many else label(compared, told))
         axes.margins(x=0.02)
         if not many and _steep(score[designs.feasible]):
             axes.set_yscale("log")
             axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             axes.yaxis.set_minor_formatter(NullFormatter())
-    what = "Composite performance index" if many else column
-    among = "" if len(names) == 1 else ": the best design for each value of a variable"
-    figure.suptitle(what + among, x=0.01, ha="left", fontsize=11)
+    among = "" if count == 1 else ": the best design for each value of a variable"
+    figure.suptitle(("Composite performance index" if many else told) + among, x=0.01, ha="left", fontsize=11)
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
     return figure
-
-
-def _best_each(designs: Designs, name: str, values: Floats) -> Ints:
-    """The best design for each value of a variable."""
-    total = np.where(designs.feasible, designs.total(), -np.inf)
-    rows = [np.flatnonzero(designs.feasible & (designs[name] == value)) for value in values]
-    return np.array([found[np.argmax(total[found])] for found in rows], dtype=np.intp)
 
 
 def _steep(values: Floats) -> bool:
@@ -73,63 +75,58 @@ def _steep(values: Floats) -> bool:
     return bool((finite > 0).all() and finite.max() > 30 * finite.min())
 
 
-def score_surface(designs: Designs) -> Figure:
+def score_surface(compared: Comparison) -> Figure:
     """The score over two variables as a map, with the best design for each row of weights [S1, Fig. 3(b)]."""
-    names, optimum = designs.names, designs.optimum
-    many = len(designs.goals) > 1
-    figure = style.new_figure(style.WIDTH, 5.2)
+    goals, (x, y) = [each.name for each in compared.designs.goals], compared.designs.variables.values()
+    many = len(goals) > 1
+    figure = style.new_figure(5.2)
     axes = figure.add_subplot()
-    filled = _fill(axes, designs, designs.total() if many else designs[next(iter(designs.goals))])
-    bar = figure.colorbar(filled, ax=axes, pad=0.02, format=FuncFormatter(lambda value, _: f"{value:.3g}"))
-    bar.minorticks_off()
-    bar.set_label("composite performance index CPI" if many else designs.label(next(iter(designs.goals))))
-    bar.outline.set_visible(False)
+    filled = _fill(axes, compared, compared.cpi if many else compared.values[:, 0])
+    what = "composite performance index CPI" if many else label(compared, goals[0])
+    digits = FuncFormatter(lambda value, _: f"{value:.3g}")
+    style.color_bar(figure, filled, what, ax=axes, pad=0.02, format=digits).minorticks_off()
     shown: dict[tuple[float, float], list[str]] = {}
-    for row in range(len(optimum)):
-        place = (float(optimum[names[0]][row]), float(optimum[names[1]][row]))
-        shown.setdefault(place, []).append(
-            "(" + ", ".join(f"{optimum[f'w_{goal}'][row]:g}" for goal in designs.goals) + ")"
-        )
+    for row, weights in zip(compared.winners, compared.weights, strict=True):
+        shown.setdefault((x[row], y[row]), []).append(f"({', '.join(f'{weight:g}' for weight in weights)})")
     for k, (place, rows) in enumerate(shown.items()):
         words = f"{place[0]:.4g}, {place[1]:.4g}: " + (f"best for {' '.join(rows)}" if many else "best")
         axes.plot(*place, MARKERS[k % len(MARKERS)], color=style.VERMILION, markeredgecolor="white", markersize=8,
                   linestyle="none", label=words, clip_on=False, zorder=5)  # fmt: skip
-    title = f"CPI over the design variables, and the best designs for weights of ({', '.join(designs.goals)})"
-    axes.set_title(title if many else f"{next(iter(designs.goals))} over the design variables", loc="left")
-    axes.set_xlabel(designs.label(names[0]))
-    axes.set_ylabel(designs.label(names[1]))
-    axes.grid(visible=False)
+    title = f"CPI over the design variables, and the best designs for weights of ({', '.join(goals)})"
+    axes.set_title(title if many else f"{goals[0]} over the design variables", loc="left")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=2 if len(shown) > 3 else 1)
     return figure
 
 
-def goal_maps(designs: Designs) -> Figure:
+def goal_maps(compared: Comparison) -> Figure:
     """Each goal over two variables, side by side."""
-    columns = min(len(designs.goals), 3)
-    rows = -(-len(designs.goals) // columns)
-    figure = style.new_figure(style.WIDTH, 0.3 + 2.7 * rows)
-    for number, goal in enumerate(designs.goals):
+    goals = compared.designs.goals
+    columns = min(len(goals), 3)
+    rows = -(-len(goals) // columns)
+    figure = style.new_figure(0.3 + 2.7 * rows)
+    for number, goal in enumerate(goals):
         axes = figure.add_subplot(rows, columns, number + 1)
-        filled = _fill(axes, designs, designs[goal])
-        bar = figure.colorbar(filled, ax=axes, location="bottom", pad=0.02)
-        bar.outline.set_visible(False)
-        bar.ax.locator_params(nbins=4)
-        axes.set_title(designs.label(goal), loc="left")
-        axes.set_xlabel(designs.label(designs.names[0]))
-        if number % columns == 0:
-            axes.set_ylabel(designs.label(designs.names[1]))
-        axes.grid(visible=False)
+        filled = _fill(axes, compared, compared.values[:, number])
+        style.color_bar(figure, filled, ax=axes, location="bottom", pad=0.02).ax.locator_params(nbins=4)
+        axes.set_title(label(compared, goal.name), loc="left")
+        if number % columns:
+            axes.set_ylabel("")
     return figure
 
 
-def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
+def _fill(axes: Axes, compared: Comparison, values: Floats) -> ScalarMappable:
     """Filled contours over two variables whose bounds may depend on each other; dots where designs are scattered."""
+    designs = compared.designs
+    across, up = designs.variables
+    axes.set_xlabel(label(compared, across))
+    axes.set_ylabel(label(compared, up))
+    axes.grid(visible=False)
     inside = designs.feasible & np.isfinite(values)
-    x, y, z = (column[inside] for column in (*(designs[name] for name in designs.names), values))
+    x, y, z = (column[inside] for column in (*designs.variables.values(), values))
     steps = [np.unique(np.round(v, 9)) for v in (x, y)]
     on_a_grid = len(steps[0]) * len(steps[1]) <= 4 * len(z)
     if not on_a_grid or len(steps[0]) < 2 or len(steps[1]) < 2 or len(z) < 4:
-        order = np.argsort(values[inside] if not any(designs.goals.values()) else designs.total()[inside])
+        order = np.argsort(compared.cpi[inside] if any(each.smallest for each in designs.goals) else z)
         axes.margins(0.03)
         return axes.scatter(x[order], y[order], c=z[order], s=14, cmap=style.COLORMAP, linewidths=0)
     # In steps of the grid triangles are well shaped; those that span missing designs are left out.

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
+from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.report.figures.panels import along
 from mechdesign.report.figures.planes import plane
-from mechdesign.report.figures.reliability.allocation import allocation_figure
-from mechdesign.report.figures.reliability.contributions import contributions_figure
+from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
 from mechdesign.report.figures.reliability.densities import density_figures
+from mechdesign.report.figures.reliability.errors import map_figures, sweep_figures
 from mechdesign.report.figures.reliability.estimates import MOST_LISTED, estimate_figure
-from mechdesign.report.figures.reliability.looks import LOOKS
-from mechdesign.report.figures.reliability.maps import map_figures
+from mechdesign.report.figures.reliability.looks import Sampled, look
 from mechdesign.report.figures.reliability.simulations import convergence_figure, histogram_figure, trend_figure
-from mechdesign.report.figures.reliability.sweeps import sweep_figures
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -45,21 +46,16 @@ def _sampled(study: Study, result: Result, poses: Poses) -> Gallery:
     tables, moments = result.tables, result.tables["moments"]
     found = Gallery()
     # The tables are of the first method that samples errors; the moments hold its name.
-    method = next((name for name in moments["method"].tolist() if LOOKS[name].simulated), None)
+    method = next((name for name in moments["method"].tolist() if look(name).simulated), None)
     if method is None:
         return found
-    if "density" in tables:
-        _, where = _pose(study, poses, tables["density"])
-        found.add("density", density_figures, study, tables["density"], moments, where, LOOKS[method].words)
-    if "histogram" in tables:
-        _, where = _pose(study, poses, tables["histogram"])
-        found.add("histogram", histogram_figure, study, tables["histogram"], where, method)
-    if "convergence" in tables:
-        pose, where = _pose(study, poses, tables["convergence"])
-        found.add("convergence", convergence_figure, tables["convergence"], moments, pose, where, method)
-    if "estimate" in tables:
-        pose, where = _pose(study, poses, tables["estimate"])
-        found.add("estimate", trend_figure, tables["estimate"], tables["reliability"], pose, where)
+    makers: dict[str, Callable[[Sampled], Figure | Mapping[str, Figure]]] = {
+        "density": density_figures, "histogram": histogram_figure, "convergence": convergence_figure,
+        "estimate": trend_figure,
+    }  # fmt: skip
+    for name, make in makers.items():
+        if name in tables:
+            found.add(name, make, Sampled(study, tables, method, *_pose(study, poses, tables[name])))
     return found
 
 

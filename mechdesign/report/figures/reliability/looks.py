@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -19,42 +18,37 @@ from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
 SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
 
 
-@dataclass(frozen=True)
-class Look:
-    """A method's name in words, colour, marker, and dashes; what is simulated is drawn as dots, without a line."""
+class Look(NamedTuple):
+    """A method's name in words, colour, marker and dashes; what is simulated is drawn as dots, without a line."""
 
     words: str
     color: str
     marker: str
-    dashes: Literal["-", "--", ":", "-.", ""]
-
-    @property
-    def simulated(self) -> bool:
-        """Whether the method samples made mechanisms."""
-        return self.dashes == ""
+    dashes: Literal["-", "--", ":", "-.", "None"]
+    simulated: bool
 
 
-class _Looks(Mapping[str, Look]):
-    """By the names of methods, in the order in which they are drawn: what is computed below what is sampled."""
-
-    def __getitem__(self, name: str) -> Look:
-        method = METHODS[name]
-        return Look(method.words, getattr(style, method.color), method.marker, "" if method.sampled else method.dashes)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(sorted(METHODS, key=lambda name: METHODS[name].sampled))
-
-    def __len__(self) -> int:
-        return len(METHODS)
+def look(name: str) -> Look:
+    """How a method is drawn."""
+    method = METHODS[name]
+    dashes = "None" if method.sampled else method.dashes
+    return Look(method.words, getattr(style, method.color), method.marker, dashes, method.sampled)
 
 
-LOOKS = _Looks()
+class Sampled(NamedTuple):
+    """What the pictures of samples show: the tables of a method at a pose, its row among the poses and its words."""
+
+    study: Study
+    tables: Mapping[str, Table]
+    method: str
+    pose: int
+    where: str
 
 
 def methods(table: Table) -> list[str]:
-    """Methods of a table, in the order in which they are drawn."""
+    """Methods of a table, in the order in which they are drawn: what is computed below what is sampled."""
     present = set(table["method"].tolist())
-    return [method for method in LOOKS if method in present]
+    return sorted((name for name in METHODS if name in present), key=lambda name: METHODS[name].sampled)
 
 
 def best_probability(table: Table) -> str:
@@ -74,10 +68,7 @@ def best_moments(table: Table) -> str:
 
 def select(table: Table, **chosen: str) -> Flags:
     """Rows in which columns have these values."""
-    rows = np.ones(len(table), dtype=bool)
-    for name, value in chosen.items():
-        rows &= table[name] == value
-    return rows
+    return np.asarray(np.logical_and.reduce([table[name] == value for name, value in chosen.items()]))
 
 
 def channels(table: Table) -> list[tuple[str, str, str]]:
@@ -86,12 +77,24 @@ def channels(table: Table) -> list[tuple[str, str, str]]:
     return sorted(found, key=lambda channel: list(SUFFIXES).index(channel[1]))
 
 
-def error_limits(study: Study, output: str, order: str) -> tuple[float, float] | None:
-    """Lowest and highest error allowed, in study units, of a coordinate or by the circle about its point."""
+def heading(output: str, order: str) -> str:
+    """An output by its name, its velocity as such."""
+    return output if order == "position" else f"{output} {order}"
+
+
+def error_limits(study: Study, output: str, order: str) -> tuple[float, float]:
+    """Lowest and highest error allowed (study units), of a coordinate or by the circle about its point; inf if none."""
     section = study.reliability
     assert section is not None
     band = section.limits.get(f"{output}{SUFFIXES[order]}")
     if band is not None:
         return (-np.inf if band.min is None else band.min, np.inf if band.max is None else band.max)
     circle = section.limits.get(f"{output.rpartition('.')[0]}{SUFFIXES[order]}")
-    return None if circle is None or circle.radius is None else (-circle.radius, circle.radius)
+    radius = np.inf if circle is None or circle.radius is None else circle.radius
+    return -radius, radius
+
+
+def apart(limits: tuple[float, float], low: float, high: float) -> tuple[list[float], list[float]]:
+    """Finite limits between two ends, and those beyond them."""
+    known = [limit for limit in limits if np.isfinite(limit)]
+    return [limit for limit in known if low < limit < high], [limit for limit in known if not low < limit < high]

@@ -92,7 +92,7 @@ def _directions(study: Study, result: Result) -> Figure | None:
         return None
     rows = known[np.unique(np.linspace(0, len(known) - 1, MOST_DIRECTIONS).astype(int))]
     unit, poses, factor = study.units.label("stiffness"), result.drawn["poses"], study.units.angle_factor
-    figure = style.new_figure(style.WIDTH, 4.2)
+    figure = style.new_figure(4.2)
     axes = figure.add_subplot()
     for k, row in enumerate(rows):
         color, angle = style.PALETTE[k], float(table["k_angle"][row])
@@ -131,7 +131,7 @@ def _curves(study: Study, result: Result) -> Figure | None:
     ]
     if not panels:
         return None
-    figure = style.new_figure(style.WIDTH, 5.2 if len(panels) > 1 else 3.4)
+    figure = style.new_figure(5.2 if len(panels) > 1 else 3.4)
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (about, kind, looks) in zip(axes, panels, strict=True):
         for name, (look, color) in looks.items():

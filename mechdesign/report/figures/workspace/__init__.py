@@ -70,7 +70,7 @@ def workspace_figure(study: Study, result: Result, region: Region, title: str = 
 def _drives(study: Study, boundary: Table) -> Figure:
     """Drive values along the boundary over the angle of the scan [S1, Fig. 7]."""
     names = study.mechanism.drives
-    figure = style.new_figure(style.WIDTH, 3.4 if len(names) < 4 else 5.0)
+    figure = style.new_figure(3.4 if len(names) < 4 else 5.0)
     axes = figure.add_subplot()
     named = set()
     for number, name in enumerate(names):

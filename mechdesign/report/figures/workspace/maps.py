@@ -53,15 +53,17 @@ def index_columns(region: Region) -> list[str]:
 def _map(study: Study, found: Sequence[Region], column: str) -> Figure:
     levels, extend = _levels(found, column)
     norm = BoundaryNorm(levels, 256, extend=extend)
-    unit, meaning = next((c.unit, c.meaning) for c in found[0].local.columns if c.name == column)
+    told = found[0].local.column(column)
     places = np.concatenate([region.places() for region in found])
     point = study.workspace.point if study.workspace else ""
     name = column.replace("_", " ")
-    page = sheet(study, places, [region.title for region in found], f"{name} at point {point}: {meaning}", bar=True)
+    page = sheet(
+        study, places, [region.title for region in found], f"{name} at point {point}: {told.meaning}", bar=True
+    )
     for axes, region in zip(page.axes, found, strict=True):
         contours(axes, list(region.grids(column)), levels, norm, extend, labels=len(found) == 1)
     page.ends(found)
-    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, unit), ticks=levels)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, told.unit), ticks=levels)
     return page.figure
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.collections import LineCollection
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.workspace.regions import ROOM, sheet
+from mechdesign.report.figures.workspace.regions import ROOM, coloured, sheet
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
@@ -36,7 +36,7 @@ def _ends(ratio: Floats) -> tuple[float, bool]:
 
 
 def _label(path: Table) -> str:
-    return style.axis_label("speed ratio", next(c.unit for c in path.columns if c.name == "speed_ratio"))
+    return style.axis_label("speed ratio", path.column("speed_ratio").unit)
 
 
 def _path(study: Study, path: Table) -> Figure:
@@ -50,22 +50,17 @@ def _path(study: Study, path: Table) -> Figure:
     ratio = path["speed_ratio"]
     top, tail = _ends(ratio)
     norm = Normalize(0.0, top)
-    drawn = None
     for rows in _pieces(path):
-        ends = np.column_stack([path["x"][rows], path["y"][rows]])
-        axes.plot(*ends.T, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=3.25)
-        drawn = LineCollection(list(np.stack([ends[:-1], ends[1:]], axis=1)), array=ratio[rows][:-1], norm=norm,
-                               cmap=style.COLORMAP, linewidths=4, capstyle="round", zorder=3.26)  # fmt: skip
-        axes.add_collection(drawn)
+        axes.plot(z[rows].real, z[rows].imag, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=3.25)
+        coloured(axes, z[rows], ratio[rows], norm, 4)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=z)
-    assert drawn is not None
-    page.color_bar(drawn, _label(path), extend="max" if tail else "neither")
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), _label(path), extend="max" if tail else "neither")
     return page.figure
 
 
 def _speed(study: Study, path: Table) -> Figure:
     drive = study.mechanism.drives[0]
-    figure = style.new_figure(style.WIDTH, 3.4)
+    figure = style.new_figure(3.4)
     axes = figure.add_subplot()
     pieces = _pieces(path)
     for rows, color in zip(pieces, style.PALETTE * len(pieces), strict=False):

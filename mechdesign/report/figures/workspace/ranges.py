@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.collections import LineCollection
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
@@ -14,7 +15,7 @@ from mechdesign.analyses.workspace.shown import curves
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.workspace.regions import PALE, ROOM, outline_of, pick, sheet
+from mechdesign.report.figures.workspace.regions import PALE, ROOM, coloured, outline_of, pick, sheet
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
@@ -51,31 +52,25 @@ def _region(study: Study, tables: Sequence[Table], titles: Sequence[str], title:
     mechanism = study.mechanism
     sketch = [np.ravel(mechanism.sketch_configuration.point(point)) for point in mechanism.points]
     page = sheet(study, np.concatenate([_places(tables), *sketch]), titles, title, bar=False, pad=ROOM)
-    fates: set[str] = set()
+    seen: set[str] = set()
     for axes, table in zip(page.axes, tables, strict=True):
         axes.add_patch(PathPatch(_area(table), facecolor=PALE, linewidth=0, zorder=0.5))
-        fates |= outline_of(axes, table)
+        seen |= outline_of(axes, table)
         alone = len(tables) == 1
         draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=alone, drives=False, faint=not alone)
-    page.legend(fates, set())
+    page.legend(seen)
     return page.figure
 
 
 def _deciding(study: Study, tables: Sequence[Table], titles: Sequence[str], name: str, label: str) -> Figure:
-    values = np.concatenate([table[name] for table in tables])
     page = sheet(study, _places(tables), titles, f"the {name} that ends the region", bar=True)
-    drawn = None
+    every = np.concatenate([table[name] for table in tables])
+    norm = Normalize(float(every.min()), float(every.max()))
     for axes, table in zip(page.axes, tables, strict=True):
         axes.add_patch(PathPatch(_area(table), facecolor="#F2F2F2", linewidth=0, zorder=0.5))
         for rows in curves(table):
-            ends = np.column_stack([table["x"][rows], table["y"][rows]])
-            lines = np.stack([ends[:-1], ends[1:]], axis=1)
-            drawn = LineCollection(list(lines), array=table[name][rows][:-1], cmap=style.COLORMAP, linewidths=3.5,
-                                   capstyle="round")  # fmt: skip
-            drawn.set_clim(float(values.min()), float(values.max()))
-            axes.add_collection(drawn)
-    if drawn is not None:
-        page.color_bar(drawn, label)
+            coloured(axes, table["x"][rows] + 1j * table["y"][rows], table[name][rows], norm)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), label)
     return page.figure
 
 

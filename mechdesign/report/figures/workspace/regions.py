@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
@@ -16,29 +18,29 @@ from matplotlib.patheffects import withStroke
 from mechdesign.analyses.workspace.shown import curves
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
+from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, windows
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 Grid = tuple[Floats, Floats, Floats]
 
-# How a piece of the boundary is drawn by what ends the region there: colour, dashes, words.
-FATES: Mapping[str, tuple[str, object, str]] = {
-    "limit": (style.INK, "-", "ends at a limit"),
-    "stretched": (style.BLUE, (0, (5, 1.5)), "a leg is stretched"),
-    "folded": (style.PURPLE, (0, (2, 1)), "a leg is folded"),
-    "reach": (style.ORANGE, (0, (4, 1.2)), "a leg is at the end of its reach"),
-    "singularity": (style.VERMILION, (0, (6, 1.5, 1, 1.5)), "ends at a singularity"),
-    "other": (style.FAINT, "-", "a piece that is left out"),
-}
-# Loci of singularities inside: of the closure (parallel) and of a leg (serial).
-LOCI: Mapping[str, tuple[str, str]] = {
-    "forward": (style.VERMILION, "parallel singularity"),
-    "inverse": (style.GREEN, "leg in line (serial singularity)"),
+# How a piece of the boundary is drawn by what ends the region there, and loci of singularities inside, of the closure
+# (parallel) and of a leg (serial): colour, dashes, width, words.
+LOOKS: Mapping[str, tuple[str, Any, float, str]] = {
+    "limit": (style.INK, "-", 1.5, "ends at a limit"),
+    "stretched": (style.BLUE, (0, (5, 1.5)), 1.5, "a leg is stretched"),
+    "folded": (style.PURPLE, (0, (2, 1)), 1.5, "a leg is folded"),
+    "reach": (style.ORANGE, (0, (4, 1.2)), 1.5, "a leg is at the end of its reach"),
+    "singularity": (style.VERMILION, (0, (6, 1.5, 1, 1.5)), 1.5, "ends at a singularity"),
+    "other": (style.FAINT, "-", 1.5, "a piece that is left out"),
+    "forward": (style.VERMILION, "-", 1.8, "parallel singularity"),
+    "inverse": (style.GREEN, "-", 1.8, "leg in line (serial singularity)"),
 }
 # Of the region itself; opaque, so that patches leave no seams.
 PALE = "#D5EBF8"
 LEFT_OUT = "#ECECEC"
-_LEFT, _RIGHT, _TOP, _BELOW, _BAR, _LEGEND = 0.72, 0.12, 0.34, 0.52, 0.95, 0.24
+# Inches: a bar of colours with its numbers, the legend, above a panel, above all of them, and between two rows.
+_BAR, _LEGEND, _ABOVE, _TOP, _DOWN = 0.95, 0.24, 0.34, 0.4, 0.28
 _TALLEST = 6.5
 # Regions that a picture shows side by side.
 MOST = 6
@@ -120,7 +122,7 @@ def pick(table: Table, values: Mapping[str, float]) -> Table:
 
 
 def fate(kind: str, at: str) -> str:
-    """What ends the region at a piece of its boundary: one of `FATES`."""
+    """What ends the region at a piece of its boundary: one of `LOOKS`."""
     if kind == "limit":
         return "limit"
     for word in ("stretched", "folded", "reach"):
@@ -129,9 +131,9 @@ def fate(kind: str, at: str) -> str:
     return "singularity"
 
 
-def outline(axes: Axes, region: Region, *, width: float = 1.5) -> set[str]:
+def outline(axes: Axes, region: Region) -> set[str]:
     """Draw a region's boundary, coloured by what ends it, and faintly what is left out; returns what occurs."""
-    seen = outline_of(axes, region.boundary, width=width)
+    seen = outline_of(axes, region.boundary)
     if region.others is not None:
         local, boundary = region.others
         for x, y, _ in _grids(local, "det_J"):
@@ -142,16 +144,16 @@ def outline(axes: Axes, region: Region, *, width: float = 1.5) -> set[str]:
     return seen
 
 
-def outline_of(axes: Axes, boundary: Table, *, width: float = 1.5) -> set[str]:
-    """Draw the curves of a table, coloured by what ends the region there; returns the fates that occur."""
+def outline_of(axes: Axes, boundary: Table) -> set[str]:
+    """Draw the curves of a table, coloured by what ends the region there; returns what occurs."""
     seen = set()
     pieces = list(curves(boundary))
     # White below keeps the gaps of dashes clean.
     for rows in pieces:
-        axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=width + 0.6, zorder=3.1)
+        axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=2.1, zorder=3.1)
     for rows in pieces:
         found = fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]]))
-        color, dashes, _ = FATES[found]
+        color, dashes, width, _ = LOOKS[found]
         axes.plot(boundary["x"][rows], boundary["y"][rows], color=color, linestyle=dashes, linewidth=width,
                   solid_capstyle="round", zorder=3.15)  # fmt: skip
         seen.add(found)
@@ -175,7 +177,7 @@ def loci(axes: Axes, region: Region) -> set[str]:
         if len(edge) and np.abs(edge - middle).min() < near:
             continue
         kind = str(table["kind"][rows[0]])
-        axes.plot(table["x"][rows], table["y"][rows], color=LOCI[kind][0], linewidth=1.8, zorder=3.2,
+        axes.plot(table["x"][rows], table["y"][rows], color=LOOKS[kind][0], linewidth=LOOKS[kind][2], zorder=3.2,
                   marker="o" if len(rows) == 1 else "", markersize=4,
                   path_effects=[withStroke(linewidth=3.4, foreground="white")])  # fmt: skip
         seen.add(kind)
@@ -193,6 +195,15 @@ def _edge(x: Floats, y: Floats) -> list[Floats]:
     return [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
 
 
+def coloured(axes: Axes, z: Complexes, values: Floats, norm: Normalize, width: float = 3.5) -> LineCollection:
+    """Draw a line in the plane, coloured by values at its places."""
+    ends = np.column_stack([z.real, z.imag])
+    drawn = LineCollection(list(np.stack([ends[:-1], ends[1:]], axis=1)), array=values[:-1], norm=norm,
+                           cmap=style.COLORMAP, linewidths=width, capstyle="round", zorder=3.26)  # fmt: skip
+    axes.add_collection(drawn)
+    return drawn
+
+
 def some(found: Sequence[Region]) -> list[Region]:
     """Of many regions a few, spread evenly."""
     return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST)).astype(int))]
@@ -208,66 +219,47 @@ class Sheet:
 
     def ends(self, found: Sequence[Region]) -> None:
         """Draw what ends each region, a panel each, and its singularities, with a legend."""
-        fates, kinds = set[str](), set[str]()
-        for axes, region in zip(self.axes, found, strict=True):
-            fates |= outline(axes, region)
-            kinds |= loci(axes, region)
-        self.legend(fates, kinds)
+        panels = list(zip(self.axes, found, strict=True))
+        self.legend(set().union(*(outline(*each) | loci(*each) for each in panels)))
 
-    def legend(self, fates: set[str], kinds: set[str]) -> None:
+    def legend(self, seen: set[str]) -> None:
         """Entries in one row below the panels for what `outline` and `loci` have drawn."""
-        lines = [(color, dashes, 1.5, words) for name, (color, dashes, words) in FATES.items() if name in fates]
-        lines += [(color, "-", 1.8, words) for kind, (color, words) in LOCI.items() if kind in kinds]
-        entries = [Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=words)  # type: ignore[arg-type]
-                   for color, dashes, width, words in lines]  # fmt: skip
+        entries = [Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=words)
+                   for name, (color, dashes, width, words) in LOOKS.items() if name in seen]  # fmt: skip
         if entries:
             self.figure.legend(handles=entries, loc="lower left", ncols=4, columnspacing=1.4, borderaxespad=0.3,
-                               bbox_to_anchor=(_LEFT / style.WIDTH - 0.02, 0.0))  # fmt: skip
+                               bbox_to_anchor=(LEFT / style.WIDTH - 0.02, 0.0))  # fmt: skip
 
     def color_bar(self, drawn: ScalarMappable, label: str, **options: Any) -> None:
         """What the colours of the panels mean."""
-        bar = self.figure.colorbar(drawn, cax=self.bar, **options)
-        bar.set_label(label)
-        bar.outline.set_visible(False)
+        style.color_bar(self.figure, drawn, label, cax=self.bar, **options)
 
 
 def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD) -> Sheet:
     """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all."""
     number = len(titles)
-    x, y = places.real, places.imag
-    pad = pad * max(float(np.ptp(x)), float(np.ptp(y)), 1e-12)
-    wide, tall = float(np.ptp(x)) + 2 * pad, float(np.ptp(y)) + 2 * pad
     columns = number if number < 4 else 2 if number == 4 else 3
     rows = -(-number // columns)
-    room = style.WIDTH - _RIGHT - (_BAR if bar else 0.0)
-    scale = min((room - _LEFT * columns) / columns / wide, (_TALLEST if rows == 1 else 7.5 / rows) / tall)
-    width, height = scale * wide, scale * tall
-    above = _TOP if number > 1 else 0.0
-    outer = 0.4 + rows * (height + above) + (rows - 1) * 0.28 + _BELOW + _LEGEND
-    figure = style.new_figure(style.WIDTH, outer, layout=None)
-    step = (room - _LEFT) / columns
-    panels = []
-    for k, name in enumerate(titles):
-        column, row = k % columns, k // columns
-        left = _LEFT + column * step + max(0.0, (step - _LEFT - width) / 2) * (number > 1)
-        low = _LEGEND + _BELOW + (rows - 1 - row) * (height + above + 0.28)
-        axes = figure.add_axes((left / style.WIDTH, low / outer, width / style.WIDTH, height / outer))
-        axes.set_xlim(float(x.min()) - pad, float(x.max()) + pad)
-        axes.set_ylim(float(y.min()) - pad, float(y.max()) + pad)
-        axes.set_aspect("equal")
+    room = style.WIDTH - RIGHT - (_BAR if bar else 0.0)
+    middle, wide, tall = extent(places)
+    wide, tall = wide + 2 * pad * max(wide, tall), tall + 2 * pad * max(wide, tall)
+    scale = min((room - LEFT * columns) / columns / wide, (_TALLEST if rows == 1 else 7.5 / rows) / tall)
+    window, above, down = Window(middle, scale, scale * wide, scale * tall), 0.0, _DOWN
+    if number > 1:
+        above, down = _ABOVE, _ABOVE + _DOWN
+    figure, panels = windows(
+        window, study.units.label("length"), number, columns, gap=(room - LEFT) / columns - window.width, above=down,
+        top=_TOP + above - down, below=BELOW + _LEGEND,
+    )  # fmt: skip
+    outer = figure.get_figheight()
+    for axes, name in zip(panels, titles, strict=True):
         axes.grid(visible=False)
         axes.set_title(name, loc="left", fontsize=9.5)
-        unit = study.units.label("length")
-        if row == rows - 1 or k + columns >= number:
-            axes.set_xlabel(style.axis_label("x", unit))
-        if column == 0:
-            axes.set_ylabel(style.axis_label("y", unit))
-        panels.append(axes)
-    figure.text(_LEFT / style.WIDTH, 1 - 0.12 / outer, title[0].upper() + title[1:], va="top", fontsize=11)
+    figure.text(LEFT / style.WIDTH, 1 - 0.12 / outer, title[0].upper() + title[1:], va="top", fontsize=11)
     colors = None
     if bar:
-        edge = (_LEFT + (columns - 1) * step + width if number == 1 else room) + 0.15
-        long = min(rows * (height + above + 0.28) - above - 0.28, 4.0)
-        middle = _LEGEND + _BELOW + (rows * (height + above + 0.28) - above - 0.28) / 2
-        colors = figure.add_axes((edge / style.WIDTH, (middle - long / 2) / outer, 0.16 / style.WIDTH, long / outer))
+        edge = (LEFT + window.width if number == 1 else room) + 0.15
+        every = rows * window.height + (rows - 1) * down
+        long, middle_up = min(every, 4.0), BELOW + _LEGEND + every / 2
+        colors = figure.add_axes((edge / style.WIDTH, (middle_up - long / 2) / outer, 0.16 / style.WIDTH, long / outer))
     return Sheet(figure, tuple(panels), colors)

@@ -1,4 +1,4 @@
-"""What errors come from: ranked shares of the variance, beside Sobol indices where they were asked for."""
+"""What errors come from, and what keeping them small costs: bars a source of the variance, and of the tolerances."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from matplotlib.figure import Figure
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.panels import MOST_PANELS, framed, legend_below, title
-from mechdesign.report.figures.reliability.looks import select
+from mechdesign.report.figures.panels import MOST_PANELS, legend_below, title
+from mechdesign.report.figures.reliability.looks import heading, select
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 MOST_SOURCES = 16
+MOST_TOLERANCES = 20
 MOST_POSES = 4
 # Columns of bars, in words and colours.
 _SOBOL = {
@@ -23,8 +24,9 @@ _SOBOL = {
     "sobol_first": ("Sobol index, alone", style.ORANGE),
     "sobol_total": ("Sobol index, with all interactions", style.GREEN),
 }
-# Inches: a source, below a panel, above it, and the least width of its bars.
-_LINE, _BELOW, _ABOVE, _NARROWEST = 0.24, 0.62, 0.32, 1.9
+# Inches: a source, below a panel and above the next, and the least width of its bars.
+_LINE, _APART, _NARROWEST = 0.24, 0.94, 1.9
+_TOLERANCE = 0.36  # inches, both bars of a tolerance
 
 
 def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
@@ -32,22 +34,16 @@ def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
     pairs = list(dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), strict=True)))[:MOST_PANELS]
     names = list(dict.fromkeys(table["source"].tolist()))
     margin = 0.3 + 0.072 * max(len(name) for name in names)
-    room = int(style.WIDTH / (margin + _NARROWEST))
-    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, room))
-    lines = -(-len(pairs) // columns)
+    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, int(style.WIDTH / (margin + _NARROWEST))))
     sobol = _sobol_pose(table, poses, len(names))
     each = sobol is None and poses.listed and poses.count <= MOST_POSES
     bars = 3 if sobol is not None else poses.count if each else 1
-    panel = (0.15 + min(len(names), MOST_SOURCES)) * max(_LINE, 0.1 * bars + 0.06)
-    keys = 0 if bars == 1 else 1 if bars < 3 else 2
-    bottom = 0.55 + 0.2 * keys
-    height = 0.75 + lines * panel + (lines - 1) * (_BELOW + _ABOVE) + bottom
-    gap = (margin + 0.1) / ((style.WIDTH - margin - 0.15 - (columns - 1) * (margin + 0.1)) / columns)
-    figure = framed(height, left=margin, right=0.15, top=0.75, bottom=bottom, apart=((_BELOW + _ABOVE) / panel, gap))
-    grid = figure.subplots(lines, columns, squeeze=False).ravel()
-    for axis in grid[len(pairs) :]:
-        axis.set_visible(False)
-    for axis, (output, order) in zip(grid, pairs, strict=False):
+    tall = (0.15 + min(len(names), MOST_SOURCES)) * max(_LINE, 0.1 * bars + 0.06)
+    bottom = 0.55 + 0.2 * (0 if bars == 1 else 1 if bars < 3 else 2)
+    figure, grid = style.page(
+        len(pairs), columns, tall, left=margin, right=0.15, top=0.75, bottom=bottom, across=margin + 0.1, down=_APART
+    )
+    for k, (axis, (output, order)) in enumerate(zip(grid, pairs, strict=True)):
         rows = select(table, output=output, order=order)
         if sobol is not None:
             _indices(axis, table, rows, names, sobol)
@@ -55,9 +51,8 @@ def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
             _shares(study, axis, table["share"][rows].reshape(poses.count, len(names)), names, poses, each)
         axis.grid(visible=False, axis="y")
         axis.tick_params(axis="y", length=0)
-        axis.set_title(output if order == "position" else f"{output} {order}", loc="left", fontsize=9.5)
-    for axis in grid[max(0, len(pairs) - columns) : len(pairs)]:
-        axis.set_xlabel("share of the variance [%]")
+        axis.set_title(heading(output, order), loc="left", fontsize=9.5)
+        axis.set_xlabel("share of the variance [%]" if k + columns >= len(pairs) else "")
     which = ""
     if sobol is not None:
         which = f"at {pose_in_words(study, poses, sobol)}; whiskers: 99.7 % intervals"
@@ -119,3 +114,46 @@ def _name(axis: Axes, names: list[str]) -> None:
     axis.set_ylim(len(names) - 0.42, -0.58)
     axis.margins(x=0.18)
     axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.get_xlim()[0] < -2.0 else 0.0)
+
+
+def allocation_figure(study: Study, table: Table) -> Figure:
+    """Bars for each source: its tolerance, given and allocated, and its cost."""
+    section = study.reliability
+    assert section is not None
+    assert section.allocate is not None
+    total = [float(np.nansum(table[name])) for name in ("cost_given", "cost_allocated")]
+    note = f"cost {total[0]:.4g} as given, {total[1]:.4g} allocated ({100 * (total[1] / total[0] - 1):+.1f} %)"
+    table = table.take(np.arange(len(table))[:MOST_TOLERANCES])
+    names = [f"{row['source']}" + f" ({row['kind']})" * (row["kind"] != "tolerance") for row in table.rows()]
+    units = table["unit"].tolist()
+    margin = 0.35 + 0.075 * max(len(name) for name in names)
+    figure, (one, two) = style.page(
+        2, 2, _TOLERANCE * len(table), left=margin, right=0.2, top=0.8, bottom=1.05,
+        across=0.45 * (style.WIDTH - margin - 0.2) / 2.45, sharey=True,
+    )  # fmt: skip
+    alike, given, allocated = len(set(units)) == 1, table["given"], table["allocated"]
+    # Tolerances of several units do not share an axis: their ratios do.
+    scale = np.ones(len(table)) if alike else given
+    _pair(one, given / scale, allocated / scale)
+    one.set_xlabel(style.axis_label("tolerance", units[0]) if alike else "tolerance over the given one")
+    for place, (value, unit) in enumerate(zip(allocated, units, strict=True)):
+        text = f" {value:.3g}" + ("" if alike else f" {unit}")
+        one.text(float(value / scale[place]), place + 0.2, text, va="center", fontsize=8)
+    _pair(two, table["cost_given"], table["cost_allocated"])
+    two.set_xlabel("cost")
+    one.set_yticks(np.arange(len(names)), names)
+    one.invert_yaxis()
+    two.tick_params(axis="y", length=0)
+    for axis in (one, two):
+        axis.grid(visible=False, axis="y")
+        axis.margins(x=0.16, y=0.02)
+        axis.locator_params(axis="x", nbins=5)
+    title(figure, f"Cheapest tolerances for a reliability of {section.allocate.reliability:.10g}", note, left=margin)
+    legend_below(figure, *one.get_legend_handles_labels())
+    return figure
+
+
+def _pair(axis: Axes, given: Floats, allocated: Floats) -> None:
+    places = np.arange(len(given))
+    axis.barh(places - 0.2, given, 0.36, color=style.FAINT, label="as given")
+    axis.barh(places + 0.2, allocated, 0.36, color=style.BLUE, label="allocated")

@@ -1,4 +1,4 @@
-"""Errors over a sweep: bands of three standard deviations, means, deviations, and where methods differ [S3]."""
+"""Errors over the poses: along a sweep bands, means, deviations, and where methods differ [S3]; over a plane maps."""
 
 from __future__ import annotations
 
@@ -12,11 +12,24 @@ from matplotlib.lines import Line2D
 
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import BARE, MOST_PANELS, WITH_LEGEND, Along, legend_below, stack, tick_abscissa
-from mechdesign.report.figures.reliability.looks import LOOKS, best_moments, channels, error_limits, methods, select
-from mechdesign.results import Table
+from mechdesign.report.figures.planes import Plane, map_sheet
+from mechdesign.report.figures.reliability.looks import (
+    Look,
+    apart,
+    best_moments,
+    best_probability,
+    channels,
+    error_limits,
+    heading,
+    look,
+    methods,
+    select,
+)
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 MOST_OUTPUTS = 7
+MOST_MAPS = 4
 # A limit so many times as far out as all errors is told and not drawn.
 _FAR = 3.0
 
@@ -24,10 +37,10 @@ _FAR = 3.0
 def sweep_figures(study: Study, moments: Table, swept: Along) -> dict[str, Figure]:
     """Bands of the errors, means, standard deviations and the methods' difference over the sweep [S3, Figs. 5 to 7]."""
     found = {"bands": _bands(study, moments, swept)}
-    for name, column, what in (("means", "mean", "mean"), ("deviations", "sigma", "standard deviation")):
-        found[name] = _curves(moments, swept, column, f"{what} of made mechanisms".capitalize())
-    reference, computed = best_moments(moments), [m for m in methods(moments) if not LOOKS[m].simulated]
-    if LOOKS[reference].simulated and computed:
+    for name, column, what in (("means", "mean", "Mean"), ("deviations", "sigma", "Standard deviation")):
+        found[name] = _curves(moments, swept, column, f"{what} of made mechanisms")
+    reference, computed = best_moments(moments), [m for m in methods(moments) if not look(m).simulated]
+    if look(reference).simulated and computed:
         found["difference"] = _difference(moments, swept, reference, computed)
     return found
 
@@ -40,35 +53,32 @@ def _bands(study: Study, moments: Table, swept: Along) -> Figure:
                          swept.label)  # fmt: skip
     tick_abscissa(axes[-1], swept)
     entries: dict[str, Any] = {}
-    filled = next((method for method in known if not LOOKS[method].simulated), None)
+    filled = next((method for method in known if not look(method).simulated), None)
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
         axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
         for method in known:
-            look, rows = LOOKS[method], select(moments, output=output, order=order, method=method)
+            drawn, rows = look(method), select(moments, output=output, order=order, method=method)
             mean = moments["mean"][rows] - moments["nominal"][rows]
             reach = 3.0 * moments["sigma"][rows]
             if method == filled:
-                band = axis.fill_between(swept.values, mean - reach, mean + reach, color=look.color, alpha=0.22,
-                                         linewidth=0)  # fmt: skip
-                axis.plot(swept.values, mean, color=look.color, linewidth=1.2)
-                entries[look.words] = band
+                entries[drawn.words] = axis.fill_between(
+                    swept.values, mean - reach, mean + reach, color=drawn.color, alpha=0.22, linewidth=0
+                )
+                axis.plot(swept.values, mean, color=drawn.color, linewidth=1.2)
                 continue
-            drawn = look.dashes or "None"
             for value in (mean - reach, mean, mean + reach):
-                (line,) = axis.plot(swept.values, value, linestyle=drawn, color=look.color, linewidth=1.2,
-                                    marker=look.marker if look.simulated else "", markersize=2.8)  # fmt: skip
-            entries[look.words] = line
-        limits = [limit for limit in error_limits(study, output, order) or () if np.isfinite(limit)]
-        far = [limit for limit in limits if abs(limit) > _FAR * np.abs(axis.get_ylim()).max()]
-        for limit in limits:
-            if limit not in far:
-                line = axis.axhline(limit, color=style.VERMILION, linestyle=(0, (5, 2)), linewidth=1.4)
-                entries["limit of the error"] = line
+                (entries[drawn.words],) = axis.plot(swept.values, value, linewidth=1.2, markersize=2.8, **_line(drawn))
+        reach = _FAR * np.abs(axis.get_ylim()).max()
+        near, far = apart(error_limits(study, output, order), -reach, reach)
+        for limit in near:
+            entries["limit of the error"] = axis.axhline(
+                limit, color=style.VERMILION, linestyle=(0, (5, 2)), linewidth=1.4
+            )
         if far:
             told = f"limit {', '.join(f'{limit:+g}' for limit in far)} {unit}, outside"
             axis.set_title(told, loc="right", fontsize=8, color=style.VERMILION)
         axis.set_ylabel(style.axis_label("error", unit))
-        axis.set_title(output if order == "position" else f"{output} {order}", loc="left", fontsize=9.5)
+        axis.set_title(heading(output, order), loc="left", fontsize=9.5)
     legend_below(figure, list(entries.values()), list(entries))
     return figure
 
@@ -82,27 +92,29 @@ def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
         for output, color in zip(outputs, style.PALETTE, strict=False):
             for method in known:
-                look, rows = LOOKS[method], select(moments, output=output, order=order, unit=unit, method=method)
-                axis.plot(swept.values, moments[column][rows], color=look.color if single else color,
-                          linestyle=look.dashes or "None", marker=look.marker if look.simulated else "",
-                          markersize=3.2)  # fmt: skip
+                rows = select(moments, output=output, order=order, unit=unit, method=method)
+                shown = _line(look(method)) | ({} if single else {"color": color})
+                axis.plot(swept.values, moments[column][rows], markersize=3.2, **shown)
         _name_outputs(axis, outputs, [style.INK] if single else style.PALETTE)
         axis.set_ylabel(style.axis_label(order, unit))
         if column == "sigma":
             axis.set_ylim(0.0, 1.1 * axis.get_ylim()[1])
-    handles = [
-        Line2D([], [], color=LOOKS[m].color if single else style.INK, linestyle=LOOKS[m].dashes or "None",
-               marker=LOOKS[m].marker if LOOKS[m].simulated else "", markersize=4) for m in known
-    ]  # fmt: skip
-    legend_below(figure, handles, [LOOKS[method].words for method in known])
+    looks = [_line(look(method)) | ({} if single else {"color": style.INK}) for method in known]
+    legend_below(figure, [Line2D([], [], markersize=4, **shown) for shown in looks],
+                 [look(method).words for method in known])  # fmt: skip
     return figure
+
+
+def _line(drawn: Look) -> dict[str, Any]:
+    """Dashes of what is computed, markers of what is simulated."""
+    return {"color": drawn.color, "linestyle": drawn.dashes, "marker": drawn.marker if drawn.simulated else ""}
 
 
 def _difference(moments: Table, swept: Along, reference: str, computed: Sequence[str]) -> Figure:
     """Standard deviations of the computed methods, in per cent of the simulated ones, and how far apart on average."""
     panels = _grouped(moments)
     figure, axes = stack(
-        len(panels), f"Standard deviation less that of {LOOKS[reference].words}, in per cent of it", swept.label,
+        len(panels), f"Standard deviation less that of {look(reference).words}, in per cent of it", swept.label,
         note="in brackets: how far apart on average", bottom=WITH_LEGEND if len(computed) > 1 else BARE,
     )  # fmt: skip
     tick_abscissa(axes[-1], swept)
@@ -118,14 +130,14 @@ def _difference(moments: Table, swept: Along, reference: str, computed: Sequence
                     percent = 100.0 * (moments["sigma"][rows] / true - 1.0)
                 mean = np.nanmean(np.abs(percent)) if np.isfinite(percent).any() else np.nan
                 apart.append(f"{mean:.2f} %")
-                axis.plot(swept.values, percent, LOOKS[method].dashes, marker=".", markersize=4, linewidth=1.2,
+                axis.plot(swept.values, percent, look(method).dashes, marker=".", markersize=4, linewidth=1.2,
                           color=color)  # fmt: skip
             named.append(f"{output} ({', '.join(apart)})")
         axis.set_ylabel(f"{order} [%]")
         _name_outputs(axis, named, style.PALETTE)
     if len(computed) > 1:
-        handles = [Line2D([], [], color=style.INK, linestyle=LOOKS[m].dashes, marker=".") for m in computed]
-        legend_below(figure, handles, [LOOKS[method].words for method in computed])
+        handles = [Line2D([], [], color=style.INK, ls=look(m).dashes, marker=".") for m in computed]
+        legend_below(figure, handles, [look(method).words for method in computed])
     return figure
 
 
@@ -145,3 +157,26 @@ def _grouped(table: Table) -> list[tuple[str, str, list[str]]]:
     for output, order, unit in channels(table):
         panels.setdefault((order, unit), []).append(output)
     return [(*key, outputs[:MOST_OUTPUTS]) for key, outputs in list(panels.items())[:MOST_PANELS]]
+
+
+def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
+    """Standard deviation of each output, and the failure probability where there are limits."""
+    moments = result.tables["moments"]
+    method = best_moments(moments)
+    shown = [channel for channel in channels(moments) if channel[1] == "position"] or channels(moments)
+    parts = []
+    for output, order, unit in shown[:MOST_MAPS]:
+        rows = select(moments, output=output, order=order, method=method)
+        parts.append((style.axis_label(output, unit), moments["sigma"][rows].reshape(over.x.shape)))
+    note = f"by {look(method).words}; the error is that of made mechanisms at this pose"
+    found = {"deviation_map": map_sheet(study, over, parts, "Standard deviation of the error", note)}
+    if "reliability" in result.tables:
+        table = result.tables["reliability"]
+        method = best_probability(table)
+        rows = select(table, method=method, scope="pose")
+        failure = table["failure"][rows].reshape(over.x.shape)
+        found["failure_map"] = map_sheet(
+            study, over, [("", failure)], "Probability that an error leaves its limits", f"by {look(method).words}",
+            logarithmic=True,
+        )  # fmt: skip
+    return found
