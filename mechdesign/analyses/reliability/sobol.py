@@ -19,8 +19,7 @@ import numpy as np
 from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE
 from mechdesign.analyses.reliability.engine.problem import BLOCK
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.setting import Setting, errors_of
-from mechdesign.analyses.reliability.simulation import generator
+from mechdesign.analyses.reliability.simulation import Setting, errors_of, generator
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import Task
 from mechdesign.numerics.arrays import Floats

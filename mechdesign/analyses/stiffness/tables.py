@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import Held, directional, principal
-from mechdesign.analyses.stiffness.loads import Effects, joints_of, points_of
+from mechdesign.analyses.stiffness.force_method import Effects, joints_of, points_of
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.results import Column, Table
