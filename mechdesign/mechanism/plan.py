@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import Value, nearest, quiet
+from mechdesign.mechanism.algebra import Value, angle_of, nearest, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
-from mechdesign.mechanism.continuation import Start, follow, unknowns_of
+from mechdesign.mechanism.continuation import Start, follow
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.solve import run
@@ -90,17 +90,22 @@ class Plan:
         """A solved pose to continue from; the sketch where left out."""
         at = self.core.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
-        guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides, at.nodes)
+        guess = self.unknowns(at, given)
         state = self.run(given, at.vectors, guess)
         return Start(given, at.places, guess, [np.sign(d) for d in state.determinants])
 
-    def all_rotations(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
-        """Rotations of a solved pose's classes, and of those that stand for given distances."""
-        extra = []
+    def unknowns(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
+        """Unknowns of the groups without a closed form in a solved pose with such given coordinates."""
+        rotations = [*at.rotations]
         for position, (_, k) in enumerate(self.structure.spans):
             edge = self.structure.edges[len(self.core.graph.edges) + position]
-            extra.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
-        return [*at.rotations, *extra]
+            rotations.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
+        found: list[Value] = []
+        for group in (self.structure.groups[index] for index in self.structure.unknowns):
+            found += [angle_of(np.asarray(rotations[root])) for root in group.angles]
+            found += [at.slides[slide] for slide in group.slides]
+            found += [part for base in group.bases for part in (np.real(at.nodes[base]), np.imag(at.nodes[base]))]
+        return found
 
     def solve(
         self,

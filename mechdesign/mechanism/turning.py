@@ -14,7 +14,6 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.continuation import unknowns_of
 from mechdesign.mechanism.newton import equations, set_unknowns
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.solve import run
@@ -45,7 +44,7 @@ def turning_point(
     (float, Configuration, int) or None
         The value, the pose there, and the index of the group in the plan; None where no singularity is near.
     """
-    guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides, near.nodes)
+    guess = plan.unknowns(near, given)
     reach = NEAR * (1.0 if plan.structure.given[k].quantity == "angle" else plan.core.size)
     folds = [(index, _fold(plan, given, k, near, guess, index)) for index in plan.structure.unknowns]
     found = [(abs(fold[0] - given[k]), index, fold) for index, fold in folds if fold is not None]
