@@ -112,17 +112,13 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome
             continue
         root = folder(study, "", options, several=len(paths) > 1)
         for command in questions(study):
-            yield _ask(study, command, root / command, options)
-
-
-def _ask(study: Study, command: str, directory: Path, options: Options) -> Outcome:
-    label = study.label
-    try:
-        given = answer(study, command, directory, options)
-    except Exception as error:
-        return _failure(label, command, directory, error)
-    tell(given, options)
-    return given
+            try:
+                given = answer(study, command, root / command, options)
+            except Exception as error:
+                yield _failure(label, command, root / command, error)
+            else:
+                tell(given, options)
+                yield given
 
 
 def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
