@@ -214,7 +214,8 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
         return {"type": "ineq", "fun": values, "jac": slopes}
 
     uniform = np.arange(PLACES) / PLACES
-    places, width, gain = uniform, 1 / PLACES, 1.0
+    inwards = np.array([0, 0, -1.0] if len(p) == 3 else [1.0, -1, 1, -1])
+    places, met, width, gain = uniform, uniform[:0], 1 / PLACES, 1.0
     for number in range(ROUNDS + 1):
         value, slope = with_slopes(p @ border(places))
         steep = np.abs(slope)
@@ -224,9 +225,10 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
         if max(gain, width**2, -distance.min()) < DEPTH or number == ROUNDS:
             break
         which = distance < 3 * LEAP
-        # In steps of some cells, since only what is near is looked at.
+        # From inside, and in steps of some cells, since only what is near is looked at.
+        start = p + max(-distance.min(), 0.0) * inwards
         found = minimize(
-            lambda q: -size(q)[0], p, jac=lambda q: -size(q)[1], method="SLSQP",
+            lambda q: -size(q)[0], start, jac=lambda q: -size(q)[1], method="SLSQP",
             bounds=[(v - LEAP, v + LEAP) for v in p], constraints=constraints(places, which, steep[which]),
             options={"ftol": 1e-14, "maxiter": 60},
         ).x  # fmt: skip
@@ -236,6 +238,7 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
         low = (distance <= np.roll(distance, 1, axis=1)) & (distance < np.roll(distance, -1, axis=1))
         lowest = np.argsort(np.where(low, distance, np.inf).min(axis=0))[:CONTACTS]
         closer = places[lowest][:, None] + width * CLOSER
-        width = min(1 / PLACES, max(width / 3, min(4 * move, width)))
-        places = np.unique(np.concatenate([uniform, closer.ravel() % 1.0]))
+        width = min(1 / PLACES, max(width / 3, 4 * move))
+        met = np.concatenate([met, places[lowest]])
+        places = np.unique(np.concatenate([uniform, met, closer.ravel() % 1.0]))
     return p if distance.min() > -LATE else None
