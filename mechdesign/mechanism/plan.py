@@ -18,9 +18,8 @@ from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.solve import run
 from mechdesign.mechanism.state import CONVERGED, STEPS, State, Unknowns, start_state
 from mechdesign.mechanism.structure import Structure
-from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.parallel import map_chunks, worker_count
+from mechdesign.parallel import keep_freed_memory, map_chunks, worker_count
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
