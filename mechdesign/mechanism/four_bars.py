@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -70,7 +71,7 @@ class FourBar:
     lengths: tuple[float, ...]
     offset: float
 
-    @property
+    @cached_property
     def slide(self) -> int:
         """Which joint is the slide; -1 in a four-bar."""
         return next((k for k, joint in enumerate(self.joints) if joint.edge >= 0), -1)

@@ -27,13 +27,14 @@ def solve_newton(state: State, index: int, guess: Unknowns) -> None:
     """
     group = state.structure.groups[index]
     found: list[Value] = [np.asarray(value, dtype=float) for value in guess]
-    small = [state.enough * (1.0 if k < len(group.angles) else state.size) for k in range(len(found))]
+    count = len(group.angles)
     active: Flags = np.ones((), dtype=bool)
     determinant: Value = 0.0
     for _ in range(state.steps):
         set_unknowns(state, group, found)
         solution, determinant = solve_linear(*equations(state, group))
-        moving = reduce(np.logical_or, (~(np.abs(step) < limit) for step, limit in zip(solution, small, strict=True)))
+        turned, moved = (reduce(np.maximum, map(np.abs, part), 0.0) for part in (solution[:count], solution[count:]))
+        moving = np.logical_not((turned < state.enough) & (moved < state.enough * state.size))
         if active.ndim:
             solution = [np.where(active, step, 0.0) for step in solution]
             moving = moving & active
