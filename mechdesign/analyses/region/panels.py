@@ -48,7 +48,7 @@ class Effort:
 
 # One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
 SINGLE = Effort(128, 48, 192)
-BATCH = Effort(24, 12, 24)
+BATCH = Effort(16, 12, 24)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,9 +33,9 @@ from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.rewriting import rewritten
 from mechdesign.study.schema.reliability import Clearance, Dimension, ReliabilitySection
 from mechdesign.study.text.document import plain
+from mechdesign.study.variants import rewritten
 
 # How often a target is corrected, and the failures that the study's own samples must show to confirm one.
 _ROUNDS = 5

@@ -24,7 +24,7 @@ from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MOST, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Reason
-from mechdesign.memory import keep_freed_memory
+from mechdesign.parallel import keep_freed_memory
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study

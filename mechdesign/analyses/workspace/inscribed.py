@@ -26,8 +26,9 @@ CELLS, TRIALS = 96, 4
 # Places of a border that are always looked at, those of rectangles at its corners, too; and those added beside each of
 # the lowest at which a margin is smallest.
 PLACES, CONTACTS, CLOSER = 64, 12, np.linspace(-1, 1, 9)
-# Rounds of growing, how far one may move (parts of the region's size), and how far a border may lie outside.
-ROUNDS, LEAP, DEPTH = 24, 0.06, 1e-9
+# Rounds of growing, how far one may move (parts of the region's size); what a border may lie outside and a round may
+# still gain at the end, and how far it may lie outside after all rounds.
+ROUNDS, LEAP, DEPTH, LATE = 24, 0.06, 1e-9, 1e-7
 # A curve shorter than this part of the longest is a point; a trial not nearly as good as the best so far is left.
 POINT, HOPEFUL = 1e-6, 0.8
 # Step of differences, as a part of the size; a margin whose slope is less than this part of it is far from zero.
@@ -82,7 +83,7 @@ def inscribed(
     met = (np.stack([every.real - corner.real, every.imag - corner.imag]) / cell[:, None]).astype(int)
     free[tuple(np.clip(met + 1, 1, CELLS - 2))] = False
     # What is negative nowhere (the length of a leg) is no border.
-    borders = ~inside.all(axis=1)
+    borders = np.array(~inside.all(axis=1), dtype=bool)
     borders[[*(margin for _, margin in ends), *range(len(field.labels), len(borders))]] = True
 
     def grown(border: Border, value: Size, start: Floats) -> Floats:
@@ -128,7 +129,7 @@ def _discs(free: Flags, cell: Floats) -> list[tuple[int, int, float]]:
 
     far = distance_transform_edt(np.pad(free, 1), sampling=tuple(cell))[1:-1, 1:-1]
     column, row = np.arange(CELLS)[:, None] * cell[0], np.arange(CELLS) * cell[1]
-    found = []
+    found: list[tuple[int, int, float]] = []
     while len(found) < TRIALS and far.any():
         i, j = (int(k) for k in np.unravel_index(int(np.argmax(far)), far.shape))
         found.append((i, j, float(far[i, j])))
@@ -194,7 +195,8 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
     def with_slopes(z: Complexes) -> tuple[Floats, Complexes]:
         """Margins, and their slopes along x and y as one number."""
         around = margins(z[:, None] + STEP * np.array([0, 1, -1, 1j, -1j]))
-        return around[..., 0], (around[..., 1] - around[..., 2] + 1j * (around[..., 3] - around[..., 4])) / (2 * STEP)
+        x, y = around[..., 1] - around[..., 2], around[..., 3] - around[..., 4]
+        return around[..., 0], np.asarray((x + 1j * y) / (2 * STEP))
 
     def constraints(places: Floats, which: Flags, steep: Floats) -> dict[str, Any]:
         """Margins at places of the border, each divided by its slope as it is now."""
@@ -212,19 +214,21 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
         return {"type": "ineq", "fun": values, "jac": slopes}
 
     uniform = np.arange(PLACES) / PLACES
-    places, width, gain = uniform, 1 / PLACES, 1.0
-    for _ in range(ROUNDS):
+    inwards = np.array([0, 0, -1.0] if len(p) == 3 else [1.0, -1, 1, -1])
+    places, met, width, gain = uniform, uniform[:0], 1 / PLACES, 1.0
+    for number in range(ROUNDS + 1):
         value, slope = with_slopes(p @ border(places))
         steep = np.abs(slope)
         # Where a margin is unknown another is negative; one that does not change is no border.
         known = np.isfinite(steep) & (steep > FLAT * np.abs(value))
         distance = np.where(known, value / np.where(known, steep, 1.0), 1.0)
-        if max(gain, width**2, -distance.min()) < DEPTH:
-            return p
+        if max(gain, width**2, -distance.min()) < DEPTH or number == ROUNDS:
+            break
         which = distance < 3 * LEAP
-        # In steps of some cells, since only what is near is looked at.
+        # From inside, and in steps of some cells, since only what is near is looked at.
+        start = p + max(-distance.min(), 0.0) * inwards
         found = minimize(
-            lambda q: -size(q)[0], p, jac=lambda q: -size(q)[1], method="SLSQP",
+            lambda q: -size(q)[0], start, jac=lambda q: -size(q)[1], method="SLSQP",
             bounds=[(v - LEAP, v + LEAP) for v in p], constraints=constraints(places, which, steep[which]),
             options={"ftol": 1e-14, "maxiter": 60},
         ).x  # fmt: skip
@@ -234,6 +238,7 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
         low = (distance <= np.roll(distance, 1, axis=1)) & (distance < np.roll(distance, -1, axis=1))
         lowest = np.argsort(np.where(low, distance, np.inf).min(axis=0))[:CONTACTS]
         closer = places[lowest][:, None] + width * CLOSER
-        width = min(1 / PLACES, max(width / 3, min(4 * move, width)))
-        places = np.unique(np.concatenate([uniform, closer.ravel() % 1.0]))
-    return None
+        width = min(1 / PLACES, max(width / 3, 4 * move))
+        met = np.concatenate([met, places[lowest]])
+        places = np.unique(np.concatenate([uniform, met, closer.ravel() % 1.0]))
+    return p if distance.min() > -LATE else None

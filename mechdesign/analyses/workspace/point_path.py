@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from mechdesign.analyses.columns import shared
-from mechdesign.analyses.kinematics.boundaries import Boundary, boundaries
+from mechdesign.analyses.kinematics.boundaries import boundaries
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.mechanism.margins import SweepMargins
@@ -21,9 +21,8 @@ from mechdesign.study import Study
 
 # Poses in which the motion is looked for, a turn; rows of the table of one path.
 POSES, ROWS = 720, 361
-# Gauss nodes of the arc length: doubled from the first to the last until two agree to the tolerance.
-FIRST, LAST = 16, 2048
-TOLERANCE = 1e-11
+# Gauss nodes of the arc length between two rows; that of the second rule tells the error.
+NODES, FEWER = 8, 6
 # The rows of a path end this far (as a part of it) before a singularity, where rates are infinite.
 INSET = 1e-9
 # A speed ratio this many times the usual one is infinite.
@@ -31,29 +30,25 @@ ENDLESS = 1e7
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """One motion: the drive's range (radians or length), what ends it (None where it closes), and whether it does."""
-
-    low: float
-    high: float
-    ends: tuple[str, str]
-    closed: bool
-
-
-@dataclass(frozen=True, eq=False)
 class _Path:
-    """A point as a function of the place t in [0, pi] along a piece; the drive is low + (high - low)(1 - cos t)/2.
+    """A point as a function of the place t in [0, pi] along one motion, of which the drive is (radians or length)
+
+        low + (high - low) (1 - cos t)/2
 
     Where the drive turns back (a dead centre) the point moves as the root of what is left of the range: smooth in t.
+    `ends` says what ends the motion.
     """
 
     margins: SweepMargins
     outputs: tuple[str, str]
-    piece: Piece
+    low: float
+    high: float
+    ends: tuple[str, str] = ("", "")
+    closed: bool = False
 
     def drive(self, t: Floats) -> Floats:
         t = np.clip(t, INSET, np.pi - INSET)
-        return self.piece.low + (self.piece.high - self.piece.low) * np.sin(t / 2) ** 2
+        return self.low + (self.high - self.low) * np.sin(t / 2) ** 2
 
     def of(self, t: Floats) -> tuple[Floats, Floats]:
         """Place (2, n), and its slope by the drive (2, n)."""
@@ -68,7 +63,7 @@ class _Path:
     def speed(self, t: Floats) -> Floats:
         """Slope of the place by t."""
         t = np.clip(t, INSET, np.pi - INSET)
-        return self.of(t)[1] * (0.5 * (self.piece.high - self.piece.low) * np.sin(t))
+        return self.of(t)[1] * (0.5 * (self.high - self.low) * np.sin(t))
 
 
 def point_path(study: Study) -> Result:
@@ -84,48 +79,51 @@ def point_path(study: Study) -> Result:
     assert study.workspace is not None
     (drive,) = study.mechanism.drives
     outputs = (f"{study.workspace.point}.x", f"{study.workspace.point}.y")
-    margins, pieces = _pieces(study, drive)
-    paths = [_Path(margins, outputs, piece) for piece in pieces]
+    paths = _paths(study, drive, outputs)
     label, length = study.units.label(study.mechanism.quantity(drive)), study.units.label("length")
     power = "" if study.mechanism.quantity(drive) == "length" else length
+    coordinate, t = study.mechanism.coordinate(drive), np.linspace(0, np.pi, ROWS)
 
-    def shown(values: Floats) -> Floats:
-        return np.asarray(in_study_units(study, margins.coordinate, values))
+    def shown(values: Sequence[float] | Floats) -> Floats:
+        return np.asarray(in_study_units(study, coordinate, np.asarray(values)))
 
-    turns = [_turns(path) for path in paths]
-    arcs = [_length(path, np.concatenate(at)) for path, at in zip(paths, turns, strict=True)]
-    boxes = [_box(path, at) for path, at in zip(paths, turns, strict=True)]
     rows: list[list[Floats]] = []
+    totals: list[list[float]] = []
     for k, path in enumerate(paths):
-        t = np.linspace(0, np.pi, ROWS)
         place, slope = path.of(t)
         ratio = np.hypot(*slope)
         # At a dead centre the point moves and the drive does not; rounding leaves a large number of it.
         ratio = np.where(ratio < ENDLESS * np.nanmedian(ratio), ratio, np.inf) if ratio.any() else ratio
+        turns = _turns(path, t)
+        arc, error = _along(path, np.concatenate(turns), t)
+        box = [path.of(np.concatenate([t[[0, -1]], at]))[0][axis] for axis, at in enumerate(turns)]
         with np.errstate(divide="ignore"):
-            inverse = 1 / ratio
-        rows.append(
-            [np.full(ROWS, k), path.drive(t), *place, ratio, inverse, _along(path, np.concatenate(turns[k]), t)]
-        )
+            rows.append([np.full(ROWS, k), path.drive(t), *place, ratio, 1 / ratio, arc])
+        totals.append([
+            arc[-1], error, *(side.min() for side in box), *(np.ptp(side) for side in box),
+            arc[-1] / (path.high - path.low), ratio.min(), ratio.max(),
+        ])  # fmt: skip
     piece, at, x, y, ratio, inverse, arc = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-    means = np.array([arc / (p.high - p.low) for (arc, _), p in zip(arcs, pieces, strict=True)])
-    ends = [p.ends for p in pieces]
-    indices = (
-        Column("from", shown(np.array([p.low for p in pieces])), label, f"{drive} where the motion begins"),
-        Column("to", shown(np.array([p.high for p in pieces])), label, f"{drive} where it ends"),
-        Column("from_at", np.array([e[0] for e in ends], dtype=str), "", "what ends the motion there"),
-        Column("to_at", np.array([e[1] for e in ends], dtype=str), "", "what ends the motion there"),
-        Column("closed", np.array([p.closed for p in pieces]), "", "1 where the path closes after a turn"),
-        Column("length", np.array([a for a, _ in arcs]), length, "length of the path"),
-        Column("length_error", np.array([e for _, e in arcs]), length, "estimated error of length"),
-        Column("box_x", np.array([b[0] for b in boxes]), length, "left side of the rectangle around the path"),
-        Column("box_y", np.array([b[1] for b in boxes]), length, "lower side of the rectangle around the path"),
-        Column("box_width", np.array([b[2] for b in boxes]), length, "width of the rectangle around the path"),
-        Column("box_height", np.array([b[3] for b in boxes]), length, "height of the rectangle around the path"),
-        Column("speed_ratio_mean", means, power, "length of the path over the drive's travel"),
-        Column("speed_ratio_min", np.array([r[4].min() for r in rows]), power, "smallest speed ratio of the rows"),
-        Column("speed_ratio_max", np.array([r[4].max() for r in rows]), power, "largest speed ratio of the rows"),
+    told = (
+        ("length", length, "length of the path"),
+        ("length_error", length, "estimated error of length"),
+        ("box_x", length, "left side of the rectangle around the path"),
+        ("box_y", length, "lower side of the rectangle around the path"),
+        ("box_width", length, "width of the rectangle around the path"),
+        ("box_height", length, "height of the rectangle around the path"),
+        ("speed_ratio_mean", power, "length of the path over the drive's travel"),
+        ("speed_ratio_min", power, "smallest speed ratio of the rows"),
+        ("speed_ratio_max", power, "largest speed ratio of the rows"),
     )
+    indices = (
+        Column("from", shown([path.low for path in paths]), label, f"{drive} where the motion begins"),
+        Column("to", shown([path.high for path in paths]), label, f"{drive} where it ends"),
+        Column("from_at", np.array([path.ends[0] for path in paths]), "", "what ends the motion there"),
+        Column("to_at", np.array([path.ends[1] for path in paths]), "", "what ends the motion there"),
+        Column("closed", np.array([path.closed for path in paths]), "", "1 where the path closes after a turn"),
+        *(Column(name, values, unit, meaning)
+          for (name, unit, meaning), values in zip(told, np.transpose(totals), strict=True)),
+    )  # fmt: skip
     path_columns = (
         Column("piece", piece.astype(int), "", "row of the indices"),
         Column(drive, shown(at), label, "drive"),
@@ -138,20 +136,17 @@ def point_path(study: Study) -> Result:
         Table("indices", indices, "the path as a whole"),
         Table("path", path_columns, "the point's path, from limit to limit of the motion"),
     ]
-    return Result("workspace", {table.name: table for table in tables}, (), {"paths": len(pieces)})
+    return Result("workspace", {table.name: table for table in tables}, (), {"paths": len(paths)})
 
 
-def _pieces(study: Study, drive: str) -> tuple[SweepMargins, list[Piece]]:
+def _paths(study: Study, drive: str, outputs: tuple[str, str]) -> list[_Path]:
     """The motions of the mechanism: that of the sketch, or of every range in which it can be assembled."""
     mechanism, unit = study.mechanism, study.units.angle_factor
     coordinate = mechanism.coordinate(drive)
     drawn = float(mechanism.sketch_configuration.value(coordinate))
     turning = coordinate.quantity == "angle"
-    if turning:
-        low, high, number = drawn - 2 * np.pi, drawn + 2 * np.pi, 2 * POSES + 1
-    else:
-        low, high = _range(study, drive)
-        number = POSES + 1
+    low, high = (drawn - 2 * np.pi, drawn + 2 * np.pi) if turning else _range(study, drive)
+    number = (2 if turning else 1) * POSES + 1
     place = np.linspace(low, high, number) / (unit if turning else 1.0)
     # The whole path is wanted, however many turns the limits leave the drive.
     near = {name: np.full(number, value) for name, value in mechanism.drawn_angles().items()}
@@ -161,89 +156,61 @@ def _pieces(study: Study, drive: str) -> tuple[SweepMargins, list[Piece]]:
     if not valid.any() and not ends:
         raise AssemblyError(f"no position of drive {drive} can be assembled within the limits")
     if not ends and turning:
-        return margins, [Piece(drawn - np.pi, drawn + np.pi, ("", ""), True)]
-    pieces = list(_between(margins, ends, low, high, drive))
+        return [_Path(margins, outputs, drawn - np.pi, drawn + np.pi, closed=True)]
+    # Stretches between neighbouring ends whose middle is valid.
+    end = f"end of the range of {drive}"
+    marks = [(low, end), *((end.place, f"{end.cause.kind}: {end.cause.joint}") for end in ends), (high, end)]
+    paths = [
+        _Path(margins, outputs, a, b, (cause_a, cause_b))
+        for (a, cause_a), (b, cause_b) in pairwise(sorted(marks, key=lambda mark: mark[0]))
+        if b - a > INSET * (high - low) and margins.solve(np.array([0.5 * (a + b)])).valid.all()
+    ]
     if turning:
         # Once round only: each is met twice.
-        pieces = [p for p in pieces if drawn - 2 * np.pi < p.low <= drawn and p.high < drawn + 2 * np.pi]
-    own = [p for p in pieces if p.low <= drawn <= p.high]
+        paths = [p for p in paths if drawn - 2 * np.pi < p.low <= drawn and p.high < drawn + 2 * np.pi]
+    own = [p for p in paths if p.low <= drawn <= p.high]
     wanted = study.workspace is not None and study.workspace.assembly == "same"
-    return margins, own[:1] if own and wanted else pieces
-
-
-def _between(margins: SweepMargins, ends: list[Boundary], low: float, high: float, drive: str) -> Iterator[Piece]:
-    """Stretches between neighbouring ends whose middle is valid."""
-    told = [(end.place, f"{end.cause.kind}: {end.cause.joint}") for end in ends]
-    marks = [(low, f"end of the range of {drive}"), *told, (high, f"end of the range of {drive}")]
-    marks.sort(key=lambda mark: mark[0])
-    for (a, cause_a), (b, cause_b) in pairwise(marks):
-        if b - a > INSET * (high - low) and margins.solve(np.array([0.5 * (a + b)])).valid.all():
-            yield Piece(a, b, (cause_a, cause_b), False)
+    return own[:1] if own and wanted else paths
 
 
 def _range(study: Study, drive: str) -> tuple[float, float]:
     """The limits of a drive that is no angle."""
-    terms = study.mechanism.nominal
-
-    def number(term: float | str | None) -> float | None:
-        return terms[term] if isinstance(term, str) else term
-
+    sizes = study.mechanism.nominal
     bounds = [b for b in study.mechanism.bounds if b.coordinate.name == drive]
-    lows = [v for b in bounds if (v := number(b.minimum)) is not None]
-    highs = [v for b in bounds if (v := number(b.maximum)) is not None]
+    lows, highs = (
+        [sizes[term] if isinstance(term, str) else term for term in terms if term is not None]
+        for terms in ([b.minimum for b in bounds], [b.maximum for b in bounds])
+    )
     if not lows or not highs:
         message = f"the path of a point needs the range of drive {drive}: give it limits, {{drive: {drive}, min, max}}"
         raise StudyError((Problem(message, "mechanism.limits", str(study.path or "")),))
     return max(lows), min(highs)
 
 
-def _turns(path: _Path) -> tuple[Floats, Floats]:
+def _turns(path: _Path, t: Floats) -> list[Floats]:
     """Places where the velocity is along an axis: those where it is along y, and along x."""
-    t = np.linspace(0, np.pi, ROWS)
-    speed = path.speed(t)
     found = []
-    for axis in (0, 1):
-        cell = np.flatnonzero(speed[axis, 1:] * speed[axis, :-1] < 0)
+    for axis, speed in enumerate(path.speed(t)):
+        cell = np.flatnonzero(speed[1:] * speed[:-1] < 0)
 
         def slope(which: Ints, at: Floats, axis: int = axis) -> Floats:
             part: Floats = path.speed(at)[axis]
             return part
 
         nan = np.full(len(cell), np.nan)
-        ends = (t[cell], speed[axis, cell], t[cell + 1], speed[axis, cell + 1])
-        found.append(bracketed_roots(slope, *ends, nan, nan, np.full(len(cell), 1e-13)) if len(cell) else nan)
-    return found[0], found[1]
+        ends = (t[cell], speed[cell], t[cell + 1], speed[cell + 1])
+        found.append(bracketed_roots(slope, *ends, nan, nan, np.full(len(cell), 1e-13)))
+    return found
 
 
-def _length(path: _Path, turns: Floats) -> tuple[float, float]:
-    """Length of a path and its error, by Gauss-Legendre rules of doubled order between the turns: it may go back."""
-    total = doubt = 0.0
-    for low, high in pairwise([0.0, *np.unique(turns).tolist(), np.pi]):
-        number, before, error = FIRST, np.inf, np.inf
-        while True:
-            nodes, weights = np.polynomial.legendre.leggauss(number)
-            speed = np.hypot(*path.speed(low + 0.5 * (high - low) * (nodes + 1)))
-            value = float(weights @ speed) * 0.5 * (high - low)
-            error = abs(value - before)
-            if error <= TOLERANCE * abs(value) or number >= LAST:
-                break
-            number, before = 2 * number, value
-        total, doubt = total + value, doubt + error
-    return total, doubt
-
-
-def _along(path: _Path, turns: Floats, t: Floats) -> Floats:
-    """Length up to each place."""
-    nodes, weights = np.polynomial.legendre.leggauss(8)
+def _along(path: _Path, turns: Floats, t: Floats) -> tuple[Floats, float]:
+    """Length up to each place, and the error of the whole; at the turns the point may go back."""
     every = np.unique(np.concatenate([t, turns]))
     half = 0.5 * np.diff(every)
-    at = (every[:-1] + half)[:, None] + half[:, None] * nodes
-    parts = (np.hypot(*path.speed(at.ravel())).reshape(at.shape) @ weights) * half
-    return np.concatenate([[0.0], np.cumsum(parts)])[np.searchsorted(every, t)]
-
-
-def _box(path: _Path, turns: tuple[Floats, Floats]) -> tuple[float, float, float, float]:
-    """Left and lower side, width and height of the rectangle around a path."""
-    ends = np.array([0.0, np.pi])
-    x, y = (path.of(np.concatenate([ends, at]))[0][axis] for axis, at in enumerate(turns))
-    return float(x.min()), float(y.min()), float(np.ptp(x)), float(np.ptp(y))
+    parts = []
+    for number in (NODES, FEWER):
+        nodes, weights = np.polynomial.legendre.leggauss(number)
+        at = (every[:-1] + half)[:, None] + half[:, None] * nodes
+        parts.append((np.hypot(*path.speed(at.ravel())).reshape(at.shape) @ weights) * half)
+    arc = np.concatenate([[0.0], np.cumsum(parts[0])])[np.searchsorted(every, t)]
+    return arc, float(np.abs(parts[0] - parts[1]).sum())

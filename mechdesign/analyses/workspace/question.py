@@ -17,8 +17,8 @@ from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
 from mechdesign.indices import INDEX_NAMES, USUAL, needed_section
-from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.parallel import keep_freed_memory
 from mechdesign.study import Study
 
 SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
@@ -47,6 +47,8 @@ class Question(Region):
         Local indices: those that the study asks for, and what `wanted` needs.
     wanted : tuple of str
         Columns of the answer.
+    rays_through : type of Designs
+        How rays meet the region of the field.
     """
 
     counted: tuple[float, float]
@@ -55,6 +57,7 @@ class Question(Region):
     nodes: int | None
     indices: tuple[Prepared, ...]
     wanted: tuple[str, ...]
+    rays_through: type[Designs] = Designs
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +140,7 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
         If a region has no end.
     """
     keep_freed_memory()
-    designs = Designs(question.field, places, count, question.about)
+    designs = question.rays_through(question.field, places, count, question.about)
     cuts = tuple(sorted(set(question.counted) - set(question.scan)))
     panels = find_panels(designs, question.scan, effort, cuts)
     pieces = None
@@ -194,9 +197,9 @@ def areas_of_pieces(question: Question, given: Evaluation, effort: Effort) -> li
     assert given.pieces is not None
     if given.pieces.number[0] == 1 and "area" in given.values:
         return [float(given.values["area"][0])]
-    none = np.zeros((0, 1), dtype=bool)
+    none, whole = np.zeros((0, 1), dtype=bool), float(given.values["area"][0])
     return [
-        float(integrate(*part, AREA_TOLERANCE, effort.samples, question.scan, (), none).area[0])
+        float(integrate(*part, question.tolerance, effort.samples, question.scan, (), none, whole).area[0])
         for part in given.pieces.all()
     ]
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,41 +56,43 @@ def stacked(parts: Sequence[Sequence[Column]]) -> tuple[Column, ...]:
     )
 
 
-def boundary_columns(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
-    """Points of the boundary curve by curve: what ends the region there, and the drives."""
-    field, told = question.field, causes(question.field)
+def boundary_columns(
+    study: Study, question: Question, found: Sequence[Patch], told: Sequence[str],
+    also: Callable[[Complexes, Complexes, Floats, Ints], Iterable[Column]],
+) -> list[Column]:  # fmt: skip
+    """Points of the boundary curve by curve, and what ends the region there.
+
+    Parameters
+    ----------
+    told : sequence of str
+        Each margin in words.
+    also : callable
+        Further columns, of points of the boundary, points beside them inside the region, the directions in which those
+        lie (1 outwards, -1 inwards), and margins.
+    """
     curves = [
         (patch.theta, radius, margin, side, patch.piece)
-        for side, names in (("inner", ("inner", "enters")), ("outer", ("outer", "leaves")))
+        for side in ("inner", "outer")
         for patch in found
-        for radius, margin in [(getattr(patch, names[0]), getattr(patch, names[1]))]
+        for radius, margin in [(patch.inner, patch.enters) if side == "inner" else (patch.outer, patch.leaves)]
         if margin >= 0
     ]
-    theta = np.concatenate([curve[0] for curve in curves])
-    radius = np.concatenate([curve[1] for curve in curves])
     lengths = [len(curve[0]) for curve in curves]
-    z = np.asarray(question.about + radius * np.exp(1j * theta))
-    inwards = np.concatenate([np.full(n, 1.0 if curve[3] == "inner" else -1.0)
-                              for n, curve in zip(lengths, curves, strict=True)])  # fmt: skip
-    within = np.asarray(question.about + radius * (1 + BESIDE * inwards) * np.exp(1j * theta))
-    drives = _drives(question, z, within, np.flatnonzero(np.diff(inwards)) + 1)
-    kinds = [field.labels[curve[2]][0] for curve in curves]
-    columns = [
-        *held_columns(study, question, len(z)),
-        *shared(study.units, x=z.real, y=z.imag, kind=np.repeat(kinds, lengths)),
-    ]
-    for drive, value in zip(field.mechanism.forward.structure.given, drives, strict=True):
-        shown = np.asarray(in_study_units(study, drive, value))
-        columns.append(Column(drive.name, shown, study.units.label(drive.quantity), "drive's value there"))
+    theta, radius = (np.concatenate([curve[k] for curve in curves]) for k in (0, 1))
+    margin, side, piece = (np.repeat([curve[k] for curve in curves], lengths) for k in (2, 3, 4))
+    inwards, turn = np.where(side == "inner", 1.0, -1.0), np.exp(1j * theta)
+    z = np.asarray(question.about + radius * turn)
+    within = np.asarray(question.about + radius * (1 + BESIDE * inwards) * turn)
+    angle = study.units.label("angle")
+    kinds = np.array([kind for kind, _ in question.field.labels])
     return [
-        *columns,
-        *shared(study.units, at=np.repeat([told[curve[2]][1] for curve in curves], lengths)),
-        Column("theta", theta / study.units.angle_factor, study.units.label("angle"),
-               "angle of the ray about the centre of the scan"),
-        *shared(study.units, side=np.repeat([curve[3] for curve in curves], lengths),
-                curve=np.repeat(np.arange(len(curves)), lengths),
-                piece=np.repeat([curve[4] for curve in curves], lengths)),
-    ]  # fmt: skip
+        *held_columns(study, question, len(z)),
+        *shared(study.units, x=z.real, y=z.imag, kind=kinds[margin]),
+        *also(z, within, inwards, margin),
+        *shared(study.units, at=np.array(told)[margin]),
+        Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
+        *shared(study.units, side=side, curve=np.repeat(np.arange(len(curves)), lengths), piece=piece),
+    ]
 
 
 def piece_columns(
@@ -145,23 +148,27 @@ def inscribed_columns(study: Study, shapes: Sequence[Floats]) -> list[Column]:
 
 def outlines(regions: Sequence[tuple[Study, Question, Sequence[Patch]]]) -> list[Table]:
     """Boundary and singularities of several regions."""
+    boundaries = [
+        boundary_columns(*region, [words for _, words in causes(region[1].field)], partial(_drives, *region[:2]))
+        for region in regions
+    ]
     return [
-        Table("boundary", stacked([boundary_columns(*region) for region in regions]),
-              "boundary of the region, curve by curve"),
+        Table("boundary", stacked(boundaries), "boundary of the region, curve by curve"),
         Table("singularities", stacked([singularity_columns(*region) for region in regions]),
               "curves of singularities inside the region and around it"),
     ]  # fmt: skip
 
 
-def _drives(question: Question, z: Complexes, within: Complexes, sides: Ints) -> list[Floats]:
+def _drives(
+    study: Study, question: Question, z: Complexes, within: Complexes, inwards: Floats, margin: Ints
+) -> Iterator[Column]:
     """Drives on the boundary, or just inside where rounding opens the mechanism.
 
     Angles lie within the drive's limits; where it has none they are continuous along each side, in the turn that is
     nearest to the sketch.
     """
-    mechanism = question.field.mechanism
+    mechanism, sides = question.field.mechanism, np.flatnonzero(np.diff(inwards)) + 1
     exact, near = question.field.configuration(z, {}), question.field.configuration(within, {})
-    found = []
     for drive in mechanism.forward.structure.given:
         here, beside = (np.broadcast_to(c.value(drive), z.shape) for c in (exact, near))
         values = np.where(np.isfinite(here), here, beside)
@@ -170,5 +177,5 @@ def _drives(question: Question, z: Complexes, within: Complexes, sides: Ints) ->
             parts = [np.unwrap(part) for part in np.split(values, sides)]
             turns = [2 * np.pi * np.round((np.mean(part) - drawn) / (2 * np.pi)) for part in parts]
             values = np.concatenate([part - turn for part, turn in zip(parts, turns, strict=True)])
-        found.append(values)
-    return found
+        shown = np.asarray(in_study_units(study, drive, values))
+        yield Column(drive.name, shown, study.units.label(drive.quantity), "drive's value there")
