@@ -94,8 +94,8 @@ def forward_plan(mechanism: Mechanism, configuration: Configuration) -> Plan:
             found = Plan(mechanism, forward.structure, modes).solve(drives, start=configuration, limits=False)
             errors[mode] = sum(abs(found.rotations[k] - configuration.rotations[k]) for k in group.angles)
             errors[mode] += sum(abs(found.slides[k] - configuration.slides[k]) for k in group.slides)
-        # A pose that is not found is as far as can be.
-        modes[index] = min(errors, key=lambda mode: np.nan_to_num(errors[mode], nan=np.inf), default=modes[index])
+        # A pose that is not found (nan) is as far as can be.
+        modes[index] = min(errors, key=lambda mode: (np.isnan(errors[mode]), errors[mode]), default=modes[index])
     return forward if tuple(modes) == forward.modes else Plan(mechanism, forward.structure, modes)
 
 
