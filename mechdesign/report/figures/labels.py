@@ -119,7 +119,7 @@ def covered(axes: Axes) -> Floats:
         path, moved = artist.get_path(), artist.get_transform()
         dots = isinstance(artist, Line2D) and artist.get_linestyle() == "None"
         pieces = moved.transform(path.vertices)[:, None] if dots else path.to_polygons(moved, closed_only=False)
-        for piece in pieces:
+        for piece in filter(lambda piece: np.isfinite(piece).all(), pieces):
             z = _points(axes, piece) @ np.array([1, 1j])
             low, high = complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
             if artist in filled and abs(high - low) < _SYMBOL:
