@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
+import platform
 import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import cache
 from itertools import islice
 from typing import Any, TypeVar
 
@@ -18,6 +21,10 @@ Value = TypeVar("Value")
 
 # Enough waiting chunks that no thread idles while the consumer works; few, because they are all in memory.
 _LOOK_AHEAD = 3
+# Options of glibc's mallopt, from malloc.h.
+_TRIM_THRESHOLD = -1
+_MMAP_THRESHOLD = -3
+_MEBIBYTE = 2**20
 
 
 def worker_count(jobs: int | None) -> int:
@@ -104,3 +111,17 @@ def _adopt(function: Callable[[Any], Any]) -> None:
 def _call(item: Any) -> Any:
     assert _adopted is not None
     return _adopted(item)
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Let the C library keep up to 256 MiB of freed blocks; does nothing where it is not glibc.
+
+    A chunk's temporaries are of some hundred kilobytes. By default every one of them is mapped anew and returned on
+    release, so that each of its pages faults in its first write: that took half the time of a Monte Carlo run.
+    """
+    if platform.libc_ver()[0] != "glibc":
+        return
+    mallopt = ctypes.CDLL(None).mallopt
+    mallopt(_MMAP_THRESHOLD, 64 * _MEBIBYTE)
+    mallopt(_TRIM_THRESHOLD, 256 * _MEBIBYTE)

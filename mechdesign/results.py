@@ -36,10 +36,6 @@ class Column:
         """Whether it holds numbers or booleans rather than words."""
         return self.values.dtype.kind in "fiub"
 
-    def take(self, rows: NDArray[Any]) -> Column:
-        """The column of some rows, by a mask or by their numbers."""
-        return replace(self, values=np.asarray(self.values)[rows])
-
 
 @dataclass(frozen=True, eq=False)
 class Table:
@@ -78,7 +74,8 @@ class Table:
 
     def take(self, rows: NDArray[Any]) -> Table:
         """The table of some rows, by a mask or by their numbers."""
-        return replace(self, columns=tuple(column.take(rows) for column in self.columns))
+        columns = tuple(replace(column, values=np.asarray(column.values)[rows]) for column in self.columns)
+        return replace(self, columns=columns)
 
     @property
     def names(self) -> tuple[str, ...]:

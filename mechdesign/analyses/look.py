@@ -31,10 +31,6 @@ def look(study: Study, command: str) -> Result:
     MechdesignError
         What the command itself would raise, but where no design of so few is feasible.
     """
-    return ask(_quick(study), command)
-
-
-def _quick(study: Study) -> Study:
     reliability, optimize = study.reliability, study.optimize
     if reliability is not None:
         few = {"samples": SAMPLES, "precision": LOOSE, "sobol": reliability.sobol and SAMPLES}
@@ -42,4 +38,4 @@ def _quick(study: Study) -> Study:
     if optimize is not None:
         method = "search" if optimize.method == "grid" else optimize.method
         optimize = optimize.model_copy(update={"method": method, "evaluations": DESIGNS, "subject_to": ()})
-    return dataclasses.replace(study, reliability=reliability, optimize=optimize)
+    return ask(dataclasses.replace(study, reliability=reliability, optimize=optimize), command)

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from inspect import Parameter, Signature
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from mechdesign.cli import batch
 from mechdesign.cli import options as given
-from mechdesign.cli.execution import BUILT_IN
+from mechdesign.cli.execution import BUILT_IN, ask
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Interrupted, explain
@@ -76,30 +76,12 @@ def _add(name: str, run: Callable[[Any, Options], int], takes: Sequence[Paramete
     app.command(name, short_help=short, help=told)(command)
 
 
-def _ask(question: str, study: Path | None, options: Options) -> int:
-    from mechdesign.cli.execution import ask
-
-    return ask(study, question, options)
-
-
-def _run(studies: Sequence[Path] | None, options: Options) -> int:
-    from mechdesign.cli import batch
-
-    return batch.run(studies or [], options)
-
-
-def _check(studies: Sequence[Path] | None, options: Options) -> int:
-    from mechdesign.cli.checking import check_studies
-
-    return check_studies(studies or [None], options)
-
-
 for _name, _asked in COMMANDS.items():
     _takes = (*given.COMMON, *given.OWN.get(_name, ()))
-    _add(_name, partial(_ask, _name), _takes, _asked.question, f"{_asked.question} {_asked.answer}")
+    _add(_name, partial(ask, _name), _takes, _asked.question, f"{_asked.question} {_asked.answer}")
 _add(
     "run",
-    _run,
+    batch.run,
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.ANIMATE, given.JUNIT, given.FAIL_FAST, given.RESUME,
     ),
@@ -108,7 +90,7 @@ _add(
 )  # fmt: skip
 _add(
     "check",
-    _check,
+    batch.check,
     (given.STUDIES, given.OUT_DRAWINGS, given.OVERRIDES, given.QUIET, given.NO_PLOTS),
     "Validate only: joints, mobility, plan of solution.",
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",

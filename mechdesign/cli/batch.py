@@ -1,8 +1,8 @@
-"""`run`: every question of every study, one summary, and a JUnit report for CI."""
+"""Many studies: `run` answers every question of each, with one summary; `check` says what each says."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,7 +37,7 @@ def questions(study: Study) -> tuple[str, ...]:
 
 
 @one_thread()
-def run(paths: Sequence[Path], options: Options) -> int:
+def run(paths: Sequence[Path] | None, options: Options) -> int:
     """Answer every question of the studies; returns the exit code, the highest of them all.
 
     A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
@@ -61,6 +61,39 @@ def run(paths: Sequence[Path], options: Options) -> int:
     return max(given.exit_code for given in answers)
 
 
+@one_thread()
+def check(paths: Sequence[Path] | None, options: Options) -> int:
+    """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
+    from mechdesign.mechanism.describe import describe
+    from mechdesign.report.requirements import foresee
+    from mechdesign.study.schema.reliability import in_words
+
+    worst = 0
+    owners: dict[str, Path | None] = {}
+    asked: Sequence[Path | None] = paths or [None]
+    for path in asked:
+        try:
+            study = load_study(path, options)
+            label = study.label
+            if not options.quiet:
+                clearances = in_words(study.reliability, study.mechanism.graph)
+                terminal.emit("\n".join([f"{label}: {study.name}", describe(study.mechanism), *clearances, ""]))
+            for warning in study.warnings:
+                terminal.say(f"warning: {warning}", quiet=options.quiet)
+            foresee(study, COMMANDS)
+            if not options.no_plots:
+                from mechdesign.report.writer import write_sketch
+
+                claim(owners, study)
+                directory = folder(study, "check", options, several=len(asked) > 1)
+                terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
+        except Exception as error:
+            code, message = explain(error)
+            terminal.say(message)
+            worst = max(worst, code)
+    return worst
+
+
 def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome]:
     """Answers of all studies in order; every study is read before the first is computed."""
     studies: list[Study] = []
@@ -79,17 +112,13 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome
             continue
         root = folder(study, "", options, several=len(paths) > 1)
         for command in questions(study):
-            yield _ask(study, command, root / command, options)
-
-
-def _ask(study: Study, command: str, directory: Path, options: Options) -> Outcome:
-    label = study.label
-    try:
-        given = answer(study, command, directory, options)
-    except Exception as error:
-        return _failure(label, command, directory, error)
-    tell(given, options)
-    return given
+            try:
+                given = answer(study, command, root / command, options)
+            except Exception as error:
+                yield _failure(label, command, root / command, error)
+            else:
+                tell(given, options)
+                yield given
 
 
 def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
@@ -103,25 +132,21 @@ def _summary(answers: Sequence[Outcome]) -> Table:
 
     from mechdesign.results import Column, Table
 
-    answers = [given for given in answers if given.command]
-
-    def words(values: list[str]) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
-        return np.array(values, dtype=np.str_)
-
     def met(given: Outcome) -> str:
         return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
 
-    return Table(
-        "summary",
-        (
-            Column("study", words([given.study for given in answers])),
-            Column("command", words([given.command for given in answers])),
-            Column("outcome", words([_OUTCOMES[given.exit_code] + " (kept)" * given.kept for given in answers])),
-            Column("exit_code", np.array([given.exit_code for given in answers], dtype=int)),
-            Column("requirements", words([met(given) for given in answers])),
-            Column("rows", np.array([given.rows for given in answers], dtype=int)),
-            Column("warnings", np.array([len(given.warnings) for given in answers], dtype=int)),
-            Column("directory", words([str(given.directory) if given.rows else "" for given in answers])),
-        ),
-        meaning="what became of each question",
+    told: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
+        "study": (str, lambda given: given.study),
+        "command": (str, lambda given: given.command),
+        "outcome": (str, lambda given: _OUTCOMES[given.exit_code] + " (kept)" * given.kept),
+        "exit_code": (int, lambda given: given.exit_code),
+        "requirements": (str, met),
+        "rows": (int, lambda given: given.rows),
+        "warnings": (int, lambda given: len(given.warnings)),
+        "directory": (str, lambda given: str(given.directory) if given.rows else ""),
+    }
+    columns = (
+        Column(name, np.array([tell_of(given) for given in answers if given.command], dtype=kind))
+        for name, (kind, tell_of) in told.items()
     )
+    return Table("summary", tuple(columns), meaning="what became of each question")

@@ -215,7 +215,7 @@ def tell(given: Outcome, options: Options) -> None:
 
 
 @one_thread()
-def ask(path: Path | None, command: str, options: Options) -> int:
+def ask(command: str, path: Path | None, options: Options) -> int:
     """One command from end to end; returns its exit code."""
     study = load_study(path, options)
     directory = folder(study, command, options)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from mechdesign.numerics.arrays import Complexes, Floats
 
 # Poses of a sweep for the range in which a mechanism closes, and halvings of its ends.
 SWEEP, HALVINGS = 721, 40
+# What mends most groups that do not close.
+LENGTHS = "check the lengths"
 
 
 def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
@@ -113,88 +116,62 @@ def open_group(state: State, gaps: Complexes) -> tuple[str, str]:
     for group in state.structure.groups:
         if group.form == "newton":
             if not np.all(next(converged)):
-                return _newton(state, group, gaps), "check the lengths"
+                return _newton(state, group, gaps), LENGTHS
             continue
         unknown = [state.rotations[root] for root in group.angles] + [state.slides[slide] for slide in group.slides]
         if not all(value is not None and np.isfinite(value) for value in unknown):
             return _dyad(state, group)
     for slide in sorted(state.graph.telescopic):
         if not float(np.real(state.slides[slide])) > 0:
-            return f"leg '{state.graph.slides[slide]}' has no positive length", "check the lengths"
-    return "a given coordinate cannot have its value", "check the lengths"
-
-
-class _Walk:
-    """The loop of a dyad cut into the parts that move as one: per unknown root its vector, links and end nodes."""
-
-    def __init__(self, state: State, group: Group) -> None:
-        (loop,) = group.loops
-        structure = state.structure
-        self.known, self.vector, self.direction = loop_vectors(state, group)
-        self.ends: dict[int, list[int]] = {root: [] for root in group.angles}
-        self.links: dict[int, list[str]] = {root: [] for root in group.angles}
-        self.slide_ends: dict[int, tuple[int, int]] = {}
-        for k, _ in loop.edges:
-            edge = structure.edges[k]
-            root = structure.ties[edge.frame].root
-            slides = edge.slide is not None and edge.slide in group.slides
-            if root in self.links and edge.locals:
-                self.links[root].append(edge.locals[0][1].removesuffix(":rod"))
-            if slides and edge.slide is not None:
-                self.slide_ends[edge.slide] = (edge.tail, edge.head)
-            elif root in self.ends:
-                for node in (edge.tail, edge.head):
-                    ends = self.ends[root]
-                    ends.remove(node) if node in ends else ends.append(node)
-        self.names = state.graph.nodes
-
-    def link(self, root: int) -> str:
-        """Links of a root, with the distance of the joints that they hold apart."""
-        links = "-".join(dict.fromkeys(self.links[root])) or "a given distance"
-        return f"{links} ({abs(self.vector[root]):.5g})"
-
-    def points(self, nodes: Sequence[int]) -> str:
-        return " and ".join(self.names[node] for node in nodes if ":" not in self.names[node])
+            return f"leg '{state.graph.slides[slide]}' has no positive length", LENGTHS
+    return "a given coordinate cannot have its value", LENGTHS
 
 
 def _dyad(state: State, group: Group) -> tuple[str, str]:
-    walk = _Walk(state, group)
+    graph, edges, slides = state.graph, state.structure.edges, [state.graph.slides[slide] for slide in group.slides]
     if group.form == "two slides":
-        one, two = (f"'{state.graph.slides[slide]}'" for slide in group.slides)
-        return f"the slides {one} and {two} are parallel, which holds nothing along them", "change a direction"
-    for root, z in walk.vector.items():
+        one, two = slides
+        return f"the slides '{one}' and '{two}' are parallel, which holds nothing along them", "change a direction"
+    known, vectors, directions = loop_vectors(state, group)
+    # By the angle that they turn with: links with the distance of the joints that they hold apart, and these joints.
+    links: dict[int, str] = {}
+    ends: dict[int, list[int]] = {}
+    for root, z in vectors.items():
+        own = [edges[k] for k in group.edges if state.structure.ties[edges[k].frame].root == root]
+        names = dict.fromkeys(edge.locals[0][1].removesuffix(":rod") for edge in own if edge.locals)
+        links[root] = f"{'-'.join(names) or 'a given distance'} ({abs(z):.5g})"
+        nodes = Counter(n for edge in own if edge.slide not in group.slides for n in (edge.tail, edge.head))
+        ends[root] = [node for node, count in nodes.items() if count % 2]
         if z == 0 and group.form != "angle and turning slide":
-            return f"the joints on link {walk.link(root)} are at one place", "put them apart"
-    tell = {"two angles": _two_links, "angle and fixed slide": _link_and_slide}.get(group.form, _turning_slide)
-    return tell(state, group, walk), "check the lengths"
+            return f"the joints on link {links[root]} are at one place", "put them apart"
 
+    def points(nodes: Iterable[int]) -> str:
+        return " and ".join(graph.nodes[node] for node in nodes if ":" not in graph.nodes[node])
 
-def _two_links(state: State, group: Group, walk: _Walk) -> str:
-    first, second = group.angles
-    inner = [node for node in walk.ends[first] if node in walk.ends[second]]
-    outer = [node for root in group.angles for node in walk.ends[root] if node not in inner]
-    gap, long, short = abs(walk.known), *sorted((abs(z) for z in walk.vector.values()), reverse=True)
-    at = f" at {walk.points(inner)}" if len(inner) == 1 else ""
-    apart = f"{walk.points(outer)} are {gap:.5g} apart" if len(outer) == 2 else f"they have to span {gap:.5g}"
-    limit = f"reach only {long + short:.5g}" if gap > long else f"span no less than {long - short:.5g}"
-    return f"links {walk.link(first)} and {walk.link(second)} cannot meet{at}: {apart}, the links {limit}"
-
-
-def _link_and_slide(state: State, group: Group, walk: _Walk) -> str:
-    (root,), (slide,) = group.angles, group.slides
-    off = abs(cross(walk.direction[slide], walk.known))
-    pins = [node for node in walk.ends[root] if node not in walk.slide_ends[slide]] or walk.ends[root]
-    line = f"the line of '{state.graph.slides[slide]}' passes {walk.points(pins[:1])} at a distance of {off:.5g}"
-    return f"link {walk.link(root)} is too short to reach its slide: {line}"
-
-
-def _turning_slide(state: State, group: Group, walk: _Walk) -> str:
-    (root,), (slide,) = group.angles, group.slides
-    off = abs(cross(walk.direction[slide], walk.vector[root]))
-    joints = walk.points(list(dict.fromkeys((group.loops[0].start, group.loops[0].end))))
-    apart = f"its joints{f' {joints}' if joints else ''} are {abs(walk.known):.5g} apart"
-    held = f"nearer than the {off:.5g} that its links hold them off the line"
-    return f"slide '{state.graph.slides[slide]}' cannot close: {apart}, {held}"
+    gap = abs(known)
+    if group.form == "two angles":
+        (one, two), (first, second) = links.values(), ends.values()
+        inner = [node for node in first if node in second]
+        outer = [node for node in (*first, *second) if node not in inner]
+        long, short = sorted((abs(z) for z in vectors.values()), reverse=True)
+        at = f" at {points(inner)}" if len(inner) == 1 else ""
+        apart = f"{points(outer)} are {gap:.5g} apart" if len(outer) == 2 else f"they have to span {gap:.5g}"
+        limit = f"reach only {long + short:.5g}" if gap > long else f"span no less than {long - short:.5g}"
+        return f"links {one} and {two} cannot meet{at}: {apart}, the links {limit}", LENGTHS
+    (root,), (slide,), (name,) = group.angles, group.slides, slides
+    if group.form == "angle and fixed slide":
+        on_line = {n for k in group.edges if edges[k].slide == slide for n in (edges[k].tail, edges[k].head)}
+        pins = [node for node in ends[root] if node not in on_line] or ends[root]
+        off = abs(cross(directions[slide], known))
+        line = f"the line of '{name}' passes {points(pins[:1])} at a distance of {off:.5g}"
+        return f"link {links[root]} is too short to reach its slide: {line}", LENGTHS
+    off = abs(cross(directions[slide], vectors[root]))
+    joints = points(dict.fromkeys((group.loops[0].start, group.loops[0].end)))
+    apart = f"its joints{f' {joints}' if joints else ''} are {gap:.5g} apart"
+    return (
+        f"slide '{name}' cannot close: {apart}, nearer than the {off:.5g} that its links hold them off the line",
+        LENGTHS,
+    )
 
 
 def _newton(state: State, group: Group, gaps: Complexes) -> str:

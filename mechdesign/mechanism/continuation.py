@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, angle_of, wrap
-from mechdesign.mechanism.newton import STEPS
-from mechdesign.mechanism.state import State
+from mechdesign.mechanism.algebra import Value, wrap
+from mechdesign.mechanism.state import STEPS, State
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
@@ -49,18 +48,6 @@ class Start:
 
 # Solves all groups for given values, dimensions and a guess, with a bound of Newton's steps.
 Solver = Callable[[Sequence[Value], Mapping[str, Value], Floats, int], State]
-
-
-def unknowns_of(
-    structure: Structure, rotations: Sequence[Value], slides: Sequence[Value], nodes: Sequence[Value]
-) -> list[Value]:
-    """Unknowns of the Newton groups in a solved pose."""
-    found: list[Value] = []
-    for group in (structure.groups[index] for index in structure.unknowns):
-        found += [angle_of(np.asarray(rotations[root])) for root in group.angles]
-        found += [slides[slide] for slide in group.slides]
-        found += [part for base in group.bases for part in (np.real(nodes[base]), np.imag(nodes[base]))]
-    return found
 
 
 def table_of(unknowns: Sequence[Value], shape: tuple[int, ...]) -> Floats:

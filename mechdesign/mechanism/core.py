@@ -82,15 +82,6 @@ class Bound:
         low, high = self.ends(places)
         return self.coordinate.kind == "expression" or (self.of_angle and bool(np.any(high - low >= TURN)))
 
-    def turn(self, places: Mapping[str, Value]) -> dict[str, Value]:
-        """Value that a drive's angle is told near, so that it lies within its limits; nothing of other limits."""
-        if not self.drive or not self.of_angle:
-            return {}
-        low, high = self.ends(places)
-        # Between limits a turn apart or more every angle has a turn: it is told in the one nearest to zero.
-        middle, room = (low + high) / 2, np.maximum((high - low) / 2 - np.pi, 0.0)
-        return {self.coordinate.name: np.clip(0.0, middle - room, middle + room)}
-
     def ends(self, places: Mapping[str, Value]) -> tuple[Value, Value]:
         """Smallest and largest value where the places have given values; None for a side that is left open."""
         low, high = (places[end] if isinstance(end, str) else end for end in (self.minimum, self.maximum))
@@ -146,7 +137,11 @@ class Core:
         sizes = {**self.nominal, **places} if places else self.nominal
         near: dict[str, Value] = {}
         for bound in self.bounds:
-            near |= bound.turn(sizes)
+            if bound.drive and bound.of_angle:
+                low, high = bound.ends(sizes)
+                # Between limits a turn apart or more every angle has a turn: it is told in the one nearest to zero.
+                middle, room = (low + high) / 2, np.maximum((high - low) / 2 - np.pi, 0.0)
+                near[bound.coordinate.name] = np.clip(0.0, middle - room, middle + room)
         return near
 
     def drawn_angles(self) -> dict[str, float]:

@@ -95,17 +95,24 @@ class Linearization(State):
         structure, offsets = self.structure, offsets or {}
         angles: list[Any] = []
         for tie in structure.ties:
-            turns = [*((sign, given[k]) for sign, k in tie.given), *((s, offsets.get(b, 0.0)) for s, b in tie.offsets)]
-            angles.append(sum((sign * turn for sign, turn in turns), 0.0))
+            total: Value = 0.0
+            for sign, k in tie.given:
+                total = total + sign * given[k]
+            for sign, body in tie.offsets:
+                total = total + sign * offsets.get(body, 0.0)
+            angles.append(total)
         slides: list[Any] = [0.0] * len(self.slides)
         for slide, k in structure.known_slides:
             slides[slide] = given[k]
         nodes: list[Any] = [0.0, *[None] * (len(self.nodes) - 1)]
 
         def step(k: int) -> Value:
-            edge = structure.edges[k]
-            total = plus(rest[k], 1, times(self.edge(k), times(1j, angles[edge.frame])))
-            return total if edge.slide is None else plus(total, 1, times(slides[edge.slide], self.direction(k)))
+            edge, total = structure.edges[k], rest[k]
+            if not _nothing(angles[edge.frame]):
+                total = plus(total, 1, self.edge(k) * (1j * angles[edge.frame]))
+            if edge.slide is not None and not _nothing(slides[edge.slide]):
+                total = plus(total, 1, slides[edge.slide] * self.direction(k))
+            return total
 
         for index, group in enumerate(structure.groups):
             if group.form != "place":
@@ -138,10 +145,14 @@ class Linearization(State):
     def acceleration(self, velocity: Rates, accelerations: Sequence[Value]) -> Rates:
         """Accelerations for given drive accelerations."""
         rest: list[Value] = []
-        for k, (edge, s1) in enumerate(zip(self.structure.edges, self._along(velocity.slides), strict=True)):
+        for k, edge in enumerate(self.structure.edges):
             omega = velocity.angles[edge.frame]
-            sliding = times(self.direction(k), times(2j, times(omega, s1)))
-            rest.append(plus(times(self.edge(k), -omega * omega), 1, sliding))
+            total: Value = 0.0
+            if not _nothing(omega):
+                total = self.edge(k) * (-omega * omega)
+                if edge.slide is not None:
+                    total = total + self.direction(k) * (2j * omega * velocity.slides[edge.slide])
+            rest.append(total)
         return self._solve(accelerations, rest)
 
     @quiet
@@ -220,6 +231,10 @@ class Linearization(State):
             if turns
         }
         return given, explicit, offsets
+
+
+def _nothing(value: Value) -> bool:
+    return isinstance(value, float) and value == 0.0
 
 
 def _rows(loop_columns: list[list[Value]]) -> list[list[Value]]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -65,12 +66,12 @@ class FourBar:
         pin of the body that slides; nan for a four-bar.
     """
 
-    links: tuple[str, str, str, str]
-    joints: tuple[Joint, Joint, Joint, Joint]
-    lengths: tuple[float, float, float, float]
+    links: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    lengths: tuple[float, ...]
     offset: float
 
-    @property
+    @cached_property
     def slide(self) -> int:
         """Which joint is the slide; -1 in a four-bar."""
         return next((k for k, joint in enumerate(self.joints) if joint.edge >= 0), -1)
@@ -137,35 +138,27 @@ class FourBar:
         """``ground-crank-rod-rocker (O A B D)``."""
         return f"{'-'.join(self.links)} ({' '.join(joint.name for joint in self.joints)})"
 
-    def _pin(self, configuration: Configuration, k: int) -> Value:
-        return configuration.nodes[self.joints[k].node]
+    def _line(self, end: int | None) -> tuple[int, int]:
+        """Joints that the coupler's action leads from and to, or the arm of the input (`end` 0) or output (3).
 
-    def _across(self, configuration: Configuration, k: int) -> Value:
-        """Unit vector across the line of the slide."""
-        edge = configuration.graph.edges[self.joints[k].edge]
-        return 1j * configuration.vectors.d[self.joints[k].edge] * configuration.rotations[edge.frame]
-
-    def action(self, configuration: Configuration) -> Value:
-        """Vector along which the coupler passes a force on: from pin to pin, or across its slide."""
-        if self.slide in (1, 2):
-            return self._across(configuration, self.slide)
-        return self._pin(configuration, 2) - self._pin(configuration, 1)
-
-    def arm(self, configuration: Configuration, end: int) -> Value:
-        """Vector from the frame to where the coupler pushes the input (`end` 0) or the output (3); across a slide."""
-        if self.slide == end:
-            return self._across(configuration, end)
-        return self._pin(configuration, self._tip(end)) - self._pin(configuration, end)
-
-    def _tip(self, end: int) -> int:
-        """The joint at which the coupler pushes the body of joint `end`; the far one where the near one is a slide."""
+        The coupler passes a force on from pin to pin, and an arm leads from the frame to where the coupler pushes. The
+        same joint twice is a slide: across it.
+        """
+        if end is None:
+            return (self.slide, self.slide) if self.slide in (1, 2) else (1, 2)
+        # The coupler pushes at the nearer of its joints, or at the farther where that is a slide.
         near, far = (1, 2) if end == 0 else (2, 1)
-        return far if self.slide == near else near
+        return (end, end) if self.slide == end else (end, far if self.slide == near else near)
+
+    def _vector(self, configuration: Configuration, end: int | None) -> Value:
+        tail, head = (self.joints[k] for k in self._line(end))
+        if tail is head:
+            return 1j * _along(configuration, tail)
+        return configuration.nodes[head.node] - configuration.nodes[tail.node]
 
     def squareness(self, configuration: Configuration, end: int) -> tuple[Value, Value]:
         """Sine and cosine of the angle from the arm of the input (`end` 0) or output (3) to the coupler's action."""
-        arm, action = self.arm(configuration, end), self.action(configuration)
-        product = action * np.conj(arm)
+        product = self._vector(configuration, None) * np.conj(self._vector(configuration, end))
         size = np.abs(product)
         return product.imag / size, product.real / size
 
@@ -174,14 +167,11 @@ class FourBar:
         return self._turn(configuration, rates, None) - self._turn(configuration, rates, end)
 
     def _turn(self, configuration: Configuration, rates: Rates, end: int | None) -> Value:
-        """Derivative of the direction of the action, or of the arm at `end`."""
-        across = self.slide if (self.slide in (1, 2) if end is None else self.slide == end) else -1
-        if across >= 0:
-            return rates.angles[configuration.graph.edges[self.joints[across].edge].frame]
-        tail, head = (1, 2) if end is None else (end, self._tip(end))
-        span = self._pin(configuration, head) - self._pin(configuration, tail)
-        change = rates.nodes[self.joints[head].node] - rates.nodes[self.joints[tail].node]
-        return cross(span, change) / norm2(span)
+        tail, head = (self.joints[k] for k in self._line(end))
+        if tail is head:
+            return rates.angles[configuration.graph.edges[tail.edge].frame]
+        span = self._vector(configuration, end)
+        return cross(span, rates.nodes[head.node] - rates.nodes[tail.node]) / norm2(span)
 
     def transmission(self, configuration: Configuration) -> Value:
         """Transmission angle, the acute angle between coupler and output (radians, 0 to pi/2).
@@ -264,21 +254,15 @@ class _Bodies:
             math.nan if min(a.node, b.node) < 0 else float(abs(pose.nodes[b.node] - pose.nodes[a.node]))
             for a, b in zip([joints[3], *joints[:3]], joints, strict=True)
         ]
-        return FourBar(
-            (_shown(links[0]), _shown(links[1]), _shown(links[2]), _shown(links[3])),
-            (joints[0], joints[1], joints[2], joints[3]),
-            (lengths[0], lengths[1], lengths[2], lengths[3]),
-            self._offset(joints, pose),
-        )
+        names = tuple(link.replace(":", " ") for link in links)
+        return FourBar(names, tuple(joints), tuple(lengths), self._offset(joints, pose))
 
     def _offset(self, joints: Sequence[Joint], pose: Configuration) -> float:
         k = next((k for k, joint in enumerate(joints) if joint.edge >= 0), -1)
         if k < 0:
             return math.nan
-        edge = joints[k].edge
-        along = pose.vectors.d[edge] * pose.rotations[self.mechanism.graph.edges[edge].frame]
         span = pose.nodes[joints[(k + 1) % 4].node] - pose.nodes[joints[k - 1].node]
-        offset = abs(float(cross(np.asarray(along), np.asarray(span))))
+        offset = abs(float(cross(np.asarray(_along(pose, joints[k])), np.asarray(span))))
         return offset if offset > EQUAL * self.mechanism.size else 0.0
 
     def _frame(self, links: Sequence[str]) -> int:
@@ -301,8 +285,9 @@ class _Bodies:
         return -1
 
 
-def _shown(body: str) -> str:
-    return body.replace(":", " ")
+def _along(configuration: Configuration, slide: Joint) -> Value:
+    """Unit vector along a slide."""
+    return configuration.vectors.d[slide.edge] * configuration.rotations[configuration.graph.edges[slide.edge].frame]
 
 
 def _rings(bodies: _Bodies) -> Iterator[tuple[list[str], list[Joint]]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -33,7 +33,6 @@ class Geometry:
 
     graph: Graph
     places: Mapping[str, Place]
-    _nominal: dict[str, Value] = field(init=False, repr=False, default_factory=dict)
 
     def term(self, term: Term, values: Mapping[str, Value]) -> Value:
         """Value of a place or number."""

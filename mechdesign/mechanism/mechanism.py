@@ -40,7 +40,9 @@ class Mechanism(Core):
         super().__init__(description)
         self._plans: dict[tuple[str, ...], Plan] = {}
         self._check_ties()
-        self._check_mobility()
+        if len(description.drives) != self.mobility:
+            drives = [self.coordinate(name) for name in description.drives]
+            raise diagnosis.wrong_count(description, self.equations, self.sketch, self.mobility, drives)
         self.drives: tuple[str, ...] = tuple(description.drives)
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
@@ -76,11 +78,6 @@ class Mechanism(Core):
                     "joint out",
                     "mechanism.joints",
                 )
-
-    def _check_mobility(self) -> None:
-        if len(self.description.drives) != self.mobility:
-            drives = [self.coordinate(name) for name in self.description.drives]
-            raise diagnosis.wrong_count(self.description, self.equations, self.sketch, self.mobility, drives)
 
     def plan(self, given: Sequence[str]) -> Plan:
         """Plan for given coordinates, exactly as many as the mobility; compiled once.

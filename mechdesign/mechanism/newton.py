@@ -16,44 +16,25 @@ from mechdesign.mechanism.state import State, Unknowns, columns, loop_gap, scala
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
 
-STEPS = 10
-# After a correction this small (radians, or parts of the mechanism's size) a further one would be below rounding:
-# the method converges quadratically.
-CONVERGED = 1e-8
 # Up to this many unknowns the equations are solved by minors, array by array; above it matrix by matrix.
 BY_MINORS = 4
 
 
-def solve_newton(
-    state: State,
-    index: int,
-    guess: Unknowns,
-    given: Sequence[Value],
-    size: float,
-    steps: int = STEPS,
-    enough: float = CONVERGED,
-) -> None:
+def solve_newton(state: State, index: int, guess: Unknowns) -> None:
     """Solve group `index` of a state from a guess of its unknowns, and note what came out in the state.
 
-    Parameters
-    ----------
-    size : float
-        A length of the mechanism, by which corrections of slides are measured.
-    steps : int
-        Most corrections; with none the guess is taken as it is, and counts as not converged. A pose that has converged
-        is left alone: its result does not depend on its batch.
-    enough : float
-        Correction after which a pose has converged.
+    A pose that has converged is left alone: its result does not depend on its batch.
     """
     group = state.structure.groups[index]
     found: list[Value] = [np.asarray(value, dtype=float) for value in guess]
-    small = [enough if k < len(group.angles) else enough * size for k in range(len(found))]
+    count = len(group.angles)
     active: Flags = np.ones((), dtype=bool)
     determinant: Value = 0.0
-    for _ in range(steps):
+    for _ in range(state.steps):
         set_unknowns(state, group, found)
-        solution, determinant = solve_linear(*equations(state, group, given))
-        moving = reduce(np.logical_or, (~(np.abs(step) < limit) for step, limit in zip(solution, small, strict=True)))
+        solution, determinant = solve_linear(*equations(state, group))
+        turned, moved = (reduce(np.maximum, map(np.abs, part), 0.0) for part in (solution[:count], solution[count:]))
+        moving = np.logical_not((turned < state.enough) & (moved < state.enough * state.size))
         if active.ndim:
             solution = [np.where(active, step, 0.0) for step in solution]
             moving = moving & active
@@ -78,7 +59,7 @@ def set_unknowns(state: State, group: Group, unknowns: Unknowns) -> None:
         state.nodes[base] = vector(x, y)
 
 
-def equations(state: State, group: Group, given: Sequence[Value]) -> tuple[list[list[Value]], list[Value]]:
+def equations(state: State, group: Group) -> tuple[list[list[Value]], list[Value]]:
     """Matrix (a list of rows) and errors of a group's equations at the state's angles and slides."""
     rows: list[list[Value]] = []
     errors: list[Value] = []
@@ -96,7 +77,7 @@ def equations(state: State, group: Group, given: Sequence[Value]) -> tuple[list[
         for which in group.conditions:
             coordinate: Coordinate = state.structure.given[which]
             rows.append([first(configuration, coordinate, move) for move in moves])
-            errors.append(configuration.value(coordinate) - given[which])
+            errors.append(configuration.value(coordinate) - state.given[which])
     return rows, errors
 
 

@@ -9,19 +9,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import Value, nearest, quiet
+from mechdesign.mechanism.algebra import Value, angle_of, nearest, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
-from mechdesign.mechanism.continuation import Start, follow, unknowns_of
+from mechdesign.mechanism.continuation import Start, follow
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
-from mechdesign.mechanism.newton import CONVERGED, STEPS
 from mechdesign.mechanism.solve import run
-from mechdesign.mechanism.state import State, Unknowns, start_state
+from mechdesign.mechanism.state import CONVERGED, STEPS, State, Unknowns, start_state
 from mechdesign.mechanism.structure import Structure
-from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.parallel import map_chunks, worker_count
+from mechdesign.parallel import keep_freed_memory, map_chunks, worker_count
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
@@ -84,25 +82,30 @@ class Plan:
     ) -> State:
         """Solve all groups, in the assembly as drawn unless `modes` says another."""
         state = start_state(self.core.graph, self.structure, vectors, given)
-        state.beyond = beyond
-        size = self.core.size if self.iterative else 1.0
-        return run(state, self.modes if modes is None else modes, guess, given, size, steps, enough)
+        state.steps, state.enough, state.beyond = steps, enough, beyond
+        state.size = self.core.size if self.iterative else 1.0
+        return run(state, self.modes if modes is None else modes, guess)
 
     def start(self, at: Configuration | None) -> Start:
         """A solved pose to continue from; the sketch where left out."""
         at = self.core.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
-        guess = unknowns_of(self.structure, self.all_rotations(at, given), at.slides, at.nodes)
+        guess = self.unknowns(at, given)
         state = self.run(given, at.vectors, guess)
         return Start(given, at.places, guess, [np.sign(d) for d in state.determinants])
 
-    def all_rotations(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
-        """Rotations of a solved pose's classes, and of those that stand for given distances."""
-        extra = []
+    def unknowns(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
+        """Unknowns of the groups without a closed form in a solved pose with such given coordinates."""
+        rotations = [*at.rotations]
         for position, (_, k) in enumerate(self.structure.spans):
             edge = self.structure.edges[len(self.core.graph.edges) + position]
-            extra.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
-        return [*at.rotations, *extra]
+            rotations.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
+        found: list[Value] = []
+        for group in (self.structure.groups[index] for index in self.structure.unknowns):
+            found += [angle_of(np.asarray(rotations[root])) for root in group.angles]
+            found += [at.slides[slide] for slide in group.slides]
+            found += [part for base in group.bases for part in (np.real(at.nodes[base]), np.imag(at.nodes[base]))]
+        return found
 
     def solve(
         self,

@@ -196,10 +196,10 @@ class Equations:
             return float(wrap(miss))
         return miss / self.size if coordinate.quantity == "length" else miss
 
-    def assemble(self, sketch: Sketch, held: Sequence[tuple[Coordinate, float]] = ()) -> Floats | None:
+    def assemble(self, sketch: Sketch) -> Floats | None:
         """An assembled configuration near the sketch; None where there is none."""
         for attempt in range(TRIES):
-            x, gap = self.solve(self.from_sketch(sketch, 0.1 * attempt, attempt), held)
+            x, gap = self.solve(self.from_sketch(sketch, 0.1 * attempt, attempt))
             if gap < CLOSED:
                 return x
         return None

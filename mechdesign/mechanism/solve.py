@@ -22,7 +22,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, cross, dot, norm2, plus, vector
-from mechdesign.mechanism.newton import CONVERGED, STEPS, solve_newton
+from mechdesign.mechanism.newton import solve_newton
 from mechdesign.mechanism.state import State, Unknowns, loop_gap
 from mechdesign.mechanism.structure import Group
 
@@ -38,16 +38,7 @@ ROUNDING = 4e-15
 Solution = tuple[Value, Value, tuple[Value, ...]]
 
 
-def run(
-    state: State,
-    modes: Sequence[Value],
-    guess: Unknowns | None = None,
-    given: Sequence[Value] = (),
-    size: float = 1.0,
-    steps: int = STEPS,
-    enough: float = CONVERGED,
-    begin: int = 0,
-) -> State:
+def run(state: State, modes: Sequence[Value], guess: Unknowns | None = None, begin: int = 0) -> State:
     """Solve all groups in order.
 
     Parameters
@@ -57,8 +48,6 @@ def run(
         unsolved.
     guess : sequence, optional
         Where Newton's method starts, for the groups without a closed form.
-    size, steps, enough
-        See `mechdesign.mechanism.newton.solve_newton`.
     begin : int
         First group to solve; those before it are known already.
     """
@@ -67,7 +56,7 @@ def run(
             continue
         if group.form == "newton":
             assert guess is not None
-            solve_newton(state, index, guess[state.structure.unknowns[index]], given, size, steps, enough)
+            solve_newton(state, index, guess[state.structure.unknowns[index]])
         elif group.form != "place":
             _closed_form(state, group, mode)
         state.place(group)

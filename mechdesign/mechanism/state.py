@@ -16,6 +16,10 @@ from mechdesign.numerics.arrays import Flags, Floats
 
 # The unknowns of all groups without a closed form, one after another (see `Structure.unknowns`).
 Unknowns = Sequence[Value] | Floats
+STEPS = 10
+# After a correction this small (radians, or parts of the mechanism's size) a further one would be below rounding:
+# Newton's method converges quadratically.
+CONVERGED = 1e-8
 
 
 @dataclass
@@ -24,6 +28,14 @@ class State:
 
     Parameters
     ----------
+    given : sequence of Value
+        Values of the given coordinates.
+    size : float
+        A length of the mechanism, by which Newton's corrections of slides are measured.
+    steps : int
+        Newton's corrections at most; with none a guess is taken as it is, and counts as not converged.
+    enough : float
+        Correction after which a pose has converged.
     beyond : bool
         Whether groups with a closed form are told beyond their reach (see `mechdesign.mechanism.solve`).
     closures : list
@@ -41,6 +53,10 @@ class State:
     rotations: list[Any]
     ties: list[Value]
     slides: list[Any]
+    given: Sequence[Value] = ()
+    size: float = 1.0
+    steps: int = STEPS
+    enough: float = CONVERGED
     beyond: bool = False
     closures: list[Value] = field(default_factory=list)
     unknowns: list[Value] = field(default_factory=list)
@@ -118,7 +134,7 @@ def start_state(graph: Graph, structure: Structure, vectors: Vectors, given: Seq
             nodes[coordinate.node] = vector(given[k], np.nan) if coordinate.kind == "x" else vector(np.nan, given[k])
     for node, x, y in structure.known_nodes:
         nodes[node] = vector(given[x], given[y])
-    return State(graph, structure, vectors, w, nodes, rotations, ties, slides)
+    return State(graph, structure, vectors, w, nodes, rotations, ties, slides, given)
 
 
 def columns(state: State, group: Group, path: Sequence[tuple[int, int]]) -> tuple[Value, list[Value]]:

@@ -214,7 +214,9 @@ def _decompose(
     for coordinate in expressions.values():
         rows.append([variables[v] for v in _variables(graph, roots, coordinate) if v in variables])
     if len(rows) != len(variables):
-        raise Undetermined(_count_message(len(variables) - len(rows)))
+        free = len(variables) - len(rows)
+        few = "few" if free > 0 else "many"
+        raise Undetermined(f"{abs(free)} coordinate{'s' if abs(free) > 1 else ''} too {few} given")
     matched = _match(rows, len(variables))
     if matched is None:
         raise Undetermined("the given coordinates fix one part of the mechanism twice and leave another free")
@@ -255,10 +257,6 @@ def _variables(graph: Graph, roots: Sequence[int], coordinate: Coordinate) -> li
     if coordinate.kind == "slide":
         return [("slide", coordinate.slide)]
     return [(coordinate.kind, coordinate.node)]
-
-
-def _count_message(free: int) -> str:
-    return f"{abs(free)} coordinate{'s' if abs(free) > 1 else ''} too {'few' if free > 0 else 'many'} given"
 
 
 def _match(rows: list[list[int]], columns: int) -> list[int] | None:

@@ -14,7 +14,6 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.continuation import unknowns_of
 from mechdesign.mechanism.newton import equations, set_unknowns
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.solve import run
@@ -45,7 +44,7 @@ def turning_point(
     (float, Configuration, int) or None
         The value, the pose there, and the index of the group in the plan; None where no singularity is near.
     """
-    guess = unknowns_of(plan.structure, plan.all_rotations(near, given), near.slides, near.nodes)
+    guess = plan.unknowns(near, given)
     reach = NEAR * (1.0 if plan.structure.given[k].quantity == "angle" else plan.core.size)
     folds = [(index, _fold(plan, given, k, near, guess, index)) for index in plan.structure.unknowns]
     found = [(abs(fold[0] - given[k]), index, fold) for index, fold in folds if fold is not None]
@@ -73,13 +72,14 @@ def _fold(
         """Everything up to the group, with its unknowns and the coordinate in their own scales."""
         values = at(unknowns[-1])
         state = start_state(plan.core.graph, plan.structure, near.vectors, values)
-        run(state, plan.modes_at(values)[:index], guess, values, size)
+        state.size = size
+        run(state, plan.modes_at(values)[:index], guess)
         set_unknowns(state, group, unknowns[:-1] * weights)
         return state
 
     def system(unknowns: Floats) -> tuple[Floats, float]:
         """Errors of the group's equations and their determinant, lengths in parts of the mechanism's size."""
-        rows, right = equations(state_at(unknowns), group, at(unknowns[-1]))
+        rows, right = equations(state_at(unknowns), group)
         matrix = np.array(rows, dtype=float) * weights / size
         return np.array(right, dtype=float) / size, float(np.linalg.det(matrix))
 
@@ -94,4 +94,4 @@ def _fold(
         return None
     value, state = float(answer.x[-1]), state_at(answer.x)
     state.place(group)
-    return value, run(state, plan.modes_at(at(value)), guess, at(value), size, begin=index + 1)
+    return value, run(state, plan.modes_at(at(value)), guess, begin=index + 1)

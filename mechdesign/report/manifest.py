@@ -33,9 +33,7 @@ class Extras:
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
-    from mechdesign.study.rewriting import inputs
-
-    files = {file.name: hashlib.sha256(text.encode()).hexdigest() for _, file, text in inputs(study)}
+    files = {file.name: hashlib.sha256(text.encode()).hexdigest() for _, file, text in study.inputs()}
     return {
         "tool": {"name": "mechdesign", "version": version("mechdesign")},
         "libraries": {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES},

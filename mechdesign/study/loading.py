@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 import hashlib
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -20,20 +20,22 @@ from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study import overrides
+from mechdesign.study import overrides, poses
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
+from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.kinematics import KinematicsSection
-from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
+from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.study.schema.study_file import StudyFile, check, check_poses
+from mechdesign.study.schema.study_file import StudyFile
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
-from mechdesign.study.text.document import Document, plain, read
+from mechdesign.study.text.document import Document, KeyPath, leaves, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
@@ -101,6 +103,17 @@ class Study:
     def label(self) -> str:
         """The name of its folder of results: that of its file."""
         return self.path.stem if self.path is not None else self.name
+
+    def inputs(self) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
+        """Files that the study reads: the keys of their names, the file, and what it holds."""
+        folder = self.path.parent if self.path is not None else pathlib.Path()
+        for keys, value in leaves(self.resolved):
+            if isinstance(value, str) and ("path" in keys[:-1] or "targets" in keys[:-1]):
+                try:
+                    content = (folder / value).read_text(encoding="utf-8-sig")
+                except (OSError, ValueError):
+                    continue
+                yield keys, folder / value, content
 
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text as long as the file is what was read."""
@@ -180,11 +193,11 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(context.parameters, formulas)
-    parts = check(Checker(builder, parameters, parts), path.parent)
+    parts = _checked(Checker(builder, parameters, parts), path.parent)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
-    check_poses(parts, mechanism, reporter, path.parent)
+    _check_poses(parts, mechanism, reporter, path.parent)
     reporter.done()
     name = parts.get("name") or path.stem
     seed = parts["seed"] if seed is None else seed
@@ -269,6 +282,45 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
             with contextlib.suppress(ValidationError):
                 parts[key] = _adapter(key).validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts
+
+
+def _checked(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
+    """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
+    found = dict(checker.parts)
+    found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
+    for index, requirement in enumerate(found["requirements"]):
+        check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
+    found["targets"] = targets.check(checker, checker.mechanism.targets, folder)
+    return found
+
+
+def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path) -> None:
+    """Check that the coordinates that poses give determine the mechanism, that they are not too many, and that the
+    targets fit those of kinematics.
+    """
+    for command in COMMANDS:
+        section = parts.get(command)
+        found: poses.Poses | None = None
+        if isinstance(section, PoseSection) and (key := section.source) is not None:
+            try:
+                found = poses.expand(section, folder)
+            except StudyError as error:
+                reporter.report((command, key), str(error))
+                continue
+            for group in found.groups if found is not None else ():
+                try:
+                    mechanism.plan(group.names)
+                except MechanismError as error:
+                    place: KeyPath = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
+                    reporter.report(place, str(error))
+            if found is not None and not found.slopes and getattr(section, "speed", None) is not None:
+                reporter.report((command, "speed"), "the path's point does not move: it has no direction", at_key=True)
+        if command == "kinematics" and parts["targets"]:
+            try:
+                assumed = found or poses.default(mechanism.description)
+            except StudyError:
+                continue
+            targets.check_poses(parts["targets"], mechanism.drives, assumed, reporter)
 
 
 def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Context, reporter: Reporter) -> None:

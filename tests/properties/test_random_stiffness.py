@@ -151,12 +151,14 @@ def test_another_point_of_the_same_body_is_the_same_matrix_seen_from_there(case:
     body = case.layout.bodies.get(case.link)
     assume(body is not None and case.link not in case.elastic and not body.to and len(body.points) > 1)
     here = ask_stiffness(case.text())
+    reach = max(abs(place) for place in case.layout.places.values())
     for point in body.points:
         there = ask_stiffness(case.text(at=point))
         transform = about(case.layout.places[point] - case.layout.places[case.at])
         inverse = about(case.layout.places[case.at] - case.layout.places[point])
-        # What is rigid there is carried from what cancels here.
-        cancels = 1e-15 * np.abs(inverse) @ np.abs(matrix(here, "C")) @ np.abs(inverse).T
+        # What is rigid there is carried from what cancels here, by arms that are as exact as the places of the points.
+        arms = np.abs(inverse) + np.abs(about(complex(reach, reach)))
+        cancels = 1e-15 * arms @ np.abs(matrix(here, "C")) @ arms.T
         agree(matrix(there, "C"), inverse @ matrix(here, "C") @ inverse.T, 1e-9, cancels)
         if np.isfinite(matrix(here, "K")).all():
             agree(matrix(there, "K"), transform.T @ matrix(here, "K") @ transform, 1e-6)

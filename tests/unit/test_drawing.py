@@ -72,7 +72,7 @@ def test_the_picture_has_the_same_bytes_again_and_no_metadata(study):
 
 
 def test_joints_stand_where_the_mechanism_has_them(study):
-    figure = style.new_figure(layout=None)
+    figure = style.new_figure(5, layout=None)
     axes = figure.add_subplot()
     axes.set(xlim=(-60, 180), ylim=(-80, 80))
     configuration = study.mechanism.plan(("theta",)).solve([np.radians(60.0)])
@@ -85,7 +85,7 @@ def test_joints_stand_where_the_mechanism_has_them(study):
 
 
 def test_a_pose_that_cannot_be_assembled_draws_nothing(study):
-    figure = style.new_figure(layout=None)
+    figure = style.new_figure(5, layout=None)
     axes = figure.add_subplot()
     configuration = study.mechanism.plan(("B.x",)).solve([1000.0])
     draw_mechanism(axes, study.mechanism, configuration)
@@ -113,7 +113,7 @@ def test_hull_of_a_plate_and_of_a_bar():
 def test_many_names_are_placed_in_time_that_grows_with_their_number():
     def seconds(count):
         with style.context():
-            axes = style.new_figure(8, 8).add_subplot()
+            axes = style.new_figure(8).add_subplot()
             axes.set(xlim=(-1, 1), ylim=(-1, 1))
             places = np.sqrt(np.arange(count) / count) * np.exp(2.4j * np.arange(count))
             labels = [Label(f"P{k}", (place,), "black") for k, place in enumerate(places)]
@@ -128,7 +128,7 @@ def test_many_names_are_placed_in_time_that_grows_with_their_number():
 
 def test_names_go_where_least_is_covered():
     with style.context():
-        axes = style.new_figure(4, 4).add_subplot()
+        axes = style.new_figure(4).add_subplot()
         axes.set(xlim=(-1, 1), ylim=(-1, 1))
         (origin,) = paper(axes, np.array([0j]))
         # Everything around the point is taken, but for what lies below it.

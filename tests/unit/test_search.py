@@ -11,10 +11,10 @@ from helpers.syntheses import OPEN, PROBLEMS, held_height, timed_path, tray
 
 import mechdesign
 from mechdesign.analyses.optimize.analysis import _doubts
+from mechdesign.analyses.optimize.descent import side_by_side
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer, Part, Scores, Spent
 from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.optimize.lockstep import side_by_side
 from mechdesign.analyses.optimize.search import Ending, search
 from mechdesign.analyses.optimize.variables import from_cube
 from mechdesign.errors import AssemblyError, StudyError

@@ -8,8 +8,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.workspace import figures
-from mechdesign.report.figures.workspace.inscribed import inscribed_figure
+from mechdesign.report.figures.workspace import figures, inscribed_figure
 from mechdesign.report.figures.workspace.maps import index_columns
 from mechdesign.report.figures.workspace.ranges import loops
 from mechdesign.report.figures.workspace.regions import fate, regions

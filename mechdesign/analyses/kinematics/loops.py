@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -16,7 +14,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.outputs import Rates
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 
 # Angles within this of each other are one (radians).
@@ -28,17 +26,6 @@ IN_LINE, AT_POSE = 1e-6, 1e-12
 # Toggles this near to each other are one, in rows of the sweep.
 ONE_TOGGLE = 1e-5
 PARTS = ("frame", "input", "coupler", "output")
-
-
-@dataclass(frozen=True)
-class _Toggle:
-    """Links in line: where along the sweep, in which loop, at its input (end 0) or output (3), and the cosine."""
-
-    position: float
-    place: float
-    loop: int
-    end: int
-    cosine: float
 
 
 def functions(loops: Sequence[FourBar], toggles: bool) -> dict[str, Function]:
@@ -154,14 +141,15 @@ def toggles_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine) -> T
     which = [(k, end) for end in (0, 3) for k in range(len(loops))]
     sines, cosines = (np.array([line.rows[f"{name} {k} {end}"] for k, end in which]) for name in ("sine", "cosine"))
     found = zeros(line, sines, AT_POSE, IN_LINE)
+    found = found.take(_once(found.position(line), found.function))
+    position = found.position(line)
     cosine = line.at(found.node, found.place)[cosines[found.function], np.arange(len(found.node))]
-    columns = [column.tolist() for column in (found.position(line), found.place, found.function, cosine)]
-    toggles = _once([
-        _Toggle(position, place, which[function][0], which[function][1], value)
-        for position, place, function, value in zip(*columns, strict=True)
-    ])  # fmt: skip
-    places = as_given(motion, swept, np.array([t.place for t in toggles]), np.array([t.position for t in toggles]))
-    texts = [_words(loops[t.loop], t, both) for t, both in zip(toggles, _together(toggles), strict=True)]
+    together = _together(position, found.function % len(loops))
+    places = as_given(motion, swept, found.place, position)
+    texts = [
+        _words(loops[which[function][0]], which[function][1], value, both)
+        for function, value, both in zip(found.function.tolist(), cosine.tolist(), together.tolist(), strict=True)
+    ]
     links, states, joints, effects, names = zip(*texts, strict=True) if texts else ((), (), (), (), ())
     return Table(
         "toggles",
@@ -178,40 +166,36 @@ def toggles_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine) -> T
     )  # fmt: skip
 
 
-def _once(toggles: list[_Toggle]) -> list[_Toggle]:
+def _once(position: Floats, function: Ints) -> Ints:
     """Toggles in the order of the sweep; of those of the same links that are one, the one found first."""
-    kept: list[tuple[int, _Toggle]] = []
-    for k, toggle in sorted(enumerate(toggles), key=lambda one: (one[1].end, one[1].loop, one[1].position)):
-        before = kept[-1] if kept else None
-        if (
-            before is None
-            or (before[1].end, before[1].loop) != (toggle.end, toggle.loop)
-            or toggle.position - before[1].position > ONE_TOGGLE
-        ):
-            kept.append((k, toggle))
-        elif k < before[0]:
-            kept[-1] = (k, toggle)
-    return sorted((toggle for _, toggle in kept), key=lambda toggle: (toggle.position, toggle.end, toggle.loop))
+    order = np.lexsort((position, function))
+    begins = np.flatnonzero(_apart(position[order], function[order]))
+    first = np.minimum.reduceat(order, begins) if len(order) else order
+    return first[np.lexsort((function[first], position[first]))]
 
 
-def _together(toggles: list[_Toggle]) -> list[bool]:
+def _together(position: Floats, loop: Ints) -> Flags:
     """Whether all three moving links of the loop are in line at a toggle."""
-    found = [False] * len(toggles)
-    order = sorted(range(len(toggles)), key=lambda k: (toggles[k].loop, toggles[k].position))
-    for one, other in pairwise(order):
-        a, b = toggles[one], toggles[other]
-        if a.loop == b.loop and b.position - a.position <= ONE_TOGGLE:
-            found[one] = found[other] = True
+    order = np.lexsort((position, loop))
+    apart = np.append(_apart(position[order], loop[order]), True)
+    found = np.empty(len(order), dtype=bool)
+    found[order] = ~(apart[:-1] & apart[1:])
     return found
 
 
-def _words(loop: FourBar, toggle: _Toggle, both: bool) -> tuple[str, str, str, str, str]:
+def _apart(position: Floats, kind: Ints) -> Flags:
+    """Which of some sorted toggles are not one with the toggle before them."""
+    near = (np.diff(position) <= ONE_TOGGLE) & (np.diff(kind) == 0)
+    return np.append(True, ~near)[: len(position)]
+
+
+def _words(loop: FourBar, end: int, cosine: float, both: bool) -> tuple[str, str, str, str, str]:
     """Links, state, joints, effect and loop of a toggle."""
     joints = [joint.name for joint in loop.joints]
-    if toggle.end == 0:
+    if end == 0:
         pair, pins, effect = loop.links[1:3], joints[:3], f"{loop.links[3]} reverses"
     else:
         pair, pins, effect = loop.links[2:4], joints[1:], f"{loop.links[1]} at its limit"
-    straight = "extended" if (toggle.cosine > 0) == (toggle.end == 0) else "folded"
-    state = "perpendicular" if loop.slide in (1, 2, toggle.end) else straight
+    straight = "extended" if (cosine > 0) == (end == 0) else "folded"
+    state = "perpendicular" if loop.slide in (1, 2, end) else straight
     return " ".join(pair), state, " ".join(pins), "change point" if both else effect, loop.name

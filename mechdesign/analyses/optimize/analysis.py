@@ -11,7 +11,8 @@ from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer
 from mechdesign.analyses.optimize.files import best_design, optimum_files
-from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns, judged_of
+from mechdesign.analyses.optimize.goals import conditions_of, goals_of
+from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
 from mechdesign.analyses.optimize.tables import (
     Comparison,
     best_table,
@@ -71,12 +72,12 @@ def optimize(
     section = study.optimize
     if section is None or not section.variables:
         raise StudyError((study.problem("an optimisation needs variables", "optimize", "variables"),))
-    goals, conditions = judged_of(study)
+    goals = tuple(goals_of(section))
     if not goals:
         message = "what is to be best? e.g. maximize: [GII, GRI, SUI], or minimize"
         raise StudyError((study.problem(message, "optimize", "maximize"),))
     weights = np.array(section.weights or [[1.0] * len(goals)], dtype=float).reshape(-1, len(goals))
-    evaluator = Evaluator(study, (*goals, *conditions), graded=section.method != "grid")
+    evaluator = Evaluator(study, (*goals, *conditions_of(section)), graded=section.method != "grid")
     meanings = index_meanings(study, evaluator.question) if evaluator.question is not None else {}
     budget = section.evaluations or (
         pareto.DEFAULT_EVALUATIONS * len(goals)

@@ -9,13 +9,14 @@ differences over steps, evaluated in one batch.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from threading import Barrier, BrokenBarrierError
 from typing import Any, Literal
 
 import numpy as np
 
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Explorer
-from mechdesign.analyses.optimize.lockstep import Ask, side_by_side
 from mechdesign.numerics.arrays import Floats, Ints
 
 # Steps of differences, and half the widths of the boxes in which they are used, in parts of the ranges.
@@ -40,6 +41,10 @@ IMPOSSIBLE = 1e3
 # Slopes of conditions below this part of their values are none.
 FLAT = 1e-6
 TINY = float(np.finfo(float).tiny)
+
+
+# From points to their rows of `Explorer.known`.
+Ask = Callable[[Floats], Ints]
 
 
 class _InVain(Exception):
@@ -74,6 +79,59 @@ def descend(
     running = [_Descent(explorer, objective, row, ladder, final) for objective, row in descents]
     side_by_side(explorer, [each.run for each in running])
     return [each.best for each in running]
+
+
+def side_by_side(explorer: Explorer, tasks: Sequence[Callable[[Ask], None]]) -> None:
+    """Run tasks that ask for few points at a time; what all of them ask is evaluated in one batch.
+
+    A batch waits for every task that still runs, and holds their points in the order of the tasks, so that the result
+    does not depend on which of them came first. `explorer.known` does not change while a task computes.
+
+    Raises
+    ------
+    Spent
+        If the evaluations are used up; all tasks have ended then.
+    """
+    none = np.empty((0, explorer.dimensions))
+    asked, rows = [none] * len(tasks), [np.empty(0, dtype=np.intp)] * len(tasks)
+    over = not tasks
+    # All tasks and this thread meet twice a batch: when everything is asked, and when everything is known.
+    meeting = Barrier(len(tasks) + 1)
+
+    def run(k: int) -> None:
+        def ask(points: Floats) -> Ints:
+            asked[k] = points
+            meeting.wait()
+            meeting.wait()
+            return rows[k]
+
+        try:
+            # The state of warnings is a thread's own.
+            with np.errstate(all="ignore"):
+                tasks[k](ask)
+            # One that has ended asks for nothing until all have.
+            while not over:
+                ask(none)
+        except BaseException:
+            meeting.abort()
+            raise
+
+    with ThreadPoolExecutor(max(len(tasks), 1)) as pool:
+        running = [pool.submit(run, k) for k in range(len(tasks))]
+        try:
+            while not over:
+                meeting.wait()
+                ends = np.cumsum([len(points) for points in asked])
+                over = not ends[-1]
+                rows[:] = np.split(explorer(np.concatenate(asked)), ends[:-1])
+                meeting.wait()
+        except BrokenBarrierError:
+            pass
+        finally:
+            meeting.abort()
+    for error in [task.exception() for task in running]:
+        if error is not None and not isinstance(error, BrokenBarrierError):
+            raise error
 
 
 class _Descent:

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
-from mechdesign.analyses.optimize.assembling import assembly_margins, shortfall
-from mechdesign.analyses.optimize.goals import Goal, bounds_of, goals_of
+from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
 from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.region.panels import BATCH
 from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, questions, split
@@ -47,7 +46,7 @@ class Layout:
     """Columns of what is found of designs.
 
     Values of the goals and their estimated errors (nan where there is none); how far the poses are from assembling
-    (`mechdesign.analyses.optimize.assembling.shortfall`, nan where there is no such design); a code that is 0 where the
+    (`mechdesign.analyses.optimize.stacked.shortfall`, nan where there is no such design); a code that is 0 where the
     design can be built; then `rows` that goals are made of, and `assembly` margins of commands.
     """
 
@@ -109,6 +108,8 @@ class Evaluator:
             self._regions_together = all(each.batched for each in self._regional) and not follows(
                 study, study.optimize.variables, ("workspace",)
             )
+        # Where the study names each.
+        self._keys = goals_of(study.optimize) | conditions_of(study.optimize)
         commands = dict.fromkeys(each.command for each in self.goals if not each.regional)
         problems = [problem for command in commands for problem in self._look(command)]
         if problems:
@@ -119,7 +120,7 @@ class Evaluator:
         for command, tables in self._together.items() if graded else ():
             poses = self._poses[command](1, {}, {})
             if poses.listed or any(table not in OF_SOME_POSES for table in tables):
-                clear[command] = assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
+                clear[command] = stacked.assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
         self.layout = Layout(self.goals, self._rows, clear)
         if not graded:
             self.limit_rows(0)
@@ -139,7 +140,7 @@ class Evaluator:
         """Find the tables of a command's goals, before anything is computed but the study's own design."""
         goals = [each for each in self.goals if each.command == command and not each.regional]
         if command == "optimize":
-            yield self.study.problem("an optimisation cannot judge itself", *self._key(goals[0]))
+            yield self.study.problem("an optimisation cannot judge itself", *self._keys.get(goals[0], ()))
             return
         assert self.study.optimize is not None
         together = command in stacked.TABLES and stacked.possible(self.study, command, self.study.optimize.variables)
@@ -166,7 +167,7 @@ class Evaluator:
                 try:
                     self._count(each, result)
                 except UnknownColumnError as error:
-                    yield self.study.problem(str(error), *self._key(each))
+                    yield self.study.problem(str(error), *self._keys.get(each, ()))
 
     def _count(self, each: Goal, result: Result) -> Chosen:
         """Note how many rows a goal is the worst of, or the root mean square, by the study's own design."""
@@ -179,16 +180,6 @@ class Evaluator:
         if rows is not None and (squares or rows.size > 1):
             self._rows[each] = rows.size
         return chosen
-
-    def _key(self, wanted: Goal) -> tuple[str | int, ...]:
-        """Where the study names a goal."""
-        section = self.study.optimize
-        assert section is not None
-        named = [*(("maximize", k) for k in range(len(section.maximize))),
-                 *(("minimize", k) for k in range(len(section.minimize)))]  # fmt: skip
-        judged = [*zip(goals_of(section), named, strict=True)]
-        judged += [(each, ("subject_to", k)) for k, given in enumerate(section.subject_to) for each in bounds_of(given)]
-        return ("optimize", *dict(judged).get(wanted, ()))
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
@@ -239,8 +230,8 @@ class Evaluator:
         batch.note(rows, wrong.any(axis=1) if whole else wrong.all(axis=1), failed)
         clear = self.layout.assembly.get(command)
         if self._graded and (clear is not None or (batch.reasons[rows] != "").any()):
-            margins = assembly_margins(self.study, poses, stack.solved or solve_poses(self.study, poses))
-            batch.table[rows, self.layout.shortfall] = shortfall(margins)
+            margins = stacked.assembly_margins(self.study, poses, stack.solved or solve_poses(self.study, poses))
+            batch.table[rows, self.layout.shortfall] = stacked.shortfall(margins)
             if clear is not None:
                 batch.table[rows, clear] = margins
         for table, goals in tables.items():
@@ -295,7 +286,7 @@ class Evaluator:
         poses = study_poses(study, command)
         solved = list(solve_poses(study, poses))
         if self._graded:
-            batch.table[k, self.layout.shortfall] = shortfall(assembly_margins(study, poses, solved))[0]
+            batch.table[k, self.layout.shortfall] = stacked.shortfall(stacked.assembly_margins(study, poses, solved))[0]
         return str(FAILED[_first(np.concatenate([each.configuration.reason for each in solved])[None])[0]])
 
 

@@ -19,8 +19,7 @@ from mechdesign.errors import MechdesignError
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
-from mechdesign.study.rewriting import rewritten
-from mechdesign.study.variants import changed_data, variant
+from mechdesign.study.variants import changed_data, rewritten, variant
 
 
 def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:

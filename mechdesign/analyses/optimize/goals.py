@@ -13,6 +13,7 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
 from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.text.document import KeyPath
 
 
 @dataclass(frozen=True)
@@ -118,10 +119,19 @@ def goal(name: str, *, smallest: bool = False, where: Mapping[str, object] | Non
     return Goal(told, command, column, smallest, column.endswith("_error"), rows)
 
 
-def goals_of(section: OptimizeSection) -> tuple[Goal, ...]:
-    """What a section maximises, then what it minimises."""
-    judged = (*((each, False) for each in section.maximize), *((each, True) for each in section.minimize))
-    return tuple(goal(each.result, smallest=smallest, where=each.where) for each, smallest in judged)
+def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
+    """What a section maximises, then what it minimises, and where it says so."""
+    return {
+        goal(each.result, smallest=key == "minimize", where=each.where): ("optimize", key, k)
+        for key in ("maximize", "minimize")
+        for k, each in enumerate(getattr(section, key))
+    }
+
+
+def conditions_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
+    """The worst rows that a section's conditions judge, and where it says so."""
+    given = enumerate(section.subject_to)
+    return {each: ("optimize", "subject_to", k) for k, condition in given for each in bounds_of(condition)}
 
 
 def bounds_of(condition: Condition) -> Iterator[Goal]:

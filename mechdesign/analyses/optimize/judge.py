@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Part, Scores
-from mechdesign.analyses.optimize.goals import Goal, bounds_of, goals_of
+from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube
 from mechdesign.journal import Journal, digest
 from mechdesign.numerics.arrays import Flags, Floats
@@ -94,7 +94,7 @@ class Judge:
     ) -> None:  # fmt: skip
         assert study.optimize is not None
         self.study, self.progress, self.layout = study, progress, evaluator.layout
-        self.goals, self.conditions = judged_of(study)
+        self.goals, self.conditions = tuple(goals_of(study.optimize)), tuple(conditions_of(study.optimize))
         self._names = tuple(study.optimize.variables)
         self._squares, self._compute, self._journal = evaluator.squares, compute, journal
         self._chunk = SMALL_CHUNK if evaluator.slow and study.optimize.method != "grid" else CHUNK
@@ -172,9 +172,3 @@ class Judge:
             {each: column for each, column in errors if not np.isnan(column).all()},
             found[:, self.layout.code].astype(np.int32), [*self._words],
         )  # fmt: skip
-
-
-def judged_of(study: Study) -> tuple[tuple[Goal, ...], tuple[Goal, ...]]:
-    """The goals and the conditions of a study."""
-    assert study.optimize is not None
-    return goals_of(study.optimize), tuple(each for given in study.optimize.subject_to for each in bounds_of(given))

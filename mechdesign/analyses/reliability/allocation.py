@@ -8,23 +8,34 @@ where the model holds the tolerances back for nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.reliability import methods
-from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, ToleranceModel, cheapest
+from mechdesign.analyses.reliability.cheapest import (
+    DIGITS,
+    TIGHTEST,
+    WIDEST,
+    Tolerance,
+    ToleranceModel,
+    cheapest,
+    tolerances,
+)
 from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.tables import at_poses
 from mechdesign.analyses.reliability.task import Partial, Task
-from mechdesign.analyses.reliability.tolerances import retold, tolerances
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Result, Table
-from mechdesign.study.rewriting import rewritten
-from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study import Study
+from mechdesign.study.schema.reliability import Clearance, Dimension, ReliabilitySection
+from mechdesign.study.text.document import plain
+from mechdesign.study.variants import rewritten
 
 # How often a target is corrected, and the failures that the study's own samples must show to confirm one.
 _ROUNDS = 5
@@ -264,3 +275,69 @@ def _unreachable(model: ToleranceModel, allowed: Floats, asked: float) -> str:
         f"{TIGHTEST:g} times the given ones it is {_plain(failures[worst])}; {reason}"
         + ("; a clearance that 'cost' names is allocated too" if held else "")
     )
+
+
+def retold(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
+    """The study's data where tolerances are as many times as wide.
+
+    What a wildcard gives is written out, place by place, unless all of it stays alike.
+    """
+    section = study.reliability
+    assert section is not None
+    data: dict[str, Any] = plain(study.resolved)
+    changed = {t.name: (t, scale) for t, scale in zip(tolerances, scales.tolist(), strict=True) if t.cost is not None}
+    given = data["reliability"]
+    dimensions: dict[str, Any] = {}
+    for key, raw in (given.get("dimensions") or {}).items():
+        own = {name: _dimension(raw, dimension, *changed[name]) if name in changed else raw
+               for name, dimension in _said(section.dimensions, given["dimensions"], key)}  # fmt: skip
+        values = list(own.values())
+        if key in own or not own:
+            dimensions[key] = own.get(key, raw)
+        elif all(value == values[0] for value in values):
+            dimensions[key] = values[0]
+        else:
+            dimensions |= own
+    if dimensions:
+        given["dimensions"] = dimensions
+    for point, raw in (given.get("clearances") or {}).items():
+        if point in changed:
+            given["clearances"][point] = _clearance(raw, section.clearances[point], *changed[point])
+    return data
+
+
+def _said(dimensions: Mapping[str, Dimension], raw: Mapping[str, Any], key: str) -> Iterator[tuple[str, Dimension]]:
+    """The dimensions that an entry of the study is about: of several wildcards the last one counts."""
+    for name, dimension in dimensions.items():
+        matching = [other for other in raw if fnmatchcase(name, other)]
+        if (name if name in raw else matching[-1]) == key:
+            yield name, dimension
+
+
+def _dimension(raw: Any, dimension: Dimension, tolerance: Tolerance, scale: float) -> Any:
+    size = _number(tolerance.given * scale)
+    if isinstance(raw, dict) and raw.get("sigma") is not None:
+        return {**raw, "sigma": size}
+    assert dimension.tolerance is not None
+    width = raw["tolerance"] if isinstance(raw, dict) else raw
+    new: Any = size
+    if isinstance(width, list):
+        middle = 0.5 * sum(dimension.tolerance)
+        new = [_number(middle - size, 12), _number(middle + size, 12)]
+    return {**raw, "tolerance": new} if isinstance(raw, dict) else new
+
+
+def _clearance(raw: dict[str, Any], clearance: Clearance, tolerance: Tolerance, scale: float) -> dict[str, Any]:
+    """Its radius or diameter, and the tolerance of that, in proportion."""
+    key = "radial" if clearance.radial is not None else "diametral"
+    size = clearance.radius if clearance.radial is not None else 2.0 * clearance.radius
+    new = {**raw, key: _number(size * scale)}
+    if isinstance(raw.get("tolerance"), list):
+        new["tolerance"] = [_number(scale * end, 12) for end in clearance.tolerance]
+    elif raw.get("tolerance") is not None and clearance.tolerance[1]:
+        new["tolerance"] = _number(scale * clearance.tolerance[1], 12)
+    return new
+
+
+def _number(value: float, digits: int = DIGITS) -> float:
+    return float(f"{value:.{digits}g}")

@@ -15,16 +15,16 @@ from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
 from mechdesign.analyses.reliability.engine.intervals import Precision
-from mechdesign.analyses.reliability.first_order import linear_errors, nominal_values
+from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
 from mechdesign.analyses.reliability.notes import notes
 from mechdesign.analyses.reliability.question import ask, unsaid
-from mechdesign.analyses.reliability.setting import Setting, forward_plan
+from mechdesign.analyses.reliability.simulation import Setting, forward_plan
 from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MOST, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Reason
-from mechdesign.memory import keep_freed_memory
+from mechdesign.parallel import keep_freed_memory
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -161,8 +161,8 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
     channels = question.channels
     reason = np.zeros(poses.count, dtype=np.int8)
     nominal = np.full((len(channels), poses.count), np.nan)
-    flexibility = np.full((len(channels), 3, poses.count), np.nan)
-    components, linear = np.zeros((len(channels), 0, 0)), None
+    elastic = None if bent is None else Elastic(np.full((len(channels), 3, poses.count), np.nan), bent.load)
+    linear = FirstOrder.unknown(sources, len(channels), poses.count)
     groups = []
     for solved in solve_poses(study, poses, [channel.coordinate for channel in channels]):
         configuration, rows = solved.configuration, solved.rows
@@ -175,25 +175,20 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
             row[rows] = value
         for begin in range(0, len(rows), _BLOCK):
             block = np.arange(begin, min(begin + _BLOCK, len(rows)))
-            part = configuration.take(block)
-            elastic = None if bent is None else bent.at(part, channels)
-            if elastic is not None:
-                flexibility[:, :, rows[block]] = elastic.flexibility
+            part, here = configuration.take(block), None
+            if bent is not None and elastic is not None:
+                here = bent.at(part, channels)
+                elastic.flexibility[:, :, rows[block]] = here.flexibility
             with np.errstate(invalid="ignore", divide="ignore"):
-                linear = linear_errors(mechanism, part, channels, sources, rates.take(block), elastic)
-            if not components.size:
-                components = np.full((*linear.components.shape[:2], poses.count), np.nan)
-            components[:, :, rows[block]] = linear.components
+                found = linear_errors(mechanism, part, channels, sources, rates.take(block), here)
+            linear.components[:, :, rows[block]] = found.components
         groups.append((solved, rates))
-    assert linear is not None
-    elastic = None
-    if bent is not None:
-        elastic = Elastic(flexibility, bent.load)
+    if bent is not None and elastic is not None:
         doubts += unknown(bent, channels)
         reason = np.where(np.isin(reason, (Reason.OK, Reason.LIMIT)) & ~elastic.held, np.int8(Reason.NOT_HELD), reason)
-    linear = replace(linear, components=components, offset=None if elastic is None else elastic.offset)
+        linear = replace(linear, offset=elastic.offset)
     task = Task(study, poses, question, sources, reason, nominal, linear, elastic)
-    components[:, :, ~task.assembled] = np.nan
+    linear.components[:, :, ~task.assembled] = np.nan
     return task, groups, doubts
 
 

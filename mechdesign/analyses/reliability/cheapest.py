@@ -7,6 +7,7 @@ far as they are broken.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,10 +15,14 @@ from typing import Any
 import numpy as np
 
 from mechdesign.analyses.reliability.first_order import FirstOrder
+from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import Task
-from mechdesign.analyses.reliability.tolerances import Tolerance
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.study import Study
+from mechdesign.study.schema.reliability import Cost
 
+# Digits that allocated numbers are written with, rounded down: what is tighter keeps what was asked.
+DIGITS = 6
 # Tolerances stay between these multiples of what is given.
 TIGHTEST, WIDEST = 1e-3, 10.0
 # Step of difference quotients in log T, and how far a constraint may be broken.
@@ -25,6 +30,67 @@ _STEP, _SLACK = 1e-4, 1e-9
 # Poses that become constraints at once, and how often more of them may.
 _MORE, _ROUNDS = 6, 30
 _TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """The tolerance of one source.
+
+    Parameters
+    ----------
+    name : str
+    given : float
+        As the study gives it, in its units: half the width of a tolerance, sigma, or a mean radial clearance.
+    kind : str
+        ``tolerance``, ``sigma`` or ``clearance``.
+    cost : Cost or None
+        None where it is held.
+    """
+
+    name: str
+    given: float
+    kind: str
+    unit: str
+    cost: Cost | None
+
+    def price(self, size: float) -> float:
+        """What it costs: a/T^exponent; nan where it is held."""
+        return float("nan") if self.cost is None else self.cost.a / size**self.cost.exponent
+
+    def size(self, scale: float) -> float:
+        """The tolerance so many times as wide, without the dust of the product."""
+        return float(f"{self.given * scale:.12g}")
+
+    def rounded(self, scale: float) -> float:
+        """The nearest scale, not above, whose tolerance has few digits."""
+        size = self.given * scale
+        unit = 10.0 ** (math.floor(math.log10(size)) + 1 - DIGITS)
+        return float(f"{math.floor(size / unit * (1.0 + 1e-7)) * unit:.{DIGITS}g}") / self.given
+
+
+def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
+    """Of all sources, in their order: dimensions are allocated, and what has a cost; other clearances are held."""
+    section = study.reliability
+    assert section is not None
+    assert section.allocate is not None
+    given = section.allocate.cost
+    found = []
+    for scalar in sources.scalars:
+        dimension = section.dimensions[scalar.name]
+        unit = "" if scalar.kind == "parameter" else study.units.label(scalar.moves[scalar.name][1])
+        half = dimension.sigma
+        kind = "sigma"
+        if half is None:
+            assert dimension.tolerance is not None
+            low, high = dimension.tolerance
+            half, kind = 0.5 * (high - low), "tolerance"
+        asked = half > 0 and (scalar.kind != "load" or scalar.name in given)
+        cost = given.get(scalar.name, Cost()) if asked else None
+        found.append(Tolerance(scalar.name, half, kind, unit, cost))
+    for pin in sources.pins:
+        cost = given.get(pin.name) if pin.radius > 0 else None
+        found.append(Tolerance(pin.name, pin.radius, "clearance", study.units.label("length"), cost))
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,10 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.intervals import binomial
-from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.setting import Setting, errors_of
-from mechdesign.analyses.reliability.simulation import CHUNK, generator
+from mechdesign.analyses.reliability.engine.problem import Estimate, counted
+from mechdesign.analyses.reliability.simulation import CHUNK, Setting, errors_of, generator
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Ints
@@ -83,14 +81,14 @@ def _simulated(found: MethodResult, task: Task) -> MethodResult:
         while done < chunks:
             for part in map_chunks(work, range(done, until), task.jobs):
                 total += part
-                task.progress.update(int(part[0]))
+                task.progress.update(int(part[1]))
             done, until = until, min(chunks, 2 * until)
-            estimate = _estimate(total)
+            estimate = counted(*total.tolist())
             if precise and task.precision.reached(estimate.failure, estimate.low, estimate.high):
                 break
     except KeyboardInterrupt:
-        raise Partial(replace(found, cycle=_estimate(total) if total[0] else None)) from None
-    return replace(found, cycle=_estimate(total))
+        raise Partial(replace(found, cycle=counted(*total.tolist()) if total[1] else None)) from None
+    return replace(found, cycle=counted(*total.tolist()))
 
 
 def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk: int, count: int) -> Ints:
@@ -99,7 +97,7 @@ def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk:
     Returns
     -------
     ndarray of int, shape (4,)
-        Mechanisms drawn, those that failed, those that cannot be assembled somewhere, and poses solved.
+        Mechanisms that failed, those drawn, those that cannot be assembled somewhere, and poses solved.
     """
     drawn = sources.draw(generator(seed, chunk, 0, *_STREAM), count)
     within = np.ones(count, dtype=bool)
@@ -115,9 +113,4 @@ def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk:
         within &= setting.question.keeps(errors)
         if not valid.all():
             drawn, within = drawn[:, valid], within[valid]
-    return np.array([count, count - np.count_nonzero(within), count - len(within), evaluations])
-
-
-def _estimate(counted: Ints) -> Estimate:
-    samples, failures, invalid, evaluations = counted.tolist()
-    return Estimate(failures / samples, *binomial(failures, samples), evaluations, samples, failures, invalid)
+    return np.array([count - np.count_nonzero(within), count, count - len(within), evaluations])

@@ -64,10 +64,6 @@ class Elastic:
             row += loads.get(name, 0.0)
         return np.asarray(self.flexibility[:, :, 0] @ force)
 
-    def by(self, name: str) -> Floats:
-        """Error by one component of the load, shape (channels, poses)."""
-        return self.flexibility[:, list(LOADS).index(name)]
-
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:

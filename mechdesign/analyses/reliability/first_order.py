@@ -32,16 +32,23 @@ class FirstOrder:
     ----------
     components : ndarray, shape (channels, components, poses)
         Derivative of each channel (radians, lengths) by each independent component of the sources.
-    owner : ndarray of int, shape (components,)
-        The source of each component.
     offset : ndarray, shape (channels, poses), or None
         Errors that nothing random causes: deflections.
     """
 
     sources: Sources
     components: Floats
-    owner: Ints
     offset: Floats | None = None
+
+    @staticmethod
+    def unknown(sources: Sources, channels: int, poses: int) -> FirstOrder:
+        """Room for poses, all nan."""
+        return FirstOrder(sources, np.full((channels, sum(len(s.directions) for s in sources.all), poses), np.nan))
+
+    @cached_property
+    def owner(self) -> Ints:
+        """The source of each component, shape (components,)."""
+        return np.repeat(np.arange(len(self.sources.all)), [len(source.directions) for source in self.sources.all])
 
     def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
         """Some of the poses."""
@@ -159,7 +166,7 @@ def derivatives(
     found = np.zeros((len(channels), len(names), *(configuration.shape or (1,))))
     for row, name in enumerate(names):
         if elastic is not None and name in LOADS:
-            found[:, row] = elastic.by(name)
+            found[:, row] = elastic.flexibility[:, list(LOADS).index(name)]
     rows = [row for row, name in enumerate(names) if name not in LOADS]
     if not rows:
         return found
@@ -197,13 +204,12 @@ def linear_errors(
     MechanismError
         For the acceleration of a measure that is an expression.
     """
-    directions = [(k, direction) for k, source in enumerate(sources.all) for direction in source.directions]
-    names = list(dict.fromkeys(name for _, direction in directions for name in direction))
-    slopes = np.array([[direction.get(name, 0.0) for name in names] for _, direction in directions])
+    directions = [direction for source in sources.all for direction in source.directions]
+    names = list(dict.fromkeys(name for direction in directions for name in direction))
+    slopes = np.array([[direction.get(name, 0.0) for name in names] for direction in directions])
     by_name = derivatives(mechanism, configuration, channels, names, rates, elastic)
     return FirstOrder(
         sources,
         np.einsum("zn,cnp->czp", slopes.reshape(-1, len(names)), by_name),
-        np.array([k for k, _ in directions], dtype=np.intp),
         None if elastic is None else elastic.offset,
     )

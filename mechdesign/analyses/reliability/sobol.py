@@ -19,8 +19,7 @@ import numpy as np
 from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE
 from mechdesign.analyses.reliability.engine.problem import BLOCK
 from mechdesign.analyses.reliability.first_order import FirstOrder
-from mechdesign.analyses.reliability.setting import Setting, errors_of
-from mechdesign.analyses.reliability.simulation import generator
+from mechdesign.analyses.reliability.simulation import Setting, errors_of, generator
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import Task
 from mechdesign.numerics.arrays import Floats
@@ -103,22 +102,13 @@ def sample(
     flat = points.reshape(dimension, -1)
     parts = [model(flat[:, begin : begin + BLOCK]) for begin in range(0, flat.shape[1], BLOCK)]
     found = np.concatenate(parts, axis=-1).reshape(*parts[0].shape[:2], 2 + len(asked), count)
-    of_a, of_b = found[:, :, 0], found[:, :, 1]
-    mixed_values = np.full((len(rows), *of_a.shape), np.nan)
-    mixed_values[asked] = np.moveaxis(found[:, :, 2:], 2, 0)
-    keep = np.isfinite(of_a).all(axis=(0, 1)) & np.isfinite(of_b).all(axis=(0, 1))
-    keep &= np.isfinite(mixed_values[asked]).all(axis=(0, 1, 2))
-    of_a, of_b = of_a[:, :, keep], of_b[:, :, keep]
-    change = mixed_values[:, :, :, keep] - of_a
-    return Replicate(
-        np.moveaxis((of_b * change).sum(axis=-1), 0, -1),
-        np.moveaxis(change.sum(axis=-1), 0, -1),
-        np.moveaxis((change * change).sum(axis=-1), 0, -1),
-        of_a.sum(axis=-1) + of_b.sum(axis=-1),
-        (of_a * of_a).sum(axis=-1) + (of_b * of_b).sum(axis=-1),
-        int(np.count_nonzero(keep)),
-        count,
-    )
+    keep = np.isfinite(found).all(axis=(0, 1, 2))
+    found = found[..., keep]
+    of_a, of_b, change = found[:, :, 0], found[:, :, 1], found[:, :, 2:] - found[:, :, :1]
+    products = np.full((3, *found.shape[:2], len(rows)), np.nan)
+    products[..., asked] = [values.sum(axis=-1) for values in (of_b[:, :, None] * change, change, change * change)]
+    sums, squares = of_a.sum(axis=-1) + of_b.sum(axis=-1), (of_a * of_a + of_b * of_b).sum(axis=-1)
+    return Replicate(products[0], products[1], products[2], sums, squares, int(keep.sum()), count)
 
 
 def combine(replicates: Sequence[Replicate], linear: tuple[Floats, Floats] | None = None) -> SobolIndices:

@@ -29,7 +29,7 @@ _UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
 
 def at_poses(task: Task, rows: Ints) -> list[Column]:
     """Columns of the poses of these rows."""
-    return [column.take(rows) for column in pose_columns(task.study, task.poses)]
+    return pose_columns(task.study, task.poses, rows)
 
 
 def of_channels(task: Task, channels: Ints) -> list[Column]:

@@ -15,8 +15,7 @@ from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
 from mechdesign.analyses.reliability.question import Question
-from mechdesign.analyses.reliability.setting import Setting
-from mechdesign.analyses.reliability.simulation import Sums
+from mechdesign.analyses.reliability.simulation import Setting, Sums
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.mechanism import Reason
 from mechdesign.numerics.arrays import Flags, Floats

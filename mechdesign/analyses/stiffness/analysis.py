@@ -13,9 +13,8 @@ from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words
 from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held, put
-from mechdesign.analyses.stiffness.force_method import Loaded, load, twists_of
+from mechdesign.analyses.stiffness.force_method import Effects, Loaded, effects_of, load, twists_of
 from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
-from mechdesign.analyses.stiffness.loads import Effects, effects_of
 from mechdesign.analyses.stiffness.network import Guide, Hinge, Network, build_network, carrying_edges
 from mechdesign.analyses.stiffness.tables import (
     Springs,

@@ -78,15 +78,10 @@ def bending(
     course: Course, low: Floats, high: Floats, profile: Profile, at: Complexes
 ) -> Iterator[tuple[Floats, Value]]:
     """Twists (3, n) of what lies between two distances along the beams of a link, and their compliances."""
-    stretch, bend, shear = rigidities(profile)
-    for middle, along, length in course.between(low, high):
-        yield slide_twist(along), length / stretch
-        yield slide_twist(1j * along), length**3 / (12 * bend) + length * shear
-        yield hinge_twist(middle - at), length / bend
-
-
-def rigidities(profile: Profile) -> tuple[float, float, float]:
-    """EA, EI and the shear compliance per length (zero unless asked for) of a section."""
     area, inertia, factor = profile.extent
+    # Shear compliance per length.
     shear = 1 / (factor * profile.G * area) if profile.shear and profile.G is not None else 0.0
-    return profile.E * area, profile.E * inertia, shear
+    for middle, along, length in course.between(low, high):
+        yield slide_twist(along), length / (profile.E * area)
+        yield slide_twist(1j * along), length**3 / (12 * profile.E * inertia) + length * shear
+        yield hinge_twist(middle - at), length / (profile.E * inertia)

@@ -135,13 +135,11 @@ def _inverse(matrix: Floats) -> tuple[Floats, Flags]:
 
 def _exact(inverse: Floats, compliances: Sequence[Floats]) -> Floats:
     """C = W^-T C_c W^-1, poses first."""
-    size, n = inverse.shape[0], inverse.shape[2]
-    total = np.zeros((size, size, n))
-    first = 0
+    total, first = np.zeros_like(inverse), 0
     for block in compliances:
         rows = inverse[first : first + len(block)]
         first += len(block)
-        _add_congruence(total, rows.swapaxes(0, 1), block)
+        total += np.einsum("ian,ijn,jbn->abn", rows, block, rows)
     return np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
 
 
@@ -162,18 +160,8 @@ def _sum_of_legs(legs: Sequence[Floats], compliances: Sequence[Floats]) -> Float
         elif len(block):
             inverse = _inverse_of_three(block)
         if len(block):
-            _add_congruence(total, wrenches, inverse)
+            total += np.einsum("ain,ijn,bjn->abn", wrenches, inverse, wrenches)
     return np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
-
-
-def _add_congruence(total: Floats, outer: Floats, inner: Floats) -> None:
-    """Add outer inner outer^T to `total` in place; the last axis runs over poses."""
-    size = len(total)
-    for i, j in np.ndindex(len(inner), len(inner)):
-        for a in range(size):
-            weighted = outer[a, i] * inner[i, j]
-            for b in range(size):
-                total[a, b] += weighted * outer[b, j]
 
 
 def _inverse_of_three(block: Floats) -> Floats:

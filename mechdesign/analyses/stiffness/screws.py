@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -120,18 +121,11 @@ def constraint_compliance(wrenches: Floats, chain: Chain) -> Floats:
     total = np.zeros((m, m, n))
     for twist, compliance in zip(chain.elastic, chain.compliance, strict=True):
         work = wrenches[0] * twist[0] + wrenches[1] * twist[1] + wrenches[2] * twist[2]
-        for i in range(m):
-            scaled = work[i] * compliance
-            for j in range(i, m):
-                total[i, j] += scaled * work[j]
-    for i in range(m):
-        for j in range(i):
-            total[i, j] = total[j, i]
+        total += (work * compliance)[:, None] * work
     return total
 
 
-@dataclass(frozen=True, eq=False)
-class Spring:
+class Spring(NamedTuple):
     """One equivalent spring of a leg in n poses.
 
     Parameters
@@ -165,10 +159,8 @@ def equivalent_springs(wrenches: Floats, chain: Chain, length: float) -> list[Sp
     far = np.hypot(twist[0], twist[1]) > np.abs(twist[2]) * length / RANK
     slides, pins = _parallel_springs(twist, chain), _pin_springs(twist, chain)
     return [
-        Spring(
-            np.where(far, s.stiffness, p.stiffness), np.where(far, s.place, p.place), np.where(far, s.angle, p.angle)
-        )
-        for s, p in zip(slides, pins, strict=True)
+        Spring(*(np.where(far, a, b) for a, b in zip(slide, pin, strict=True)))
+        for slide, pin in zip(slides, pins, strict=True)
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import Held, directional, principal
-from mechdesign.analyses.stiffness.loads import Effects, joints_of, points_of
+from mechdesign.analyses.stiffness.force_method import Effects, joints_of, points_of
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.results import Column, Table
@@ -42,16 +42,15 @@ class Springs:
         return whole.take(np.lexsort((whole.leg, whole.row)))
 
 
-def _kinds(size: int, what: str) -> dict[tuple[int, int], str]:
-    """Kind of quantity of each entry of the upper triangle of a stiffness or compliance matrix."""
-    prefix = ("", "coupling_", "rotational_")
-    return {(i, j): prefix[(i == 2) + (j == 2)] + what for i in range(size) for j in range(i, size)}
-
-
 def _entries(study: Study, letter: str, matrix: Floats, what: str, meaning: str) -> list[Column]:
+    """Columns of the upper triangle of stiffness or compliance matrices."""
+    prefix = ("", "coupling_", "rotational_")
     return [
-        Column(f"{letter}{i + 1}{j + 1}", matrix[:, i, j], study.units.label(kind), meaning)
-        for (i, j), kind in _kinds(matrix.shape[1], what).items()
+        Column(
+            f"{letter}{i + 1}{j + 1}", matrix[:, i, j], study.units.label(prefix[(i == 2) + (j == 2)] + what), meaning
+        )
+        for i in range(matrix.shape[1])
+        for j in range(i, matrix.shape[1])
     ]
 
 

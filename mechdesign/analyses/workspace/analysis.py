@@ -163,9 +163,7 @@ def _doubts(question: Question, given: Evaluation) -> Iterator[str]:
 
 
 def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluation]) -> Iterator[Column]:
-    for name in asked[0].held:
-        label = study.units.label(study.mechanism.quantity(name))
-        yield Column(name, np.array([question.held[name] for question in asked]), label, "held coordinate")
+    yield from stacked([held_columns(study, question, 1) for question in asked])
     meanings = index_meanings(study, asked[0])
 
     def column(name: str) -> Column:

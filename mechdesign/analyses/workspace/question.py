@@ -17,8 +17,8 @@ from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
 from mechdesign.indices import INDEX_NAMES, USUAL, needed_section
-from mechdesign.memory import keep_freed_memory
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.parallel import keep_freed_memory
 from mechdesign.study import Study
 
 SECTOR_RAYS, MIDPOINT_RAYS = 101, 300

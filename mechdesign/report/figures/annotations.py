@@ -1,4 +1,4 @@
-"""What stands around the links of a drawing: arrows of the drives, names, and what names must not cover."""
+"""What stands around the links of a drawing: arrows of the drives, and names."""
 
 from __future__ import annotations
 
@@ -6,15 +6,9 @@ import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
-from numpy.typing import NDArray
-
-from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import shapes, style
-from mechdesign.report.figures.labels import Label, paper
+from mechdesign.report.figures.labels import Label
 from mechdesign.report.figures.scene import GROUND, Scene, hull
 
 _LEAST_SWEEP = 0.2  # radians; a smaller angle gets an arrow of the positive sense instead
@@ -126,60 +120,3 @@ def _link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
             reach, heading = shapes.BAR / 2 + 3, cmath.phase(1j * run if (1j * run).imag >= 0 else -1j * run)
         labels.append(Label(name, anchors, shapes.darker(colors[name]), reach, heading, 9, True, True))
     return labels
-
-
-def obstacles(axes: Axes, scene: Scene, arrows: Sequence[Arrow], travel: Mapping[str, tuple[float, float]]) -> Floats:
-    """Points on paper, shape (n, 2), that names should not cover: links, symbols, rails, arrows."""
-    found = [_column(np.array([]))]
-
-    def at(place: complex) -> Floats:
-        return paper(axes, np.array([place]))
-
-    for name, link in scene.description.links.items():
-        places = [scene.points[point] for point in scene.link_points(name)]
-        if name == GROUND or len(places) < 2:
-            continue
-        corners = places[:2] if link.telescopic else hull(places)
-        width = shapes.BAR + 3 if link.telescopic else shapes.BAR
-        closing = corners[:1] if len(corners) > 2 else []
-        for start, end in zip(corners, corners[1:] + closing, strict=False):
-            found.append(_strip(paper(axes, np.array([start, end])), width))
-    ring = np.exp(1j * np.linspace(0, math.tau, 9))
-    for place in scene.points.values():
-        found.append(at(place) + (shapes.PIN + 1) * _column(ring))
-    for point in scene.pivots():
-        x, y = np.meshgrid(np.linspace(-12, 12, 7), np.linspace(-shapes.GROUND - 1, -2, 4))
-        found.append(at(scene.points[point]) + _column(x + 1j * y))
-    for guide in scene.guides:
-        if guide.slider is not None:
-            x, y = np.meshgrid(np.linspace(-0.5, 0.5, 7), np.linspace(-0.5, 0.5, 5))
-            found.append(at(guide.pin) + _column((x * shapes.BLOCK[0] + 1j * y * shapes.BLOCK[1]) * guide.along))
-        if guide.owner == GROUND:
-            down = shapes.rail_side(guide.along) * (shapes.BLOCK[1] / 2 + 3)
-            rail = paper(axes, np.array(guide.ends(travel, scene.span)))
-            found.append(_strip(rail + np.array([down.real, down.imag]), 5))
-    for arrow in arrows:
-        if isinstance(arrow, Turn):
-            arc = arrow.radius * np.exp(1j * (arrow.start + np.linspace(0, 1, 16) * arrow.sweep))
-            found.append(at(arrow.place) + _column(arc))
-        else:
-            stem = arrow.along * (np.linspace(-0.5, 0.5, 9) * arrow.length + 1j * arrow.away)
-            found.append(at(arrow.place) + _column(stem))
-    return np.concatenate(found)
-
-
-def _column(places: NDArray[Any]) -> Floats:
-    flat = np.ravel(places)
-    return np.column_stack([flat.real, flat.imag])
-
-
-def _strip(ends: Floats, width: float) -> Floats:
-    """Points over a straight strip of some width, about 4 points of paper apart."""
-    run = ends[1] - ends[0]
-    length = float(np.hypot(*run))
-    if length == 0:
-        return ends
-    count = max(2, int(length / 4))
-    normal = np.array([-run[1], run[0]]) / length * width / 2
-    middle = ends[0] + np.linspace(0, 1, count)[:, None] * run
-    return np.concatenate([middle - normal, middle, middle + normal])

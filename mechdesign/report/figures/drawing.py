@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-import numpy as np
 from matplotlib.axes import Axes
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
-from mechdesign.report.figures.annotations import Turn, drive_arrows, name_labels, obstacles
-from mechdesign.report.figures.labels import paper, place_labels
+from mechdesign.report.figures.annotations import Turn, drive_arrows, name_labels
+from mechdesign.report.figures.labels import covered, place_labels
 from mechdesign.report.figures.scene import GROUND, Guide, Scene, hull, pose
 from mechdesign.report.figures.shapes import Pen
 
@@ -37,12 +35,12 @@ def draw_mechanism(
     labels: bool = True,
     drives: bool = True,
     travel: Travel | None = None,
-    avoid: Complexes | None = None,
     size: float = 1.0,
 ) -> None:
     """Draw a mechanism in one pose of a batch; a pose that cannot be assembled draws nothing.
 
     Sizes of symbols are in points on paper, so that limits may change after drawing; only labels need final limits.
+    They keep off what is drawn before.
 
     Parameters
     ----------
@@ -52,8 +50,6 @@ def draw_mechanism(
         Pale and below what is drawn otherwise, without labels and drives: for further poses.
     travel : mapping, optional
         Range of each slide (lengths from the line's origin), which its guide should cover.
-    avoid : complex ndarray, optional
-        Places of the drawing that names should not cover.
     size : float
         Size of the symbols; 1 for a drawing as wide as the page.
     """
@@ -91,10 +87,7 @@ def draw_mechanism(
             pen.push(arrow.place, arrow.along, arrow.length, arrow.away, DRIVE)
     if labels:
         named = name_labels(scene, colors, arrows, DRIVE)
-        blocked = obstacles(axes, scene, arrows, travel or {})
-        if avoid is not None:
-            blocked = np.concatenate([blocked, paper(axes, avoid)])
-        place_labels(axes, named, blocked, order=pen.order + 2)
+        place_labels(axes, named, covered(axes), order=pen.order + 2)
 
 
 def draw_ghost(axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int, *, share: float) -> None:

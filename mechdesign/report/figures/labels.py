@@ -9,12 +9,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
+from numpy.typing import ArrayLike
 
 from mechdesign.numerics.arrays import Complexes, Floats
 
 _LETTER = 0.62  # mean width of a letter in font sizes
 _DIRECTIONS = 16
+_NET = 4.5  # points between two places of what names keep off
+_SYMBOL = 36.0  # largest diagonal of a symbol, points: nothing is written into it
+_HATCHED = 10.0  # width of a hatched line, points
+_PALE = 0.5  # opacity below which a drawing may be written on
 
 
 @dataclass(frozen=True)
@@ -51,14 +59,14 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
     Parameters
     ----------
     obstacles : ndarray, shape (n, 2)
-        Points of the drawing that names should not cover, in points on paper (`paper`).
+        Points of the drawing that names should not cover, in points on paper (`covered`).
     """
     window = paper(axes, np.array([complex(axes.get_xlim()[0], axes.get_ylim()[0]),
                                    complex(axes.get_xlim()[1], axes.get_ylim()[1])]))  # fmt: skip
     obstacles = obstacles[np.argsort(obstacles[:, 0])]
     taken, count = np.empty((len(labels), 4)), 0
     for label in labels:
-        half = np.array([_LETTER * label.size * len(label.text), 0.85 * label.size]) / 2
+        half = np.array([_LETTER * label.size * len(label.text), label.size]) / 2
         offsets, strains = _offsets(label, half)
         # Only what is within reach of some place can be covered.
         reach = np.abs(offsets).max(axis=0) + half + 2
@@ -76,7 +84,7 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
             k = int(np.argmin(costs))
             if best is None or costs[k] < best[0]:
                 best = float(costs[k]), anchor, offsets[k], boxes[k]
-        if best is None or (label.optional and best[0] > 4.0):
+        if best is None or (label.optional and best[0] > 5.5):
             continue
         _, anchor, offset, box = best
         taken[count], count = box, count + 1
@@ -89,10 +97,42 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
 
 def paper(axes: Axes, places: Complexes) -> Floats:
     """Places of the drawing in points on paper, shape (n, 2)."""
+    return _points(axes, axes.transData.transform(np.column_stack([places.real, places.imag])))
+
+
+def _points(axes: Axes, pixels: ArrayLike) -> Floats:
     figure = axes.get_figure(root=True)
     assert figure is not None
-    pixels = axes.transData.transform(np.column_stack([places.real, places.imag]))
     return np.asarray(pixels, dtype=float) * 72 / figure.dpi
+
+
+def covered(axes: Axes) -> Floats:
+    """Points on paper, shape (n, 2), in a net, that lines and symbols cover; what is pale may be written on."""
+    found = [np.empty(0, dtype=complex)]
+    filled = {patch for patch in axes.patches if to_rgba(patch.get_facecolor())[3]}
+    lines: list[Line2D | Patch] = [*axes.lines, *axes.patches]
+    for artist in lines:
+        # The strokes of a hatched line stand beside it.
+        width = _HATCHED if artist.get_path_effects() else artist.get_linewidth()
+        if not width or (artist.get_alpha() or 1.0) < _PALE:
+            continue
+        path, moved = artist.get_path(), artist.get_transform()
+        dots = isinstance(artist, Line2D) and artist.get_linestyle() == "None"
+        pieces = moved.transform(path.vertices)[:, None] if dots else path.to_polygons(moved, closed_only=False)
+        for piece in filter(lambda piece: np.isfinite(piece).all(), pieces):
+            z = _points(axes, piece) @ np.array([1, 1j])
+            low, high = complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
+            if artist in filled and abs(high - low) < _SYMBOL:
+                x, y = (np.arange(a, b + _NET, _NET) for a, b in ((low.real, high.real), (low.imag, high.imag)))
+                found.append(np.add.outer(x, 1j * y).ravel())
+                continue
+            ends = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(z)))])
+            line = np.interp(np.linspace(0.0, ends[-1], 2 + int(ends[-1] / _NET)), ends, z)
+            along = np.gradient(line)
+            across = 0.5j * width * along / np.maximum(np.abs(along), 1e-9)
+            found += [line - across, line, line + across]
+    every = np.concatenate(found)
+    return np.unique(np.round(np.column_stack([every.real, every.imag]) / _NET), axis=0) * _NET
 
 
 def _offsets(label: Label, half: Floats) -> tuple[Floats, Floats]:
@@ -112,12 +152,7 @@ def _offsets(label: Label, half: Floats) -> tuple[Floats, Floats]:
     return np.array(places), np.array(strains)
 
 
-def _costs(
-    boxes: Floats,
-    obstacles: Floats,
-    taken: Floats,
-    window: Floats,
-) -> Floats:
+def _costs(boxes: Floats, obstacles: Floats, taken: Floats, window: Floats) -> Floats:
     """What each of some boxes (left, low, right, high; a row each) would cover, and how far it leaves the window."""
     left, low, right, high = boxes.T[:, :, None]
     x, y = obstacles.T

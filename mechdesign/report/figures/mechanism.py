@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.shown import solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.model import Fixed
 from mechdesign.report.figures import style
-from mechdesign.report.figures.beams import draw_beams
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, extent, fit, framed, scale_of, windows
 from mechdesign.report.figures.labels import paper
@@ -26,6 +28,8 @@ _TITLE, _LINE, _LETTERS = 0.42, 0.18, 11.5  # inches for a title and a further l
 _SAME = 0.02  # part of the mechanism's size by which the points of two poses differ that need not both be drawn
 _ROUGH = 10.0  # points on paper: a place drawn nearer than this lies under the symbol of its joint
 _TALLEST = 4.2
+_SHORTEST = 0.005  # part of the mechanism's size: nearer to a beam than this, a bracket is too short to be seen
+_BEAMS = 3.3  # order: above links and slots, below pins and names
 
 
 def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -> Figure:
@@ -72,8 +76,8 @@ def sketch_figure(study: Study) -> Figure:
         crosses.real, crosses.imag, "x", color=style.INK, alpha=0.5, markersize=7, markeredgewidth=1.6, zorder=4.5
     )
     axes.set_title("the sketch, assembled" + ("; crosses: where it is drawn" if len(rough) else ""), loc="left")
-    draw_beams(axes, study, mechanism.sketch_configuration)
-    draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=crosses)
+    _draw_beams(axes, study, mechanism.sketch_configuration)
+    draw_mechanism(axes, mechanism, mechanism.sketch_configuration)
     return figure
 
 
@@ -110,7 +114,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
     figure, grid = windows(window, study.units.label("length"), count, columns, above=above)
     for axes, title, (_, configuration, index) in zip(grid, titles, panels, strict=True):
         axes.set_title(title, loc="left")
-        draw_beams(axes, study, configuration, index)
+        _draw_beams(axes, study, configuration, index)
         draw_mechanism(axes, mechanism, configuration, index, travel=travel)
     return figure
 
@@ -118,3 +122,45 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
     return (style.WIDTH - RIGHT - LEFT * columns) / columns, 3.0 if rows > 1 else _TALLEST
+
+
+def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: int = 0) -> None:
+    """Draw the beams of the study's elastic links in one pose of a batch, where they are not plainly the link itself.
+
+    Those are links with brackets, and links of more than two points without ends.
+    """
+    if study.stiffness is None:
+        return
+    looks = {"elastic beam": (1.3, (0, (6, 2))), "rigid bracket": (2.2, "-")}
+    told = set()
+    for name in study.stiffness.elastic:
+        lines = list(_lines(study, name, configuration, index))
+        if len(lines) == 1 and len(lines[0][1]) < 3:
+            continue
+        for kind, ends in lines:
+            width, dashes = looks[kind]
+            axes.plot(ends.real, ends.imag, color=style.INK, linewidth=width, linestyle=dashes, zorder=_BEAMS,
+                      label=kind if kind not in told else None)  # fmt: skip
+            told.add(kind)
+    if told:
+        axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none")
+
+
+def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
+    """The beams of a link, all in one line, and its brackets."""
+    from mechdesign.analyses.stiffness.beams import beams_of, course_of
+
+    mechanism = study.mechanism
+    link = mechanism.description.links[name]
+    beams = beams_of(link)
+    yield "elastic beam", np.array([np.ravel(configuration.point(corner))[index] for corner in beams.corners])
+    if link.telescopic or len(beams.corners) < 2:
+        return
+    course = course_of(beams, configuration)
+    riding = [joint.point for joint in mechanism.description.joints.values()
+              if not isinstance(joint, Fixed) and joint.line.link == name]  # fmt: skip
+    for point in (*link.points, *riding):
+        place = configuration.point(point)
+        ends = np.array([np.ravel(end)[index] for end in (course.place(course.foot(point, place)), place)])
+        if abs(ends[1] - ends[0]) > _SHORTEST * mechanism.size:
+            yield "rigid bracket", ends

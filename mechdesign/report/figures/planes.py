@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
@@ -103,8 +102,10 @@ def _map(figure: Figure, axes: Axes, bar: Axes, over: Plane, values: Floats, log
     if not known.any():
         bar.set_visible(False)
         return
-    levels = _powers(values[known]) if logarithmic else _round(values[known])
-    if logarithmic:
+    if not logarithmic:
+        levels = style.levels(float(values[known].min()), float(np.quantile(values[known], 0.97)), 9)
+    else:
+        levels = _powers(values[known])
         # Between nodes powers are interpolated; below the last level is all that is smaller, even 0.
         values, levels = np.log10(np.maximum(values, 1e-3 * levels[0])), np.log10(levels)
     shown = np.ma.masked_invalid(values)
@@ -124,13 +125,6 @@ def _map(figure: Figure, axes: Axes, bar: Axes, over: Plane, values: Floats, log
     if logarithmic:
         bar.set_yticks(levels, [_power(10.0**level) for level in levels])
     bar.tick_params(labelsize=8)
-
-
-def _round(values: Floats) -> Floats:
-    low, high = float(values.min()), float(np.quantile(values, 0.97))
-    if high - low <= 1e-9 * abs(high):
-        low, high = low - 0.5 * abs(low) - 1e-12, low + 0.5 * abs(low) + 1e-12
-    return np.asarray(MaxNLocator(nbins=9, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
 
 
 def _powers(values: Floats) -> Floats:

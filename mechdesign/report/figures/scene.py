@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.model import Description, Fixed, Line, Link, Slot, Term
+from mechdesign.mechanism.model import Description, Fixed, Link, Slot
 
 GROUND = "ground"
 
@@ -103,8 +104,8 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
     """The pose of that index in a (flattened) batch, or None where it cannot be assembled."""
     description = mechanism.description
 
-    def pick(values: np.ndarray) -> complex:
-        return complex(np.ravel(values)[index])
+    def pick(values: Value) -> complex:
+        return complex(np.broadcast_to(values, configuration.shape).flat[index])
 
     names = {point for link in description.links.values() for point in link_points(link)}
     points = {name: pick(configuration.point(name)) for name in sorted(names)}
@@ -112,30 +113,14 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
     if not all(map(cmath.isfinite, (*points.values(), *rotations.values()))):
         return None
 
-    def number(term: Term) -> float:
-        if not isinstance(term, str):
-            return term
-        value = configuration.places.get(term, description.places[term].nominal)
-        return float(np.ravel(np.broadcast_to(value, configuration.shape))[index])
-
-    def line(of: Line) -> tuple[complex, complex]:
-        rotation, link = rotations[of.link], description.links[of.link]
-        if of.through is not None:
-            start = points[of.through]
-        elif of.link == GROUND or not link.points:
-            start = 0j
-        else:
-            name, (x, y) = next(iter(link.points.items()))
-            start = points[name] - rotation * complex(number(x), number(y))
-        if of.toward is not None:
-            return start, (points[of.toward] - start) / abs(points[of.toward] - start)
-        return start, rotation * cmath.exp(1j * number(of.direction))
-
-    guides = []
+    graph, guides = mechanism.graph, []
+    edges = {edge.slide: k for k, edge in enumerate(graph.edges)}
     for name, joint in description.joints.items():
         if isinstance(joint, Fixed):
             continue
-        origin, along = line(joint.line)
+        k = edges[graph.slides.index(name)]
+        origin = pick(configuration.nodes[graph.edges[k].tail])
+        along = pick(configuration.rotations[graph.edges[k].frame] * configuration.vectors.d[k])
         slider = None if isinstance(joint, Slot) else joint.slider
         guides.append(Guide(name, joint.line.link, joint.point, origin, along, points[joint.point], slider))
     drawn = np.array([mechanism.sketch_configuration.point(name) for name in points])

@@ -8,13 +8,17 @@ from contextlib import contextmanager
 from typing import Any, Literal
 
 import matplotlib
+import numpy as np
 from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from PIL import Image
+
+from mechdesign.numerics.arrays import Floats
 
 DPI = 120
 # Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 10 ms a picture; 9 takes 40 ms for two hundredths more.
@@ -102,6 +106,13 @@ def color_bar(figure: Figure, drawn: ScalarMappable, label: str = "", **options:
     bar.set_label(label)
     bar.outline.set_visible(False)
     return bar
+
+
+def levels(low: float, high: float, number: int) -> Floats:
+    """About so many levels at round numbers over a range; about its value where it is only one."""
+    if high - low <= 1e-9 * max(abs(low), abs(high)):
+        low, high = low - 0.5 * max(abs(low), 1e-12), high + 0.5 * max(abs(high), 1e-12)
+    return np.asarray(MaxNLocator(nbins=number, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
 
 
 def axis_label(name: str, unit: str = "") -> str:

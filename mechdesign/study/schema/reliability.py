@@ -441,13 +441,8 @@ def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath)
             checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
     if name in checker.parameters.nominal:
         return
-    if name in LOADS:
-        kind = LOADS[name]
-    elif name in checker.places:
-        kind = checker.places[name].quantity
-    else:
-        kind = checker.mechanism.driven_kinds[name]
-    checker.kind(path, kind)
+    kinds = {**checker.mechanism.driven_kinds, **LOADS}
+    checker.kind(path, checker.places[name].quantity if name in checker.places else kinds[name])
 
 
 def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tuple[str, list[str]]]:

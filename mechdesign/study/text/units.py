@@ -10,12 +10,11 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
-Powers = tuple[int, int, int, int]
+Powers = tuple[int, ...]
 """Exponents of length, angle, time and force."""
 
 KINDS: dict[str, Powers] = {
@@ -226,13 +225,8 @@ def _common(unit: str) -> tuple[Powers, float] | None:
     powers = KINDS[kind]
     if len(names) == 2:
         kind, divisor = _COMMON[names[1]]
-        powers, factor = _powers(a - b for a, b in zip(powers, KINDS[kind], strict=True)), factor / divisor
+        powers, factor = tuple(a - b for a, b in zip(powers, KINDS[kind], strict=True)), factor / divisor
     return powers, factor
-
-
-def _powers(exponents: Iterable[float]) -> Powers:
-    length, angle, time, force = map(int, exponents)
-    return length, angle, time, force
 
 
 @cache
@@ -250,7 +244,7 @@ def _unit(unit: str) -> tuple[Powers, float]:
     if any(exponent != int(exponent) for exponent in exponents):
         raise QuantityError(f"the unit {unit!r} has a broken power")
     # The registry's base of mass is the gram.
-    return _powers(exponents), float(base.magnitude) * 1e-3**mass
+    return tuple(map(int, exponents)), float(base.magnitude) * 1e-3**mass
 
 
 @cache

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.numerics.arrays import Flags, Floats
 
 # Step of a difference quotient of margins, in standard deviations: the third root of what rounding leaves in doubt.
@@ -48,6 +49,11 @@ class Estimate:
         if self.samples and self.failure == self.failures / self.samples:
             return 3.0 * math.sqrt(self.failure * (1.0 - self.failure) / self.samples)
         return 0.5 * (self.high - self.low)
+
+
+def counted(failures: int, samples: int, invalid: int, evaluations: int) -> Estimate:
+    """Estimate from counted failures, with the interval of Clopper and Pearson."""
+    return Estimate(failures / samples, *binomial(failures, samples), evaluations, samples, failures, invalid)
 
 
 class Problem:

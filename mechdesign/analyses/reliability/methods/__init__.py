@@ -7,10 +7,8 @@ from importlib import import_module
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.setting import Setting
-from mechdesign.analyses.reliability.simulation import Sums
+from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
@@ -42,13 +40,6 @@ def normal(name: str, task: Task, mean: Floats, covariance: Floats) -> MethodRes
             pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)
         })  # fmt: skip
     return found
-
-
-def counted(sums: Sums) -> Estimate:
-    """Estimate from counted failures, with the interval of Clopper and Pearson."""
-    low, high = binomial(sums.failures, sums.samples)
-    invalid = sums.samples - sums.valid
-    return Estimate(sums.failures / sums.samples, low, high, sums.samples, sums.samples, sums.failures, invalid)
 
 
 def pose_by_pose(name: str, task: Task, work: Callable[[Setting], MethodResult]) -> MethodResult:

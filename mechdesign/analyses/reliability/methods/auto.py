@@ -11,9 +11,8 @@ import numpy as np
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
 from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
-from mechdesign.analyses.reliability.methods import SEARCH, counted, pose_by_pose
-from mechdesign.analyses.reliability.setting import Setting, problem_of
-from mechdesign.analyses.reliability.simulation import Sums, generator, simulate_chunk
+from mechdesign.analyses.reliability.methods import SEARCH, pose_by_pose
+from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 
@@ -46,7 +45,7 @@ def run(task: Task) -> MethodResult:
                 # The first chunk is the pilot, the following ones are whole.
                 size = min(PILOT if not drawn else FEW, count - have)
                 drawn.append(simulate_chunk(setting, task.sources, task.seed, len(drawn), size))
-            return counted(Sums.total(drawn))
+            return Sums.total(drawn).estimate
 
         if not task.question.limited:
             plain(min(FEW, task.most))

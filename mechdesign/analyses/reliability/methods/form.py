@@ -20,8 +20,7 @@ from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
 from mechdesign.analyses.reliability.probability import half_spaces
-from mechdesign.analyses.reliability.setting import Setting, problem_of
-from mechdesign.analyses.reliability.simulation import generator
+from mechdesign.analyses.reliability.simulation import Setting, generator, problem_of
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 

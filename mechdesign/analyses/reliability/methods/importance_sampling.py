@@ -15,9 +15,8 @@ from mechdesign.analyses.reliability.engine.design_points import EXPLORED, MOST,
 from mechdesign.analyses.reliability.engine.intervals import Precision, weighted
 from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Problem, failed
-from mechdesign.analyses.reliability.methods import SEARCH, counted, of_limits
-from mechdesign.analyses.reliability.setting import Setting, problem_of
-from mechdesign.analyses.reliability.simulation import Sums, generator, simulate
+from mechdesign.analyses.reliability.methods import SEARCH, of_limits
+from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 
@@ -51,7 +50,7 @@ def run(task: Task) -> MethodResult:
             return found
         sums: dict[int, Sums] = {}
         simulate([setting], task.sources, task.seed, task.samples, sums)
-        found = counted(sums[setting.pose])
+        found = sums[setting.pose].estimate
         return replace(found, evaluations=found.evaluations + problem.evaluations)
 
     return of_limits("importance_sampling", task, work)

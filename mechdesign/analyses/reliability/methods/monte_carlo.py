@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from mechdesign.analyses.reliability.methods import counted
 from mechdesign.analyses.reliability.simulation import Sums, simulate
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 
@@ -19,5 +18,5 @@ def run(task: Task) -> MethodResult:
 
 
 def _found(task: Task, sums: dict[int, Sums]) -> MethodResult:
-    estimates = {pose: counted(each) for pose, each in sums.items()} if task.question.limited else {}
+    estimates = {pose: each.estimate for pose, each in sums.items()} if task.question.limited else {}
     return MethodResult("monte_carlo", estimates, sums)

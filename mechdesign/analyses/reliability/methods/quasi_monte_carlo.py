@@ -14,8 +14,7 @@ import numpy as np
 from mechdesign.analyses.reliability.engine.intervals import binomial, replicated
 from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate
 from mechdesign.analyses.reliability.methods import QUASI, pose_by_pose
-from mechdesign.analyses.reliability.setting import Setting
-from mechdesign.analyses.reliability.simulation import Sums, generator, sums_of
+from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, sums_of
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 

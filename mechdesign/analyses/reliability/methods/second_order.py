@@ -14,7 +14,7 @@ import numpy as np
 
 from mechdesign.analyses.reliability.laws import PIN_LAWS, Normal, pair_nodes
 from mechdesign.analyses.reliability.methods import normal
-from mechdesign.analyses.reliability.setting import Setting, errors_of
+from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats, Ints

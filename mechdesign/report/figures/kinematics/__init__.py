@@ -5,8 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from mechdesign.report.figures.kinematics.curves import curves_figure
-from mechdesign.report.figures.kinematics.modes import modes_figure
-from mechdesign.report.figures.kinematics.paths import paths_figure
+from mechdesign.report.figures.kinematics.paths import modes_figure, paths_figure
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.sweep import Sweep
 from mechdesign.results import Result

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,17 +33,12 @@ _LIMITS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
 
 
-@dataclass(frozen=True)
-class _Curve:
+class _Curve(NamedTuple):
     """A column, what it is of, and what kind of number it holds."""
 
     column: Column
     of: str
     order: str
-
-    @property
-    def panel(self) -> tuple[str, str]:
-        return self.order, self.column.unit
 
 
 def curves_figure(study: Study, result: Result) -> Figure | None:
@@ -57,7 +51,9 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     panels = _panels(study, [column for column in table.columns if column.name != "valid"], swept, x)
     if not panels:
         return None
-    marks = list(_limits(result, swept)) if swept else []
+    limits, marks = result.tables.get("limits"), []
+    if limits is not None and swept in limits:
+        marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
     longest = min(max(len(curve.of) for panel in panels for curve in panel[:MOST_CURVES]), _LETTERS)
     figure, axes = style.page(
@@ -104,7 +100,7 @@ def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[
         if not told and _still(position, sizes.get(unit_of.get(of, ""), 1.0)):
             continue
         curve = _Curve(column, of, order)
-        panels.setdefault(curve.panel, []).append(curve)
+        panels.setdefault((order, column.unit), []).append(curve)
     found = sorted(panels.values(), key=lambda panel: _RANKS.index(panel[0].order))[:MOST_PANELS]
     for panel in found:
         if len(panel) > MOST_CURVES:
@@ -121,13 +117,6 @@ def _coincide(one: Floats, other: Floats) -> bool:
     known = np.isfinite(one) & np.isfinite(other)
     span = max(float(np.ptp(one[known])), float(np.ptp(other[known]))) if known.any() else 0.0
     return bool(np.all(np.abs(one[known] - other[known]) <= _HIDDEN * span))
-
-
-def _limits(result: Result, swept: str) -> Iterator[tuple[float, str]]:
-    """Value of the swept coordinate and kind of each limit of motion."""
-    table = result.tables.get("limits")
-    if table is not None and swept in table:
-        yield from zip(table[swept].tolist(), table["kind"].tolist(), strict=True)
 
 
 def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]]:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib.tri import Triangulation
 
 from mechdesign.analyses.optimize.tables import Comparison
@@ -134,13 +134,9 @@ def _fill(axes: Axes, compared: Comparison, values: Floats) -> ScalarMappable:
     mesh = Triangulation(*scaled)
     corners = np.stack([mesh.x[mesh.triangles], mesh.y[mesh.triangles]])
     mesh = Triangulation(x, y, mesh.triangles, mask=(np.ptp(corners, axis=2) > 2.01).any(axis=0))
-    norm = None
-    if np.ptp(z) == 0:
-        levels = np.array([z[0] - 0.5, z[0] + 0.5])
-    elif _steep(z) and len(designs.goals) == 1:
+    levels, norm = style.levels(z.min(), z.max(), LEVELS), None
+    if _steep(z) and len(designs.goals) == 1:
         levels, norm = np.geomspace(z.min(), z.max(), LEVELS + 1), LogNorm(z.min(), z.max())
-    else:
-        levels = np.asarray(MaxNLocator(nbins=LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(z.min(), z.max()))
     filled = axes.tricontourf(mesh, z, levels=levels, cmap=style.COLORMAP, norm=norm)
     axes.tricontour(mesh, z, levels=levels, colors="white", linewidths=0.4, alpha=0.6)
     axes.margins(0.02)

@@ -8,16 +8,15 @@ from matplotlib.figure import Figure
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.report.figures import style
-from mechdesign.report.figures.annotations import name_labels, obstacles
-from mechdesign.report.figures.drawing import draw_mechanism, link_colors
-from mechdesign.report.figures.framing import TALLEST, TITLE, framed
-from mechdesign.report.figures.labels import place_labels
+from mechdesign.report.figures.annotations import name_labels
+from mechdesign.report.figures.drawing import link_colors
+from mechdesign.report.figures.labels import covered, place_labels
 from mechdesign.report.figures.panels import along
 from mechdesign.report.figures.planes import Plane, map_sheet, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, pose
-from mechdesign.report.figures.stiffness.deflected import deflections, free_motion
-from mechdesign.report.figures.stiffness.springs import Coil, coil_labels, coil_obstacles, draw_coils, quantity
+from mechdesign.report.figures.stiffness.deflected import deflections, free_motion, posed
+from mechdesign.report.figures.stiffness.springs import Coil, coil_labels, draw_coils, quantity
 from mechdesign.results import Result
 from mechdesign.study import Poses, Study
 
@@ -50,13 +49,10 @@ def _springs(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     if scene is None or not coils:
         return None
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
-    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
-    axes.set_title(f"equivalent springs at {pose_in_words(study, poses, drawn.row)}", loc="left")
-    draw_mechanism(axes, study.mechanism, drawn.configuration, labels=False, drives=False)
+    figure, axes = posed(study, poses, drawn, places, "equivalent springs", labels=False, drives=False)
     draw_coils(axes, coils)
     points = [label for label in name_labels(scene, link_colors(study.mechanism), (), style.INK) if not label.italic]
-    blocked = np.concatenate([obstacles(axes, scene, (), {}), coil_obstacles(axes, coils)])
-    place_labels(axes, coil_labels(coils) + points, blocked, order=8)
+    place_labels(axes, coil_labels(coils) + points, covered(axes), order=8)
     return figure
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
@@ -29,6 +31,14 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
                    3 * _ALONG**2 - 2 * _ALONG**3, _ALONG**3 - _ALONG**2])  # fmt: skip
 
 
+def posed(study: Study, poses: Poses, drawn: Drawn, places: Complexes, what: str, **look: Any) -> tuple[Figure, Axes]:
+    """The mechanism in a pose, in a window that holds these places, too."""
+    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
+    axes.set_title(f"{what} at {pose_in_words(study, poses, drawn.row)}", loc="left")
+    draw_mechanism(axes, study.mechanism, drawn.configuration, **look)
+    return figure, axes
+
+
 def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     """The whole mechanism where each load moves it."""
     scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
@@ -42,8 +52,7 @@ def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     scales = [round_down(_MOVED * scene.span / max(size, 1e-300)) for size in sizes]
     bent = [[rest + scale * move[:, k] for rest, move in shapes] for k, scale in enumerate(scales)]
     places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
-    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
-    draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True)
+    figure, axes = posed(study, poses, drawn, places, "deflections, enlarged,", faint=True)
     for color, lines, each, scale in zip(style.PALETTE, bent, loads, scales, strict=False):
         for line in lines:
             axes.plot(line.real, line.imag, color=color, linewidth=1.8, zorder=5)
@@ -51,7 +60,6 @@ def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
         # The asked point begins the first line.
         axes.plot([lines[0][0].real], [lines[0][0].imag], "o", color=color, zorder=6)
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(f"deflections, enlarged, at {pose_in_words(study, poses, drawn.row)}", loc="left")
     return figure
 
 
@@ -141,13 +149,11 @@ def free_motion(study: Study, result: Result, drawn: Drawn) -> Figure | None:
     else:
         ways = [rest + way * scale * move for way in (1, -1)]
     places = np.concatenate([[*scene.points.values()], *ways])
-    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
-    draw_mechanism(axes, study.mechanism, drawn.configuration)
+    figure, axes = posed(study, result.drawn["poses"], drawn, places, "free motion")
     for line, dash in zip(ways, ("-", "--"), strict=True):
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
-    axes.set_title(f"free motion at {pose_in_words(study, result.drawn['poses'], row)}", loc="left")
     return figure
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
-from mechdesign.report.figures.labels import Label, paper
+from mechdesign.report.figures.labels import Label
 
 _TURNS = 7
 _SWING = 0.12  # half the width of a coil over its length
@@ -88,12 +88,6 @@ def coil_labels(coils: Sequence[Coil]) -> list[Label]:
         heading = float(np.angle(1j * span if (1j * span).real > 0 else -1j * span))
         labels.append(Label(coil.text, anchors, style.VERMILION, 11, heading, 9.5))
     return labels
-
-
-def coil_obstacles(axes: Axes, coils: Sequence[Coil]) -> Floats:
-    """Points on paper that names should not cover."""
-    runs = [coil.path for coil in coils] + [np.linspace(coil.tip, coil.place, 30) for coil in coils]
-    return paper(axes, np.concatenate(runs)) if runs else np.empty((0, 2))
 
 
 def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: object) -> None:

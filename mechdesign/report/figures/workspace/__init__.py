@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch, Rectangle
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from mechdesign.analyses.workspace.shown import curves
@@ -13,16 +15,20 @@ from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.workspace.inscribed import inscribed_figure
 from mechdesign.report.figures.workspace.maps import map_figures
 from mechdesign.report.figures.workspace.point_paths import path_figures
 from mechdesign.report.figures.workspace.ranges import range_figures
-from mechdesign.report.figures.workspace.regions import ROOM, Region, fill, regions, sheet
+from mechdesign.report.figures.workspace.regions import ROOM, Region, fill, regions, sheet, some
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 SIDES = {"inner": style.BLUE, "outer": style.VERMILION}
 DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
+
+
+CIRCLE = ("circle_x", "circle_y", "circle_radius")
+RECTANGLE = ("rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height")
+_HALO = [withStroke(linewidth=2.2, foreground="white")]
 
 
 def figures(study: Study, result: Result) -> Mapping[str, Figure]:
@@ -88,3 +94,35 @@ def _drives(study: Study, boundary: Table) -> Figure:
     axes.set_ylabel(style.axis_label(", ".join(names), units.pop() if len(units) == 1 else ""))
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
     return figure
+
+
+def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> Figure | None:
+    """The regions with the shapes that their row of indices gives; None where it gives none."""
+    table = result.tables["indices"]
+    if not any(name in table for name in (*CIRCLE, *RECTANGLE)):
+        return None
+    shown = some(found)
+    places = np.concatenate([region.places() for region in shown])
+    page = sheet(study, places, [region.title for region in shown], "largest circle and rectangle in the workspace",
+                 bar=False)  # fmt: skip
+    unit = study.units.label("length")
+    size = 9 if len(shown) == 1 else 7.5
+    for axes, region in zip(page.axes, shown, strict=True):
+        fill(axes, region)
+        shapes: list[tuple[Patch, tuple[float, float], str, str]] = []
+        if CIRCLE[0] in table:
+            x, y, radius = (float(table[name][region.row]) for name in CIRCLE)
+            shapes.append((Circle((x, y), radius), (x, y), f"r = {radius:.4g}", style.BLUE))
+            axes.plot(x, y, "+", color=style.BLUE, zorder=4)
+        if RECTANGLE[0] in table:
+            x, y, width, height = (float(table[name][region.row]) for name in RECTANGLE)
+            corner = (x - width / 2, y - height / 2)
+            shapes.append((Rectangle(corner, width, height), corner, f"{width:.4g} x {height:.4g}", style.GREEN))
+        for shape, place, words, color in shapes:
+            if np.isfinite(place).all():
+                shape.set(edgecolor=color, facecolor="none", linewidth=1.6, zorder=4)
+                axes.add_patch(shape)
+                axes.annotate(f"{words} {unit}".strip(), place, (4, 4), textcoords="offset points", color=color,
+                              fontsize=size, zorder=5, path_effects=_HALO)  # fmt: skip
+    page.ends(shown)
+    return page.figure

@@ -14,7 +14,6 @@ from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import MaxNLocator
 
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
@@ -147,10 +146,8 @@ def _levels(found: Sequence[Region], column: str) -> tuple[Floats, Extend]:
     if not tail:
         high = top
     low = 0.0 if 0 <= low < 0.5 * high else low
-    if high - low <= 1e-9 * max(abs(high), abs(low)):
-        low, high = high - 0.5 * max(abs(high), 1e-12), high + 0.5 * max(abs(high), 1e-12)
-    levels = MaxNLocator(nbins=11, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return np.asarray(levels), "max" if tail or top > levels[-1] else "neither"
+    levels = style.levels(low, high, 11)
+    return levels, "max" if tail or top > levels[-1] else "neither"
 
 
 def _areas(x: Floats, y: Floats) -> Floats:

@@ -53,7 +53,7 @@ def _path(study: Study, path: Table) -> Figure:
     for rows in _pieces(path):
         axes.plot(z[rows].real, z[rows].imag, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=3.25)
         coloured(axes, z[rows], ratio[rows], norm, 4)
-    draw_mechanism(axes, mechanism, mechanism.sketch_configuration, avoid=z)
+    draw_mechanism(axes, mechanism, mechanism.sketch_configuration)
     page.color_bar(ScalarMappable(norm, style.COLORMAP), _label(path), extend="max" if tail else "neither")
     return page.figure
 
