@@ -11,9 +11,8 @@ from mechdesign.analyses.columns import SHARED, shared
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.panels import SINGLE
 from mechdesign.analyses.region.regions import RAYS
-from mechdesign.analyses.workspace.index import determinant_power, power_of_length, prepare
+from mechdesign.analyses.workspace.index import Local, determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
-from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
 from mechdesign.analyses.workspace.question import (
@@ -25,7 +24,6 @@ from mechdesign.analyses.workspace.question import (
     questions,
     split,
 )
-from mechdesign.analyses.workspace.shown import poses_along
 from mechdesign.analyses.workspace.singularities import singular_everywhere
 from mechdesign.analyses.workspace.tables import (
     held_columns,
@@ -33,6 +31,7 @@ from mechdesign.analyses.workspace.tables import (
     left_out,
     outlines,
     piece_columns,
+    poses_along,
     stacked,
     where,
 )

@@ -10,7 +10,7 @@ from matplotlib.patches import Circle, Patch, Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from mechdesign.analyses.workspace.shown import curves
+from mechdesign.analyses.workspace.tables import curves
 from mechdesign.mechanism import Configuration
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
-from mechdesign.analyses.workspace.shown import curves
+from mechdesign.analyses.workspace.tables import curves
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
