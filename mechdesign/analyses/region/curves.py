@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.region.panels import SINGLE, Panels, find_panels
 from mechdesign.analyses.region.pieces import Pieces
-from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, trace
+from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, ray_through, trace
 from mechdesign.analyses.region.regions import RAYS, Region, regions
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism.algebra import Value
@@ -63,7 +63,7 @@ class Patch:
 
     def holds(self, z: Complexes, about: complex) -> Flags:
         """Which places lie in the patch, as far as its rays tell."""
-        radius, theta = np.abs(z - about), self.theta[0] + (np.angle(z - about) - self.theta[0]) % (2 * np.pi)
+        radius, theta = np.abs(z - about), ray_through(z - about, self.theta[0])
         inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
         return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
 

@@ -33,6 +33,16 @@ INSET = 1e-10
 FIVE = np.linspace(0.0, 1.0, 5)
 
 
+def is_turn(scan: tuple[float, float]) -> bool:
+    """Whether a scan goes all the way round, but for rounding."""
+    return scan[1] - scan[0] >= 2 * np.pi * (1 - 1e-12)
+
+
+def ray_through(way: Complexes, start: float) -> Floats:
+    """Angles of the rays to places seen from their centre, from the first ray of the scan on."""
+    return np.asarray(start + (np.angle(way) - start) % (2 * np.pi))
+
+
 @dataclass(frozen=True, eq=False)
 class Designs:
     """Several designs of one mechanism, scanned about one point.
@@ -108,6 +118,12 @@ class Intervals:
     def slot(self) -> Ints:
         """Place of each interval on its ray, outwards from 0."""
         return np.arange(len(self.ray)) - np.searchsorted(self.ray, self.ray)
+
+    def by_ray(self, *values: Floats | Ints) -> Floats:
+        """Values of intervals in order outwards, shape (values, most intervals of a ray, rays); nan where none is."""
+        found = np.full((len(values), int(self.counts.max(initial=0)), len(self.beyond)), np.nan)
+        found[:, self.slot, self.ray] = values
+        return found
 
     def kept(self, keep: Flags) -> Intervals:
         """Some of the intervals, on the same rays."""
