@@ -29,7 +29,7 @@ NODES = 8
 # Areas as near as this, as parts of the whole, are equal; smaller ones than the second are slits that rounding leaves.
 EQUAL = 1e-4
 SLIT = 1e-10
-# The piece of an interval that no ray beside it tells.
+# The piece of an interval that overlaps none on the rays on either side.
 UNKNOWN = -2
 
 

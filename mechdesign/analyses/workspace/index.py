@@ -26,14 +26,7 @@ BLOCK = 4096
 
 @dataclass(frozen=True, eq=False)
 class Local(Jacobian):
-    """The Jacobian of a field's outputs at a batch of points.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    found : dict
-        Values of indices that were computed already, by name.
-    """
+    """The Jacobian of a field's outputs at a batch of points; `found` holds values of indices computed already."""
 
     configuration: Configuration
     found: dict[str, Value] = dataclasses.field(default_factory=dict)
@@ -58,10 +51,8 @@ class Index:
 
     Parameters
     ----------
-    meaning : str
     prepare : function of a study
         Makes what evaluates it; raises `StudyError` where the study lacks what it needs.
-    unit : function of a study and a field
     crossing : float or None
         What it tends to where a forward determinant vanishes inside the region (``assembly: any``); infinite if it
         grows as 1/distance; None where it stays finite.

@@ -52,16 +52,7 @@ SECANTS = 10
 
 @dataclass(frozen=True, eq=False)
 class Locus:
-    """A curve of singularities.
-
-    Parameters
-    ----------
-    kind : str
-        ``forward`` or ``inverse``.
-    cause : str
-        Which links, and what they do there.
-    points : ndarray of complex
-    """
+    """A curve of ``forward`` or ``inverse`` singularities; the cause says which links, and what they do there."""
 
     kind: str
     cause: str
