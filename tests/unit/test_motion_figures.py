@@ -6,9 +6,8 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.kinematics import figures
+from mechdesign.report.figures.kinematics import curves_figure, figures
 from mechdesign.report.figures.kinematics.animation import in_order
-from mechdesign.report.figures.kinematics.curves import curves_figure
 from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.sweep import Sweep, ranks
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 
 from mechdesign.analyses.optimize import pareto
 from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer
-from mechdesign.analyses.optimize.files import best_design, optimum_files
 from mechdesign.analyses.optimize.goals import conditions_of, goals_of
 from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
 from mechdesign.analyses.optimize.tables import (
@@ -22,14 +26,17 @@ from mechdesign.analyses.optimize.tables import (
     sensitivity_table,
 )
 from mechdesign.analyses.optimize.variables import grid, in_words
-from mechdesign.analyses.workspace.analysis import index_meanings
-from mechdesign.errors import AssemblyError, Interrupted, StudyError
+from mechdesign.analyses.shown import solve_shown
+from mechdesign.analyses.workspace.analysis import index_meanings, workspace
+from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import workers
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
+from mechdesign.study.loading import load_bytes
+from mechdesign.study.variants import changed_data, rewritten, variant
 from mechdesign.threads import one_thread
 
 # Numbers that a search keeps of the rows behind its goals.
@@ -189,3 +196,70 @@ def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Ite
         if loose.any():
             told = f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for"
             yield f"{told}; see {each.name}_error"
+
+
+def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
+    """Texts by file name, ``optimum.yaml`` for the first row of weights, ``optimum_2.yaml`` ..., and what is wrong.
+
+    Parameters
+    ----------
+    marked : mapping of str to int
+        Further designs worth a file, by its name without the suffix.
+    """
+    goals = [each.name for each in compared.designs.goals]
+    wanted = {}
+    for row, winner in enumerate(compared.winners.tolist()):
+        weights = ", ".join(f"{each} {weight:g}" for each, weight in zip(goals, compared.weights[row], strict=True))
+        name = f"optimum_{row + 1}" if row else "optimum"
+        wanted[name] = winner, f"Optimum of {study.name} for the weights {weights}"
+    wanted |= {name: (k, f"{name.capitalize()} of the Pareto front of {study.name}") for name, k in marked.items()}
+    files: dict[str, str] = {}
+    doubts = []
+    for name, (k, heading) in wanted.items():
+        numbers = {variable: float(column[k]) for variable, column in compared.designs.variables.items()}
+        heading = f"{heading}: {in_words(numbers)}"
+        data = changed_data(study, numbers)
+        try:
+            if not _assembles_alike(study, numbers, data):
+                data = _drawn_anew(study, numbers)
+                if not _assembles_alike(study, numbers, data):
+                    doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
+        except MechdesignError as error:
+            doubts.append(f"{name}.yaml: {str(error).splitlines()[0]}")
+        text, beside = rewritten(study, data, heading)
+        files |= {f"{name}.yaml": text, **beside}
+    return files, doubts
+
+
+def _assembles_alike(study: Study, numbers: Mapping[str, float], data: Mapping[str, Any]) -> bool:
+    """Whether the study of this data has the assembly in which the design was evaluated."""
+    try:
+        alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path or Path("study.yaml"))
+    except MechdesignError:
+        return False
+    return alone.mechanism.forward.modes == variant(study, numbers).mechanism.forward.modes
+
+
+def _drawn_anew(study: Study, numbers: Mapping[str, float]) -> dict[str, Any]:
+    """The data of a design with the sketch as it assembles."""
+    data = changed_data(study, numbers)
+    assembled = variant(study, numbers).mechanism.sketch_configuration
+    points = {name: np.asarray(assembled.point(name)).item() for name in data["mechanism"]["sketch"]}
+    data["mechanism"]["sketch"] = {name: [point.real, point.imag] for name, point in points.items()}
+    return data
+
+
+def best_design(compared: Comparison) -> tuple[Study, Result]:
+    """The design that is best on the whole as a study, and its workspace where that was judged, or else its motion."""
+    numbers = {name: float(column[compared.best]) for name, column in compared.designs.variables.items()}
+    best = variant(compared.study, numbers)
+    if best.workspace is not None and any(each.command == "workspace" for each in compared.designs.goals):
+        # The region is drawn, not its indices.
+        plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))
+        result = workspace(plain)
+        if "local" in result.tables:
+            return plain, result
+    drawn = {}
+    with suppress(MechdesignError):
+        drawn["motion"] = solve_shown(best)
+    return best, Result("kinematics", {}, drawn=drawn)

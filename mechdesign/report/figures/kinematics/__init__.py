@@ -2,14 +2,38 @@
 
 from __future__ import annotations
 
-from matplotlib.figure import Figure
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
-from mechdesign.report.figures.kinematics.curves import curves_figure
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.report.figures import style
 from mechdesign.report.figures.kinematics.paths import modes_figure, paths_figure
+from mechdesign.report.figures.panels import abscissa, moving_names, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.sweep import Sweep
-from mechdesign.results import Result
-from mechdesign.study import Study
+from mechdesign.report.figures.sweep import Sweep, ranks
+from mechdesign.results import Column, Result
+from mechdesign.study import Study, Units
+
+# More curves than this in one panel cannot be told apart.
+MAX_CURVES = 7
+MAX_CURVE_PANELS = 12
+_COLORS = (*style.PALETTE[:6], style.INK)  # yellow is lost on white
+_ORDERS = ("velocity", "acceleration", "error", "effort")
+_RANKS = ("position", *_ORDERS, "det_J", "inverse_condition")
+_MAX_TALL_PANELS = 7  # more panels are lower
+_LEGEND_LETTERS = 26  # of the longest name in a legend
+_STILL = 1e-9  # part of its size by which a column changes that does not change
+_HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
+_TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
+_PEAK_RATIO = 6  # of the whole range to that of the other poses
+_LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
+_SHADE = "#EFEFEF"
 
 
 def figures(study: Study, result: Result) -> Gallery:
@@ -20,12 +44,168 @@ def figures(study: Study, result: Result) -> Gallery:
     found = Gallery()
     if result.drawn["poses"].motion:
         found.add("motion", curves_figure, study, result)
-        found.add("paths", _paths, result)
+        sweep = Sweep.of(result.drawn["motion"])
+        if len(sweep.valid):
+            found.add("paths", paths_figure, sweep)
     if "modes" in result.tables:
         found.add("modes", modes_figure, study, result)
     return found
 
 
-def _paths(result: Result) -> Figure | None:
-    sweep = Sweep.of(result.drawn["motion"])
-    return paths_figure(sweep) if len(sweep.valid) else None
+class _Curve(NamedTuple):
+    """A column, what it is of, and what kind of number it holds."""
+
+    column: Column
+    of: str
+    order: str
+
+
+def curves_figure(study: Study, result: Result) -> Figure | None:
+    """Every output over the swept coordinate, or along the path; None where nothing changes."""
+    table = result.tables["motion"]
+    if not moving_names(result.drawn["poses"]):
+        return None
+    over = abscissa(study, result.drawn["poses"])
+    swept, x = over.name, over.values
+    panels = _panels(study, [column for column in table.columns if column.name != "valid"], swept, x)
+    if not panels:
+        return None
+    limits, marks = result.tables.get("limits"), []
+    if limits is not None and swept in limits:
+        marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
+    invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
+    longest = min(max(len(curve.of) for panel in panels for curve in panel[:MAX_CURVES]), _LEGEND_LETTERS)
+    figure, axes = style.page(
+        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=1.0, right=0.6 + 0.08 * longest,
+        top=0.4 if marks else 0.15, bottom=0.5, down=0.2, sharex=True,
+    )  # fmt: skip
+    colors: dict[tuple[str, str], str] = {}
+    for axis, panel in zip(axes, panels, strict=True):
+        for begin, end in invalid:
+            axis.axvspan(begin, end, color=_SHADE, linewidth=0, zorder=0)
+        _draw(axis, panel, x, study.units, colors)
+    _draw_limits(figure, axes, marks, bool(invalid))
+    axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
+    axes[-1].margins(x=0.02)
+    axes[-1].set_xlabel(over.label)
+    tick_abscissa(axes[-1], over)
+    return figure
+
+
+def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
+    """Columns by kind and unit, in the order of `_RANKS`, what tells most first."""
+    section = study.kinematics
+    asked = section.outputs if section is not None and section.outputs is not None else ()
+    values = {column.name: column.values for column in columns}
+    unit_of = {column.name: column.unit for column in columns}
+    units = study.units
+    sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): study.mechanism.size}
+    rank = ranks(study.mechanism, tuple(asked))
+    # The condition of a single number is 1, that of each pose is for its table.
+    left_out = {"conditioning"} | ({"inverse_condition"} if len(study.mechanism.drives) == 1 else set())
+    panels: dict[tuple[str, str], list[_Curve]] = {}
+    for column in columns:
+        if column.values.dtype.kind != "f" or column.name in left_out or not np.isfinite(column.values).any():
+            continue
+        order = next((order for order in _ORDERS if column.name.endswith(f"_{order}")), "position")
+        of = column.name.removesuffix(f"_{order}")
+        if column.name in _RANKS:
+            order = of = column.name
+        position = values.get(of, column.values)
+        if order in _RANKS[:3] and swept and _still(position - x, float(np.ptp(x))):
+            continue  # the sweep over itself
+        # Of what stands still only the place is told, and only where it is asked for.
+        told = order in ("error", "effort") or (order == "position" and asked and of not in study.mechanism.drives)
+        if not told and _still(position, sizes.get(unit_of.get(of, ""), 1.0)):
+            continue
+        curve = _Curve(column, of, order)
+        panels.setdefault((order, column.unit), []).append(curve)
+    found = sorted(panels.values(), key=lambda panel: _RANKS.index(panel[0].order))[:MAX_CURVE_PANELS]
+    for panel in found:
+        if len(panel) > MAX_CURVES:
+            panel.sort(key=lambda curve: -rank.get(curve.of.rpartition(".")[0], 1))
+    return found
+
+
+def _still(values: Floats, size: float) -> bool:
+    known = values[np.isfinite(values)]
+    return not len(known) or float(np.ptp(known)) <= _STILL * max(float(np.abs(known).max()), size)
+
+
+def _coincide(one: Floats, other: Floats) -> bool:
+    known = np.isfinite(one) & np.isfinite(other)
+    span = max(float(np.ptp(one[known])), float(np.ptp(other[known]))) if known.any() else 0.0
+    return bool(np.all(np.abs(one[known] - other[known]) <= _HIDDEN * span))
+
+
+def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]]:
+    """Ranges of x that are not valid, up to the limit of motion where one lies beside them."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], invalid, [False]]).astype(int)))
+    found = []
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        ends = []
+        for inner, outer in ((first, max(first - 1, 0)), (last, min(last + 1, len(x) - 1))):
+            low, high = sorted((x[inner], x[outer]))
+            between = limits[(limits >= low) & (limits <= high)] if len(limits) else limits
+            ends.append(float(between[0]) if len(between) else float(x[inner] + x[outer]) / 2)
+        found.append((ends[0], ends[1]))
+    return found
+
+
+def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
+    shown: list[Floats] = []
+    for curve in panel[:MAX_CURVES]:
+        values = curve.column.values
+        # A name keeps its colour from its position to its acceleration.
+        color = colors.setdefault((curve.of, "" if curve.order in _RANKS[:4] else curve.order), _COLORS[len(shown)])
+        hidden = any(_coincide(values, other) for other in shown)
+        label = (
+            curve.of
+            if len(curve.of) <= _LEGEND_LETTERS
+            else f"{curve.of[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+        )
+        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=label)
+        shown.append(values)
+    first = panel[0]
+    title = first.order.replace("_", " ")
+    if title == "position":
+        kinds = {units.label("angle"): "angle", units.label("length"): "position"}
+        title = kinds.get(first.column.unit, "value")
+    title = title.replace("inverse ", "inverse\n")
+    axis.set_ylabel(style.axis_label(title, first.column.unit).replace(" [", "\n["))
+    axis.yaxis.set_label_coords(-0.57 / (axis.get_position().width * style.WIDTH), 0.5)
+    axis.ticklabel_format(axis="y", scilimits=(-4, 4))
+    known = np.concatenate([values[np.isfinite(values)] for values in shown])
+    if np.ptp(known) <= _STILL * max(float(np.abs(known).max()), 1.0):
+        # What stands still is drawn straight, not by its rounding.
+        middle = float(known.mean())
+        axis.set_ylim(middle - max(0.1 * abs(middle), 0.1), middle + max(0.1 * abs(middle), 0.1))
+    elif first.order != "position":
+        low, high = np.percentile(known, (_TAIL_PERCENT, 100 - _TAIL_PERCENT))
+        if np.ptp(known) > _PEAK_RATIO * (high - low) > 0:
+            # Near a dead centre rates grow without bound: what they are elsewhere stays legible.
+            axis.set_ylim(low - 0.5 * (high - low), high + 0.5 * (high - low))
+    if len(panel) > 1 or first.of != first.order:
+        left_out = len(panel) - len(shown)
+        note = f"and {left_out} more" if left_out else None
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=note, title_fontsize=9, alignment="left")
+
+
+def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, str]], shaded: bool) -> None:
+    kinds = list(dict.fromkeys(kind for _, kind in marks))
+    looks: dict[str, dict[str, Any]] = {
+        kind: {"color": _LIMIT_COLORS[k % len(_LIMIT_COLORS)], "linestyle": (0, (6, 2 + k))}
+        for k, kind in enumerate(kinds)
+    }
+    for axis in axes:
+        for value, kind in marks:
+            axis.axvline(value, linewidth=1.1, zorder=1.5, **looks[kind])
+    handles: list[Line2D | Patch] = [Line2D([], [], linewidth=1.1, label=kind, **looks[kind]) for kind in kinds]
+    if shaded:
+        handles.append(Patch(color=_SHADE, label="not valid"))
+    if handles:
+        height = figure.get_figheight()
+        figure.legend(
+            handles=handles, loc="lower left", ncols=len(handles), borderaxespad=0.0,
+            bbox_to_anchor=(axes[0].get_position().x0, 1 - 0.34 / height),
+        )  # fmt: skip
