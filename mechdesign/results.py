@@ -72,6 +72,13 @@ class Table:
     def __len__(self) -> int:
         return len(self.columns[0].values) if self.columns else 0
 
+    def where(self, **values: object) -> NDArray[np.bool_]:
+        """Which rows have these values in columns of these names, as a mask."""
+        found = np.ones(len(self), dtype=bool)
+        for name, value in values.items():
+            found &= self[name] == value
+        return found
+
     def take(self, rows: NDArray[Any]) -> Table:
         """The table of some rows, by a mask or by their numbers."""
         columns = tuple(replace(column, values=np.asarray(column.values)[rows]) for column in self.columns)

@@ -56,6 +56,8 @@ class Poses:
         Whether a person listed these very poses, so that one that fails is an error.
     grid : tuple of int
         Number of values along each swept coordinate; the last varies fastest. One number for lists and paths.
+    patches : tuple of slice
+        Of a grid of rays: those of each patch of the workspace, which turn on from one to the next.
     designs : int
         Each has as many poses.
     places, parameters : mapping of str to ndarray, shape (count,)
@@ -80,6 +82,7 @@ class Poses:
     closed: bool = False
     slopes: Mapping[str, Floats] = field(default_factory=dict)
     bends: Mapping[str, Floats] = field(default_factory=dict)
+    patches: tuple[slice, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -10,9 +10,11 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-# Merits of points that miss a condition, of points without a value, and of those of which nothing is known: beyond any
-# goal, with room for their order.
-MISSES, OPEN, UNKNOWN = 1e60, 1e90, 1e120
+# Least merits, beyond any goal and with room for their order, of points that miss a condition, of points without a
+# value, and of those of which nothing is known.
+CONDITION_MISSED = 1e60
+NO_VALUE = 1e90
+UNKNOWN = 1e120
 # Column of the parts that are of no goal or condition: margins of assembly, negative where a pose does not assemble.
 ASSEMBLY = -1
 FIRST_ROWS = 256
@@ -24,7 +26,7 @@ class Spent(Exception):
 
 @dataclass(frozen=True)
 class Part:
-    """Rows that a goal or a condition is the worst of, or the root mean square.
+    """Rows, columns `place` of `Known.rows`, of which a goal or a condition is the worst or the root mean square.
 
     Parameters
     ----------
@@ -34,10 +36,6 @@ class Part:
         1 where the largest row is the worst, -1 where the smallest is.
     absolute : bool
         Whether absolute values are judged.
-    place : slice
-        Columns of `Known.rows`.
-    bound : float
-        Of a condition.
     squares : bool
         Whether the goal is the root mean square of the rows.
     """
@@ -71,14 +69,14 @@ class Scores(NamedTuple):
 
 @dataclass(frozen=True)
 class Known:
-    """Everything evaluated so far.
+    """Everything evaluated so far, a line a point.
 
     Parameters
     ----------
     u : ndarray, shape (points, dimensions)
         Points of the unit cube.
     values : ndarray, shape (points, goals)
-        Values of the goals; nan where there is none.
+        Of the goals; nan where there is none.
     margins : ndarray, shape (points, conditions)
         By how much each condition is met, negative where it is not.
     rows : ndarray, shape (points, rows)
@@ -112,27 +110,23 @@ class Known:
         [Deb, An efficient constraint handling method for genetic algorithms, 2000]; inf where that is not known.
         """
         valid, feasible = self.valid, self.feasible
-        merit = np.where(np.isnan(self.shortfall), np.inf, OPEN * (1.0 + self.shortfall))
+        merit = np.where(np.isnan(self.shortfall), np.inf, NO_VALUE * (1.0 + self.shortfall))
         merit[feasible] = self.values[feasible] @ objective
         missing = valid & ~feasible
         if missing.any():
             scale = np.abs(self.margins[valid]).max(axis=0)
             short = np.maximum(-self.margins[missing] / np.where(scale > 0, scale, 1.0), 0.0).sum(axis=1)
-            merit[missing] = MISSES * (1.0 + short)
+            merit[missing] = CONDITION_MISSED * (1.0 + short)
         return merit
 
 
 class Explorer:
-    """Evaluates points of the unit cube, each once.
+    """Evaluates points of the unit cube, at most `budget` of them and each once.
 
     Parameters
     ----------
     evaluate
         From points, shape (m, dimensions), to what is known of them.
-    budget : int
-        How many points may be evaluated.
-    parts : sequence of Part
-        Which rows there are.
     rough : bool
         Whether values are known to a tolerance only, so that differences over small steps are noise.
     slow : bool
@@ -140,8 +134,8 @@ class Explorer:
 
     Attributes
     ----------
-    reserve : int
-        How many of the evaluations that are left are kept for later.
+    left, reserve : int
+        Evaluations that are left, and how many of them are kept for later.
     """
 
     def __init__(

@@ -24,16 +24,14 @@ class Goal:
     ----------
     name : str
         As the study gives it; of a condition with its bound.
-    command, column : str
-        Where it is found; the column as `mechdesign.rows.choose` understands it.
+    column : str
+        As `mechdesign.rows.choose` understands it.
     smallest : bool
         Whether the largest row is the worst one; of a condition, whether its bound is an upper one.
     absolute : bool
         Judge absolute values.
     where : tuple of (str, object)
         Only rows whose columns have these values count.
-    bound : float
-        Of a condition.
     """
 
     name: str
@@ -115,8 +113,8 @@ def goal(name: str, *, smallest: bool = False, where: Mapping[str, object] | Non
     """
     command, column = _parts(name)
     rows = tuple((where or {}).items())
-    told = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
-    return Goal(told, command, column, smallest, column.endswith("_error"), rows)
+    title = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
+    return Goal(title, command, column, smallest, column.endswith("_error"), rows)
 
 
 def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:

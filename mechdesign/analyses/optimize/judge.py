@@ -1,4 +1,4 @@
-"""Designs evaluated and judged: values of goals, conditions, reasons; all that is asked for, in the order of asking."""
+"""Designs evaluated and judged, in the order of evaluation: values of goals and conditions, reasons of failure."""
 
 from __future__ import annotations
 
@@ -27,16 +27,13 @@ SMALL_CHUNK = 16
 
 @dataclass(frozen=True, eq=False)
 class JudgedDesigns:
-    """Designs and what was found of them.
+    """Evaluated designs; arrays are of shape (designs,).
 
     Parameters
     ----------
-    variables : dict of str to ndarray, shape (designs,)
-        Values of the design variables.
-    goals, conditions : tuple of Goal
-    values : dict of Goal to ndarray, shape (designs,)
-        Values of the goals and of what the conditions bound; nan where there is none.
-    errors : dict of Goal to ndarray, shape (designs,)
+    values : dict of Goal to ndarray
+        Of the goals and of what the conditions bound; nan where there is none.
+    errors : dict of Goal to ndarray
         Estimated errors, of goals that have any.
     codes, words : ndarray of int, list of str
         Why a design cannot be built: ``words[code]``, empty where it can.
@@ -82,10 +79,7 @@ class JudgedDesigns:
 class Judge:
     """Evaluates designs in chunks and keeps what is found; what a journal holds is not computed again.
 
-    Parameters
-    ----------
-    compute
-        Evaluates chunks, in their order: ``map(evaluator, chunks)``, or workers that do so.
+    `compute` evaluates chunks in their order: ``map(evaluator, chunks)``, or workers that do so.
     """
 
     def __init__(

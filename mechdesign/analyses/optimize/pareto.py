@@ -23,10 +23,7 @@ SAME_DESIGN = 1e-4
 def spread(explorer: Explorer, signs: Floats, seed: int) -> None:
     """Use the evaluations that are left to spread a population along the front, from its widest gaps so far.
 
-    Parameters
-    ----------
-    signs : ndarray, shape (goals,)
-        1 where a goal is minimised, -1 where it is maximised.
+    `signs`, shape (goals,), are 1 where a goal is minimised, -1 where it is maximised.
     """
     size, known = int(np.clip(explorer.left // GENERATIONS, SMALLEST_POPULATION, LARGEST_POPULATION)), explorer.known
     begun = np.flatnonzero(known.feasible)
@@ -38,15 +35,7 @@ def spread(explorer: Explorer, signs: Floats, seed: int) -> None:
 
 
 def evolve(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
-    """Spread a population along the front by NSGA-II [Deb et al., 2002], as pymoo does it.
-
-    Parameters
-    ----------
-    signs : ndarray, shape (goals,)
-        As `spread` takes them.
-    first : ndarray, shape (points, dimensions)
-        Points of the unit cube to begin with.
-    """
+    """Spread a population along the front by NSGA-II [Deb et al., 2002], from points of shape (points, dimensions)."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.evaluator import Evaluator
     from pymoo.core.problem import Problem
@@ -81,13 +70,7 @@ def evolve(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
 
 
 def front(values: Floats) -> Ints:
-    """Rows that no other row surpasses; of equal rows the first.
-
-    Parameters
-    ----------
-    values : ndarray, shape (designs, goals)
-        Less is better.
-    """
+    """Rows of values, shape (designs, goals), that no other surpasses, less being better; of equals the first."""
     from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
     unique, first = np.unique(values, axis=0, return_index=True)
@@ -119,12 +102,7 @@ def _ends(share: Floats) -> list[int]:
 def knee(values: Floats) -> int:
     """The row farthest from the plane through the extremes of a front (the line, for two goals), towards the ideal.
 
-    [Das, On characterizing the 'knee' of the Pareto curve, 1999.]
-
-    Parameters
-    ----------
-    values : ndarray, shape (designs, goals)
-        Of a front; less is better.
+    Less is better. [Das, On characterizing the 'knee' of the Pareto curve, 1999.]
     """
     share = normalised(values)
     ones = np.ones(share.shape[1])

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.analyses.optimize.descent import LADDER, ROUGH, descend
-from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Spent
+from mechdesign.analyses.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Known, Spent
 from mechdesign.numerics.arrays import Floats
 
 # Evaluations per row of weights and per (variables + 1): the fewest of a start, and the default of a search.
@@ -97,7 +97,7 @@ def search(
     smallest : sequence of bool
         Which goals are minimised.
     rows : sequence of sequence of float
-        Weights, in the order of the goals.
+        Rows of weights.
     use_all : bool
         Whether all evaluations are used; else it ends when two starts have found the same.
     """
@@ -133,21 +133,12 @@ def search(
 
 
 def _start(
-    explorer: Explorer,
-    smallest: Sequence[bool],
-    rows: Sequence[Sequence[float]],
-    rng: np.random.Generator,
-    begin: int,
-    use_all: bool,
-) -> None:
-    """Search from points of its own until the evaluations of this start are used up.
+    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator,
+    begin: int, use_all: bool,
+) -> None:  # fmt: skip
+    """Search from points of its own, rows of `explorer.known` from `begin` on, until its evaluations are used up.
 
     Where not all need be used it ends after `FEWEST_ROUNDS` of descents, or one in which two came to the same.
-
-    Parameters
-    ----------
-    begin : int
-        First row of `explorer.known` that belongs to this start.
     """
     n, allowed = explorer.dimensions, explorer.left - explorer.reserve
     ladder = ROUGH if explorer.rough else LADDER
@@ -251,7 +242,7 @@ def _ends(known: Known, objective: Floats, begins: Sequence[int]) -> Floats:
 
 def _agree(known: Known, objective: Floats, found: Floats) -> bool:
     """Whether the two smallest of some values of an objective are feasible and the same."""
-    two = np.sort(found[found < MISSES])[:2]
+    two = np.sort(found[found < CONDITION_MISSED])[:2]
     return len(two) == 2 and bool(np.ptp(two) <= _rounding(known, known.merit(objective), two[0]))
 
 
@@ -279,14 +270,8 @@ def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> F
 def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, begin: int = 0, most: int = 1000) -> None:
     """Differential evolution, a generation a batch, begun with the best known points and some others.
 
+    It begins with rows of `explorer.known` from `begin` on, and evaluates `most` points.
     [Storn & Price, Differential evolution, 1997; scipy.optimize.differential_evolution.]
-
-    Parameters
-    ----------
-    begin : int
-        First row of `explorer.known` that it may begin with.
-    most : int
-        Evaluations.
     """
     from scipy.optimize import differential_evolution
 
@@ -315,7 +300,7 @@ def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, begi
         merits.append(float(merit.min()))
         if len(merits) <= most_stalled:
             return False
-        inside = merit[merit < MISSES]
+        inside = merit[merit < CONDITION_MISSED]
         gained = merits[-1 - most_stalled] - merits[-1]
         return bool(gained <= STALLED_GAIN * (float(np.ptp(inside)) if inside.size else abs(merits[-1])))
 

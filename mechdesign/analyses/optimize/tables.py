@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
-from mechdesign.analyses.optimize.variables import ROUNDING, Batch, bounds, steps
+from mechdesign.analyses.optimize.variables import BOUND_ROUNDING, Batch, bounds, steps
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
-# Best designs that are told for each row of weights, and how far apart they are in parts of each variable's range.
-MOST_BEST = 10
+# Best designs that are listed for each row of weights, and how far apart they are in parts of each variable's range.
+MAX_BEST = 10
 APART = 0.05
 # How near a bound is at it, as a fraction of the variable's range, or of a condition's bound.
 AT_BOUND = 1e-4
@@ -174,7 +174,7 @@ def best_table(compared: Comparison) -> Table:
     chosen: list[tuple[int, int, int, float]] = []
     for row, weights in enumerate(compared.weights):
         score = np.where(designs.feasible, compared.score(weights), -np.inf)
-        for rank in range(MOST_BEST):
+        for rank in range(MAX_BEST):
             k = int(np.argmax(score))
             if score[k] == -np.inf:
                 break
@@ -206,7 +206,7 @@ def _active(compared: Comparison) -> NDArray[np.object_]:
     held: list[list[str]] = [[] for _ in rows]
     for name in at:
         low, high = bounds(study, at, name, len(rows))
-        near = AT_BOUND * (high - low) + ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        near = AT_BOUND * (high - low) + BOUND_ROUNDING * np.maximum(np.abs(low), np.abs(high))
         above = np.maximum(near, step[name] * (1 - 1e-6)) if study.optimize.method == "grid" else near
         for k, words in enumerate(held):
             sides = ["from"] * bool(at[name][k] - low[k] <= near[k]) + ["to"] * bool(high[k] - at[name][k] <= above[k])
@@ -260,6 +260,6 @@ def _inside(study: Study, designs: Batch) -> Flags:
     found = np.ones(len(next(iter(designs.values()))), dtype=bool)
     for name, values in designs.items():
         low, high = bounds(study, designs, name, len(values))
-        slack = ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        slack = BOUND_ROUNDING * np.maximum(np.abs(low), np.abs(high))
         found &= (low - slack <= values) & (values <= high + slack)
     return found

@@ -1,4 +1,4 @@
-"""A mechanism drawn into axes: links, named joints, slides, ground and drives; and as a ghost of lines."""
+"""A mechanism drawn into axes: links, joints, slides, ground, arrows of the drives and names; and as a ghost."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from matplotlib.axes import Axes
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.report.figures import shapes, style
 from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.scene import GROUND, Guide, Scene, hull, pose
+from mechdesign.report.figures.scene import Guide, Scene, hull, pose
 from mechdesign.report.figures.shapes import Pen
 
-_LEAST_SWEEP = 0.2  # radians; a smaller angle gets an arrow of the positive sense instead
+DRIVE_COLOR = style.VERMILION
+LINK_COLORS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
+Travel = Mapping[str, tuple[float, float]]
+_MIN_SWEEP = 0.2  # radians; a smaller angle gets an arrow of the positive sense instead
 _NESTING = 9.0  # points between the arrows of drives at one pivot
 
 
@@ -54,8 +58,8 @@ def drive_arrows(scene: Scene) -> tuple[Arrow, ...]:
             rank = sum(isinstance(arrow, Turn) and arrow.place == place for arrow in arrows)
             start = cmath.phase(scene.rotations[drive.reference])
             sweep = cmath.phase(scene.rotations[drive.target] / scene.rotations[drive.reference])
-            if abs(sweep) < _LEAST_SWEEP:
-                sweep = 4 * _LEAST_SWEEP
+            if abs(sweep) < _MIN_SWEEP:
+                sweep = 4 * _MIN_SWEEP
             arrows.append(Turn(name, place, start, sweep, shapes.ARC + _NESTING * rank))
         elif drive.kind == "length":
             ends = scene.description.links[drive.target].ends
@@ -64,15 +68,15 @@ def drive_arrows(scene: Scene) -> tuple[Arrow, ...]:
             arrows.append(Push(name, base + 0.36 * leg, leg / abs(leg), shapes.BAR / 2 + 6))
         else:
             guide = next(guide for guide in scene.guides if guide.joint == drive.target)
-            arrows.append(Push(name, guide.pin, guide.along, shapes.BLOCK[1] / 2 + 6))
+            arrows.append(Push(name, guide.pin, guide.along, shapes.SLIDER_SIZE[1] / 2 + 6))
     return tuple(arrows)
 
 
-def name_labels(scene: Scene, colors: Mapping[str, str], arrows: Sequence[Arrow], drive_color: str) -> list[Label]:
+def name_labels(scene: Scene, colors: Mapping[str, str], arrows: Sequence[Arrow]) -> list[Label]:
     """Names of points, drives, slides and links, the most needed first."""
     return [
         *_point_labels(scene),
-        *_drive_labels(arrows, drive_color),
+        *_drive_labels(arrows),
         *_slide_labels(scene),
         *_link_labels(scene, colors),
     ]
@@ -83,25 +87,25 @@ def _point_labels(scene: Scene) -> list[Label]:
     labels = []
     for name, kind in scene.kinds().items():
         if kind != "none" or name in slid:
-            reach = shapes.BLOCK[1] / 2 if name in slid else shapes.PIN
+            reach = shapes.SLIDER_SIZE[1] / 2 if name in slid else shapes.PIN
             labels.append(Label(name, (scene.points[name],), style.INK, reach + 4, size=10.5))
     return labels
 
 
-def _drive_labels(arrows: Sequence[Arrow], color: str) -> list[Label]:
+def _drive_labels(arrows: Sequence[Arrow]) -> list[Label]:
     labels = []
     for arrow in arrows:
         if isinstance(arrow, Turn):
             reach, heading = arrow.radius + 4, arrow.start + arrow.sweep / 2
         else:
             reach, heading = arrow.away + 5, cmath.phase(1j * arrow.along)
-        labels.append(Label(arrow.name, (arrow.place,), color, reach, heading))
+        labels.append(Label(arrow.name, (arrow.place,), DRIVE_COLOR, reach, heading))
     return labels
 
 
 def _slide_labels(scene: Scene) -> list[Label]:
     return [
-        Label(guide.joint, (guide.pin,), style.FAINT, shapes.BLOCK[1] / 2 + 8, -math.pi / 3, 9, True, True)
+        Label(guide.joint, (guide.pin,), style.FAINT, shapes.SLIDER_SIZE[1] / 2 + 8, -math.pi / 3, 9, True, True)
         for guide in scene.guides
         if guide.joint not in scene.description.drives
     ]
@@ -115,7 +119,7 @@ def _link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
             continue
         anchors: tuple[complex, ...]
         if len(places) == 1:
-            anchors, reach, heading = (places[0],), shapes.BLOCK[1] / 2 + 4, -math.pi / 2
+            anchors, reach, heading = (places[0],), shapes.SLIDER_SIZE[1] / 2 + 4, -math.pi / 2
         elif len(corners := hull(places)) > 2:
             # The middle of a plate is its own best place.
             anchors, reach, heading = (sum(corners) / len(corners),), 0.0, 0.0
@@ -127,15 +131,10 @@ def _link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
     return labels
 
 
-DRIVE = style.VERMILION
-LINKS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
-Travel = Mapping[str, tuple[float, float]]
-
-
 def link_colors(mechanism: Mechanism) -> dict[str, str]:
     """The colour of each link, the same in every picture."""
     moving = [name for name in mechanism.description.links if name != GROUND]
-    return {name: LINKS[k % len(LINKS)] for k, name in enumerate(moving)} | {GROUND: style.INK}
+    return {name: LINK_COLORS[k % len(LINK_COLORS)] for k, name in enumerate(moving)} | {GROUND: style.INK}
 
 
 def draw_mechanism(
@@ -195,11 +194,11 @@ def draw_mechanism(
     arrows = drive_arrows(scene) if drives else ()
     for arrow in arrows:
         if isinstance(arrow, Turn):
-            pen.turn(arrow.place, arrow.start, arrow.sweep, arrow.radius, DRIVE)
+            pen.turn(arrow.place, arrow.start, arrow.sweep, arrow.radius, DRIVE_COLOR)
         else:
-            pen.push(arrow.place, arrow.along, arrow.length, arrow.away, DRIVE)
+            pen.push(arrow.place, arrow.along, arrow.length, arrow.away, DRIVE_COLOR)
     if labels:
-        named = name_labels(scene, colors, arrows, DRIVE)
+        named = name_labels(scene, colors, arrows)
         place_labels(axes, named, covered(axes), order=pen.order + 2)
 
 

@@ -13,10 +13,14 @@ from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 
 PAD = 0.5  # inches around what is drawn, for symbols and names
-LEAST, TALLEST = 1.5, 5.3  # inches, height of a window
+MIN_HEIGHT = 1.5  # inches, of a window
+MAX_HEIGHT = 5.3  # inches
 TITLE = 0.36  # inches above a window for a line of words
-# Inches left of a window and below it, for axis labels, and above and right of it.
-LEFT, BELOW, ABOVE, RIGHT = 0.78, 0.55, 0.12, 0.15
+# Inches beside a window; left and below for axis labels.
+LEFT = 0.78
+BELOW = 0.55
+ABOVE = 0.12
+RIGHT = 0.15
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ def fit(places: Complexes | Iterable[complex], width: float, height: float, pad:
     """A window `width` inches wide and at most `height` inches high that shows all of the places."""
     middle, wide, tall = extent(places)
     scale = scale_of(wide, tall, width, height, pad)
-    return Window(middle, scale, width, max(scale * tall + 2 * pad, min(LEAST, height)))
+    return Window(middle, scale, width, max(scale * tall + 2 * pad, min(MIN_HEIGHT, height)))
 
 
 def windows(

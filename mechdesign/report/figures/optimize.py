@@ -17,10 +17,10 @@ from matplotlib.tri import Triangulation
 from mechdesign.analyses.optimize.tables import Comparison
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.kinematics.paths import paths_figure
+from mechdesign.report.figures.kinematics import paths_figure
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.sweep import Sweep
+from mechdesign.report.figures.scene import Sweep
 from mechdesign.report.figures.workspace import workspace_figure
 from mechdesign.report.figures.workspace.regions import regions
 from mechdesign.results import Result, Table

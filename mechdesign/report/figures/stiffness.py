@@ -20,7 +20,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism, link_colors, name_labels
-from mechdesign.report.figures.framing import TALLEST, TITLE, framed
+from mechdesign.report.figures.framing import MAX_HEIGHT, TITLE, framed
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import along
 from mechdesign.report.figures.planes import Plane, map_sheet, plane
@@ -53,7 +53,7 @@ def figures(study: Study, result: Result) -> Gallery:
         found.add("free", free_motion, study, result, drawn["loose"])
     found.add("directions", _directions, study, result)
     if not poses.listed and poses.count > 2:
-        over = plane(study, poses, study.stiffness)
+        over = plane(study, poses)
         if over is not None:
             found.add("stiffness", _map, study, result, over)
         if len(poses.grid) == 1:
@@ -69,7 +69,7 @@ def _springs(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
     figure, axes = posed(study, poses, drawn, places, "equivalent springs", labels=False, drives=False)
     draw_coils(axes, coils)
-    points = [label for label in name_labels(scene, link_colors(study.mechanism), (), style.INK) if not label.italic]
+    points = [label for label in name_labels(scene, link_colors(study.mechanism), ()) if not label.italic]
     place_labels(axes, coil_labels(coils) + points, covered(axes), order=8)
     return figure
 
@@ -238,7 +238,7 @@ def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: obje
 
 def posed(study: Study, poses: Poses, drawn: Drawn, places: Complexes, what: str, **look: Any) -> tuple[Figure, Axes]:
     """The mechanism in a pose, in a window that holds these places, too."""
-    figure, axes = framed(places, study.units.label("length"), height=TALLEST, above=TITLE)
+    figure, axes = framed(places, study.units.label("length"), height=MAX_HEIGHT, above=TITLE)
     axes.set_title(f"{what} at {pose_in_words(study, poses, drawn.row)}", loc="left")
     draw_mechanism(axes, study.mechanism, drawn.configuration, **look)
     return figure, axes

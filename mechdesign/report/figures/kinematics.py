@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -11,12 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.kinematics.paths import modes_figure, paths_figure
+from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, extent, fit, framed, scale_of, windows
 from mechdesign.report.figures.panels import abscissa, moving_names, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.sweep import Sweep, ranks
+from mechdesign.report.figures.scene import Sweep, link_points, ranks
 from mechdesign.results import Column, Result
 from mechdesign.study import Study, Units
 
@@ -34,6 +37,19 @@ _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
+# Largest number of moving links, and for it the number of ghosts and their share of colour.
+_GHOSTS = ((3, 7, 0.42), (5, 6, 0.38), (8, 4, 0.32), (10**6, 2, 0.3))
+# Line width and share of colour of a path by the rank of its point.
+_PATH_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
+HEIGHT = 5.6  # inches, of a mechanism along its motion at most
+# Of the panels of assemblies: their number side by side, inches, and the size of symbols in small ones.
+_MAX_COLUMNS = 4
+_MAX_HEIGHT = 4.0
+_MIN_HEIGHT = 1.2
+_PANEL_TITLE = 0.3
+_NOTE = 0.3
+_GAP = 0.12
+_SMALL_SYMBOLS = 0.6
 
 
 def figures(study: Study, result: Result) -> Gallery:
@@ -209,3 +225,97 @@ def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, 
             handles=handles, loc="lower left", ncols=len(handles), borderaxespad=0.0,
             bbox_to_anchor=(axes[0].get_position().x0, 1 - 0.34 / height),
         )  # fmt: skip
+
+
+def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
+    """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
+
+    `above` it, inches are left for a title.
+    """
+    wanted = [
+        target.table[:, -2] + 1j * target.table[:, -1]
+        for target in sweep.study.targets.values()
+        if target.table is not None and len(target.coordinates) == 2
+    ]
+    places = np.concatenate([sweep.extent, *wanted])
+    figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
+    for path in wanted:
+        axes.plot(
+            path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,
+            zorder=3.7,
+        )  # fmt: skip
+    count = len(sweep.mechanism.description.links) - 1
+    _, ghosts, share = next(entry for entry in _GHOSTS if count <= entry[0])
+    # A closed motion ends where it begins: its last ghost would hide the first.
+    some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
+    for index in np.unique(some[1 : -1 if sweep.closed else None]):
+        draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index), share=share)
+    draw_paths(axes, sweep)
+    first = int(sweep.valid[0])
+    draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
+    return figure
+
+
+def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
+    """Draw the path of every moving point, the more boldly the more it tells."""
+    section = sweep.study.kinematics
+    asked = section.outputs if section is not None and section.outputs is not None else ()
+    ranked = ranks(sweep.mechanism, tuple(asked))
+    # Where no point tells more than the others, none is thin.
+    lift = 2 - max(ranked.values(), default=2)
+    colors = link_colors(sweep.mechanism)
+    owners: dict[str, str] = {}
+    for name, link in sweep.mechanism.description.links.items():
+        if name != GROUND:
+            for point in link_points(link):
+                owners.setdefault(point, name)
+    for point, path in sweep.places.items():
+        if sweep.closed and sweep.poses.closed:
+            # A closed path is listed without its begin at its end.
+            path = np.append(path, path[0])
+        line, share = _PATH_LOOKS[min(ranked[point] + lift, 2)]
+        axes.plot(
+            path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,
+            zorder=2.5 + 0.1 * ranked[point], solid_joinstyle="round",
+        )  # fmt: skip
+
+
+def modes_figure(study: Study, result: Result) -> Figure:
+    """A panel an assembly that has a valid pose, as many as the result carries, on one scale."""
+    shown = [(title, Sweep.of(each)) for title, each in result.drawn["modes"].items()]
+    found = result.counts["modes"]
+    moving = int((result.tables["modes"]["valid"].reshape(found, -1) > 0).any(axis=1).sum())
+    notes = []
+    if moving > len(shown):
+        notes.append(f"{len(shown)} of {moving} assemblies")
+    if found > moving:
+        notes.append(f"{found - moving} of {found} assemblies have no valid pose")
+    places = np.concatenate([sweep.extent for _, sweep in shown])
+    _, wide, tall = extent(places)
+    columns = max(
+        range(1, min(len(shown), _MAX_COLUMNS) + 1),
+        key=lambda count: scale_of(wide, tall, *_room(count, math.ceil(len(shown) / count)), _pad(count)),
+    )
+    window = fit(places, *_room(columns, math.ceil(len(shown) / columns)), _pad(columns))
+    unit, top = study.units.label("length"), _NOTE if notes else 0.0
+    figure, grid = windows(window, unit, len(shown), columns, gap=_GAP, above=_PANEL_TITLE, top=top)
+    for axes, (title, sweep) in zip(grid, shown, strict=True):
+        axes.set_title(title, loc="left", fontsize=10)
+        draw_paths(axes, sweep, width=0.8)
+        draw_mechanism(
+            axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=columns == 1, drives=False,
+            travel=sweep.travel, size=_SMALL_SYMBOLS if columns > 1 else 1.0,
+        )  # fmt: skip
+    figure.text(LEFT / style.WIDTH, 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
+    return figure
+
+
+def _pad(columns: int) -> float:
+    """Inches around what a panel shows."""
+    return 0.4 if columns == 1 else 0.2
+
+
+def _room(columns: int, rows: int) -> tuple[float, float]:
+    """Largest width and height of a panel, inches: all of them on about one screen."""
+    width = (style.WIDTH - LEFT - RIGHT - _GAP * (columns - 1)) / columns
+    return width, min(max(8.0 / rows, _MIN_HEIGHT), _MAX_HEIGHT)
