@@ -22,8 +22,7 @@ from mechdesign.analyses.kinematics.motion import (
     move,
 )
 from mechdesign.analyses.kinematics.peaks import extremes, needed
-from mechdesign.analyses.poses import judge_failures, pose_in_words
-from mechdesign.analyses.shown import Keeper, Shown
+from mechdesign.analyses.poses import Keeper, Shown, judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.kinematics.motion import Motion, as_given, thinned
-from mechdesign.analyses.poses import CHUNK, in_study_units, radians
+from mechdesign.analyses.poses import POSES_AT_ONCE, in_study_units, radians
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -137,8 +137,8 @@ class _Search:
 
     def look(self, step: Ints, low: Floats, high: Floats) -> _Parts:
         found = []
-        for first in range(0, len(step), CHUNK):
-            here, x = step[first : first + CHUNK], np.stack([low, high])[:, first : first + CHUNK]
+        for first in range(0, len(step), POSES_AT_ONCE):
+            here, x = step[first : first + POSES_AT_ONCE], np.stack([low, high])[:, first : first + POSES_AT_ONCE]
             ahead = x + SLOPE * (x[1] - x[0])
             start = None if self.start is None else self.start.take(np.tile(here, 4))
             values, valid = self.margins.look(np.concatenate([x, ahead]).ravel(), start)

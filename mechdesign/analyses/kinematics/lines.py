@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.analyses.kinematics.boundaries import Boundary
 from mechdesign.analyses.kinematics.motion import NEAR, Motion, thinned
 from mechdesign.analyses.kinematics.rates import drive_velocities
-from mechdesign.analyses.poses import CHUNK, dimensions, in_study_units, radians, starts
+from mechdesign.analyses.poses import POSES_AT_ONCE, dimensions, in_study_units, radians, starts
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet, wrap
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -159,9 +159,9 @@ class PoseLine:
         return self.values[: len(self._angles), node]
 
     def _in_chunks(self, row: Ints, place: Floats, near: Floats) -> tuple[Floats, Floats, Flags]:
-        if len(row) <= CHUNK:
+        if len(row) <= POSES_AT_ONCE:
             return self._sample(row, place, near)
-        parts = [slice(k, k + CHUNK) for k in range(0, len(row), CHUNK)]
+        parts = [slice(k, k + POSES_AT_ONCE) for k in range(0, len(row), POSES_AT_ONCE)]
         values, slopes, valid = zip(*[self._sample(row[p], place[p], near[:, p]) for p in parts], strict=True)
         return np.concatenate(values, axis=1), np.concatenate(slopes, axis=1), np.concatenate(valid)
 

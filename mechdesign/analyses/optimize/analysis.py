@@ -1,4 +1,4 @@
-"""Which dimensions are best? A grid, a search or a Pareto front of designs, compared by normalised, weighted goals."""
+"""Which dimensions are best? A grid, a search or a Pareto front of designs, compared; the best as study files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mechdesign.analyses.optimize.tables import (
     sensitivity_table,
 )
 from mechdesign.analyses.optimize.variables import grid, in_words
-from mechdesign.analyses.shown import solve_shown
+from mechdesign.analyses.poses import solve_shown
 from mechdesign.analyses.workspace.analysis import index_meanings, workspace
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
@@ -40,9 +40,9 @@ from mechdesign.study.variants import changed_data, rewritten, variant
 from mechdesign.threads import one_thread
 
 # Numbers that a search keeps of the rows behind its goals.
-MOST_KEPT = 10_000_000
-# Reasons of infeasible designs that are told one by one.
-MOST_REASONS = 10
+MAX_KEPT_ROWS = 10_000_000
+# Reasons of infeasible designs that are reported one by one.
+MAX_REASONS = 10
 
 
 @one_thread()
@@ -58,8 +58,6 @@ def optimize(
 
     Parameters
     ----------
-    study : Study
-        With an optimize section.
     seed : int, optional
         Of the search and the front, in place of the study's; a grid is not random.
     jobs : int or None
@@ -87,11 +85,11 @@ def optimize(
     evaluator = Evaluator(study, (*goals, *conditions_of(section)), graded=section.method != "grid")
     meanings = index_meanings(study, evaluator.question) if evaluator.question is not None else {}
     budget = section.evaluations or (
-        pareto.DEFAULT_EVALUATIONS * len(goals)
+        pareto.FRONT_EVALUATIONS * len(goals)
         if section.method == "pareto"
         else searching.allowance(len(section.variables), len(weights), len(goals), slow=evaluator.slow)
     )
-    evaluator.limit_rows(MOST_KEPT // budget)
+    evaluator.limit_rows(MAX_KEPT_ROWS // budget)
     with workers(evaluator, jobs, processes=True) as compute:
         judge = Judge(study, evaluator, compute, progress, journal)
         try:
@@ -138,7 +136,7 @@ def _ask(
     judge.progress.start(budget, "designs")
     # Values of a workspace are known to a tolerance only.
     rough = evaluator.question is not None
-    explorer = Explorer(judge.scores, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
+    explorer = Explorer(judge.known, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
     if section.method == "search":
         use_all = section.evaluations is not None
         return tuple(_doubts(searching.search(explorer, smallest, weights.tolist(), seed, use_all=use_all), budget))
@@ -172,7 +170,7 @@ def _none_feasible(designs: JudgedDesigns) -> str:
     reasons = designs.counted()
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
-    told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MOST_REASONS])
+    told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
     return f"no design of {len(designs)} is feasible: {told}"
 
 
@@ -184,11 +182,11 @@ def _finished_part(study: Study, designs: JudgedDesigns, meanings: Mapping[str, 
 
 def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Iterator[str]:
     reasons = designs.counted()
-    for reason, count, first in reasons[:MOST_REASONS]:
+    for reason, count, first in reasons[:MAX_REASONS]:
         row = {name: float(column[first]) for name, column in designs.variables.items()}
         yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {in_words(row)})"
-    if len(reasons) > MOST_REASONS:
-        yield f"designs are infeasible for {len(reasons) - MOST_REASONS} more reasons; see designs.csv"
+    if len(reasons) > MAX_REASONS:
+        yield f"designs are infeasible for {len(reasons) - MAX_REASONS} more reasons; see designs.csv"
     if evaluator.question is None or evaluator.question.rule != "gauss":
         return
     for each, error in designs.errors.items():
@@ -201,10 +199,7 @@ def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Ite
 def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
     """Texts by file name, ``optimum.yaml`` for the first row of weights, ``optimum_2.yaml`` ..., and what is wrong.
 
-    Parameters
-    ----------
-    marked : mapping of str to int
-        Further designs worth a file, by its name without the suffix.
+    `marked` are further designs worth a file, by its name without the suffix.
     """
     goals = [each.name for each in compared.designs.goals]
     wanted = {}

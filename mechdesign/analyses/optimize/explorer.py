@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -58,18 +57,9 @@ class Part:
         return np.asarray(found - self.sign * self.bound)
 
 
-class Scores(NamedTuple):
-    """What an evaluation of points gives; see `Known`. Without shortfalls, points without a value are all alike."""
-
-    values: Floats
-    margins: Floats
-    rows: Floats
-    shortfall: Floats | None = None
-
-
 @dataclass(frozen=True)
 class Known:
-    """Everything evaluated so far, a line a point.
+    """Evaluated points, a line each.
 
     Parameters
     ----------
@@ -126,7 +116,7 @@ class Explorer:
     Parameters
     ----------
     evaluate
-        From points, shape (m, dimensions), to what is known of them.
+        Of points, shape (m, dimensions).
     rough : bool
         Whether values are known to a tolerance only, so that differences over small steps are noise.
     slow : bool
@@ -139,7 +129,7 @@ class Explorer:
     """
 
     def __init__(
-        self, evaluate: Callable[[Floats], Scores], dimensions: int, budget: int, parts: Sequence[Part] = (),
+        self, evaluate: Callable[[Floats], Known], dimensions: int, budget: int, parts: Sequence[Part] = (),
         *, rough: bool = False, slow: bool = False,
     ) -> None:  # fmt: skip
         self._evaluate, self.dimensions, self.parts = evaluate, dimensions, tuple(parts)
@@ -172,9 +162,7 @@ class Explorer:
                 raise Spent
             self.left -= len(order)
             found = self._evaluate(u[order])
-            none = np.where(np.isnan(found.values).any(axis=1), 1.0, 0.0)
-            shortfall = none if found.shortfall is None else found.shortfall
-            parts = (u[order], found.values, found.margins, found.rows, shortfall[:, None])
+            parts = (found.u, found.values, found.margins, found.rows, found.shortfall[:, None])
             end = begun + len(order)
             if end > len(self._table):
                 *self._ends, width = np.cumsum([part.shape[1] for part in parts]).tolist()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
-from mechdesign.analyses.optimize.explorer import ASSEMBLY, Part, Scores
+from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube
 from mechdesign.journal import Journal, digest
@@ -20,9 +20,9 @@ from mechdesign.progress import Progress
 from mechdesign.study import Study
 
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
-CHUNK = 384
+DESIGNS_AT_ONCE = 384
 # The same where designs cost much and a search asks for few at once.
-SMALL_CHUNK = 16
+SLOW_DESIGNS_AT_ONCE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Judge:
         self.goals, self.conditions = tuple(goals_of(study.optimize)), tuple(conditions_of(study.optimize))
         self._names = tuple(study.optimize.variables)
         self._squares, self._compute, self._journal = evaluator.squares, compute, journal
-        self._chunk = SMALL_CHUNK if evaluator.slow and study.optimize.method != "grid" else CHUNK
+        self._chunk = SLOW_DESIGNS_AT_ONCE if evaluator.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
         # Words of an earlier run keep their numbers: this one meets them in the same order.
         self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
         self._asked: list[Floats] = []
@@ -110,7 +110,7 @@ class Judge:
             found.append(Part(ASSEMBLY, -1.0, False, slice(margins.start - head, margins.stop - head)))
         return found
 
-    def scores(self, u: Floats) -> Scores:
+    def known(self, u: Floats) -> Known:
         """Evaluate points of the unit cube."""
         designs, given = from_cube(self.study, u)
         found = np.full((len(u), self.layout.width), np.nan)
@@ -118,8 +118,8 @@ class Judge:
             found[given] = self.evaluate({name: column[given] for name, column in designs.items()})
         values = np.where(found[:, [self.layout.code]] > 0, np.nan, found[:, self.layout.values])
         margins = [each.margin(values[:, self.layout.column[each]]) for each in self.conditions]
-        return Scores(
-            values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
+        return Known(
+            u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
             found[:, self.layout.head :], found[:, self.layout.shortfall],
         )  # fmt: skip
 

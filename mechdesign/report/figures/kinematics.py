@@ -109,7 +109,7 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
 
 
 def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
-    """Columns by kind and unit, in the order of `_RANKS`, what tells most first."""
+    """Columns by kind and unit, in the order of `_RANKS`, the most informative first."""
     section = study.kinematics
     asked = section.outputs if section is not None and section.outputs is not None else ()
     values = {column.name: column.values for column in columns}
@@ -130,7 +130,7 @@ def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[
         position = values.get(of, column.values)
         if order in _RANKS[:3] and swept and _still(position - x, float(np.ptp(x))):
             continue  # the sweep over itself
-        # Of what stands still only the place is told, and only where it is asked for.
+        # Of what stands still only the position is drawn, and only where it is an output.
         told = order in ("error", "effort") or (order == "position" and asked and of not in study.mechanism.drives)
         if not told and _still(position, sizes.get(unit_of.get(of, ""), 1.0)):
             continue
@@ -257,11 +257,11 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
 
 
 def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
-    """Draw the path of every moving point, the more boldly the more it tells."""
+    """Draw the path of every moving point, bold ones for outputs and coupler points, as `ranks` has them."""
     section = sweep.study.kinematics
     asked = section.outputs if section is not None and section.outputs is not None else ()
     ranked = ranks(sweep.mechanism, tuple(asked))
-    # Where no point tells more than the others, none is thin.
+    # Where all points are of a low rank, none is thin.
     lift = 2 - max(ranked.values(), default=2)
     colors = link_colors(sweep.mechanism)
     owners: dict[str, str] = {}

@@ -123,7 +123,7 @@ def score_curves(compared: Comparison) -> Figure:
 
 
 def _steep(values: Floats) -> bool:
-    """Whether values are told apart on a logarithmic scale only."""
+    """Whether values differ so much that only a logarithmic scale separates them."""
     finite = values[np.isfinite(values)]
     return bool((finite > 0).all() and finite.max() > 30 * finite.min())
 

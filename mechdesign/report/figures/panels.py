@@ -90,7 +90,7 @@ def stack(
 
 
 def tick_abscissa(axis: Axes, swept: Along) -> None:
-    """Places for the ticks of a sweep: degrees of much of a turn are told in parts of a turn."""
+    """Places for the ticks of a sweep: over much of a turn its parts, such as 30 or 45 degrees."""
     turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
     axis.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=TURNS if turning else [1, 2, 2.5, 5, 10]))
 

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.shown import Shown
+from mechdesign.analyses.poses import Shown
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
@@ -243,7 +243,7 @@ class Sweep(Shown):
 
 
 def ranks(mechanism: Mechanism, outputs: tuple[str, ...] = ()) -> dict[str, int]:
-    """How much the path of each moving point has to tell.
+    """How boldly the path of each moving point is drawn.
 
     2 for points that are asked for and points of one link only (a coupler point, a tool), 1 for joints between moving
     links, 0 for points that turn about a pivot of the ground or slide along a line of it.

@@ -17,7 +17,7 @@ from mechdesign.study.poses import Poses
 
 MAX_SOURCES = 16
 MAX_TOLERANCES = 20
-MAX_SHOWN_POSES = 4
+MAX_POSE_BARS = 4
 # Columns of bars, in words and colours.
 _SOBOL = {
     "share": ("first-order share", style.BLUE),
@@ -38,7 +38,7 @@ def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
     margin = 0.3 + 0.072 * max(len(name) for name in names)
     columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, int(style.WIDTH / (margin + _MIN_WIDTH))))
     sobol = _sobol_pose(table, poses, len(names))
-    each = sobol is None and poses.listed and poses.count <= MAX_SHOWN_POSES
+    each = sobol is None and poses.listed and poses.count <= MAX_POSE_BARS
     bars = 3 if sobol is not None else poses.count if each else 1
     tall = (0.15 + min(len(names), MAX_SOURCES)) * max(_SOURCE_HEIGHT, 0.1 * bars + 0.06)
     bottom = 0.55 + 0.2 * (0 if bars == 1 else 1 if bars < 3 else 2)

@@ -36,7 +36,7 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
 
-# The largest speed ratios may belong to dead centres, where they grow without bounds: this share is told apart.
+# The largest speed ratios may belong to dead centres, where they grow without bounds: this share has its own colours.
 _SHOWN_RATIOS = 0.97
 SIDES = {"inner": style.BLUE, "outer": style.VERMILION}
 DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
@@ -158,7 +158,7 @@ def _pieces(path: Table) -> list[Ints]:
 
 
 def _ends(ratio: Floats) -> tuple[float, bool]:
-    """The largest value to be told apart, and whether a tail lies beyond it."""
+    """The largest value with a colour of its own, and whether a tail lies beyond it."""
     finite = ratio[np.isfinite(ratio)]
     high, top = float(np.quantile(finite, _SHOWN_RATIOS)), float(finite.max())
     return (high, True) if top > 1.5 * high or len(finite) < len(ratio) else (top, False)

@@ -12,7 +12,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
-from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -87,7 +86,10 @@ def label_levels(
     axes: Axes, drawn: Sequence[QuadContourSet], levels: Floats, norm: BoundaryNorm, blocked: Complexes
 ) -> None:
     """Name each level once on one of its lines, far from other lines and names; or not at all."""
-    lines = [[part for contour in drawn for part in _parts(axes, contour, k)] for k in range(len(levels) - 1)]
+    parts_of = [contour.allsegs for contour in drawn]
+    lines = [
+        [_on_paper(axes, part @ [1, 1j]) for parts in parts_of for part in parts[k]] for k in range(len(levels) - 1)
+    ]
     every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]
     taken = np.zeros(0, dtype=complex)
     for k, level in enumerate(levels[1:]):
@@ -111,14 +113,6 @@ def label_levels(
             rotation=(turn + 90) % 180 - 90, rotation_mode="anchor", color="white" if norm(level) < 140 else style.INK,
             zorder=3.5, path_effects=[withStroke(linewidth=2.5, foreground=back)],
         )  # fmt: skip
-
-
-def _parts(axes: Axes, contour: QuadContourSet, level: int) -> list[Complexes]:
-    path = contour.get_paths()[level]
-    if path.codes is None:
-        return []
-    corners = np.split(np.asarray(path.vertices), np.flatnonzero(path.codes == Path.MOVETO)[1:])
-    return [_on_paper(axes, part @ np.array([1, 1j])) for part in corners]
 
 
 def _on_paper(axes: Axes, places: Complexes) -> Complexes:
