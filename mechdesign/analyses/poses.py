@@ -219,13 +219,13 @@ def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tupl
     return [f"{told}; the first: {named[0]}"], ""
 
 
-def pose_in_words(study: Study, poses: Poses, row: int) -> str:
+def pose_in_words(study: Study, poses: Poses, row: int, digits: int = 6) -> str:
     """``theta1 = 30 deg, theta2 = 60 deg`` for the pose of a row."""
     parts = []
     for name, values in poses.values.items():
         if np.isfinite(values[row]):
             unit = study.units.label(study.mechanism.quantity(name))
-            parts.append(f"{name} = {values[row]:g} {unit}".rstrip())
+            parts.append(f"{name} = {values[row] + 0.0:.{digits}g} {unit}".rstrip())
     return ", ".join(parts)
 
 

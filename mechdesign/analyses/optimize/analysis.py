@@ -30,6 +30,7 @@ from mechdesign.analyses.poses import solve_shown
 from mechdesign.analyses.workspace.analysis import index_meanings, workspace
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
+from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import workers
 from mechdesign.progress import NULL, Progress
@@ -183,8 +184,8 @@ def _finished_part(study: Study, designs: JudgedDesigns, meanings: Mapping[str, 
 def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Iterator[str]:
     reasons = designs.counted()
     for reason, count, first in reasons[:MAX_REASONS]:
-        row = {name: float(column[first]) for name, column in designs.variables.items()}
-        yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {in_words(row)})"
+        place = in_words(designs.numbers(first))
+        yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {place})"
     if len(reasons) > MAX_REASONS:
         yield f"designs are infeasible for {len(reasons) - MAX_REASONS} more reasons; see designs.csv"
     if evaluator.question is None or evaluator.question.rule != "gauss":
@@ -211,13 +212,17 @@ def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int])
     files: dict[str, str] = {}
     doubts = []
     for name, (k, heading) in wanted.items():
-        numbers = {variable: float(column[k]) for variable, column in compared.designs.variables.items()}
+        numbers = compared.designs.numbers(k)
         heading = f"{heading}: {in_words(numbers)}"
         data = changed_data(study, numbers)
         try:
-            if not _assembles_alike(study, numbers, data):
-                data = _drawn_anew(study, numbers)
-                if not _assembles_alike(study, numbers, data):
+            mechanism = variant(study, numbers).mechanism
+            if not _assembles_alike(study, mechanism, data):
+                # With the sketch as it assembles.
+                sketch = data["mechanism"]["sketch"]
+                places = [np.asarray(mechanism.sketch_configuration.point(point)).item() for point in sketch]
+                sketch |= {point: [z.real, z.imag] for point, z in zip(sketch, places, strict=True)}
+                if not _assembles_alike(study, mechanism, data):
                     doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
         except MechdesignError as error:
             doubts.append(f"{name}.yaml: {str(error).splitlines()[0]}")
@@ -226,28 +231,18 @@ def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int])
     return files, doubts
 
 
-def _assembles_alike(study: Study, numbers: Mapping[str, float], data: Mapping[str, Any]) -> bool:
-    """Whether the study of this data has the assembly in which the design was evaluated."""
+def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]) -> bool:
+    """Whether the study of this data has the assembly of the mechanism that was evaluated."""
     try:
         alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path or Path("study.yaml"))
     except MechdesignError:
         return False
-    return alone.mechanism.forward.modes == variant(study, numbers).mechanism.forward.modes
-
-
-def _drawn_anew(study: Study, numbers: Mapping[str, float]) -> dict[str, Any]:
-    """The data of a design with the sketch as it assembles."""
-    data = changed_data(study, numbers)
-    assembled = variant(study, numbers).mechanism.sketch_configuration
-    points = {name: np.asarray(assembled.point(name)).item() for name in data["mechanism"]["sketch"]}
-    data["mechanism"]["sketch"] = {name: [point.real, point.imag] for name, point in points.items()}
-    return data
+    return alone.mechanism.forward.modes == mechanism.forward.modes
 
 
 def best_design(compared: Comparison) -> tuple[Study, Result]:
     """The design that is best on the whole as a study, and its workspace where that was judged, or else its motion."""
-    numbers = {name: float(column[compared.best]) for name, column in compared.designs.variables.items()}
-    best = variant(compared.study, numbers)
+    best = variant(compared.study, compared.designs.numbers(compared.best))
     if best.workspace is not None and any(each.command == "workspace" for each in compared.designs.goals):
         # The region is drawn, not its indices.
         plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))

@@ -27,8 +27,6 @@ from mechdesign.study import Study
 from mechdesign.study.variants import faults, follows, variant
 
 NO_REGION = "nothing of the workspace can be reached"
-# Tables that may be of some of the poses only.
-OF_SOME_POSES = ("extremes",)
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 # Why a pose fails, by `mechdesign.mechanism.Reason`.
 FAILED = np.array([
@@ -114,7 +112,8 @@ class Evaluator:
         clear: dict[str, int] = {}
         for command, tables in self._together.items() if graded else ():
             poses = self._poses[command](1, {}, {})
-            if poses.listed or any(table not in OF_SOME_POSES for table in tables):
+            # Extremes may be of some of the poses only.
+            if poses.listed or set(tables) != {"extremes"}:
                 clear[command] = stacked.assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
         self.layout = Layout(self.goals, self._rows, clear)
         if not graded:

@@ -50,6 +50,10 @@ class JudgedDesigns:
     def __len__(self) -> int:
         return len(self.codes)
 
+    def numbers(self, row: int) -> dict[str, float]:
+        """The variables of one design."""
+        return {name: float(column[row]) for name, column in self.variables.items()}
+
     @cached_property
     def failures(self) -> dict[str, Flags]:
         """Designs by why they are infeasible: that they cannot be built, else every condition that they miss."""

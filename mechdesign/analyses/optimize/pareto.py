@@ -25,10 +25,8 @@ def spread(explorer: Explorer, signs: Floats, seed: int) -> None:
 
     `signs`, shape (goals,), are 1 where a goal is minimised, -1 where it is maximised.
     """
-    size, known = (
-        int(np.clip(explorer.left // GENERATIONS, SMALLEST_FRONT_POPULATION, LARGEST_FRONT_POPULATION)),
-        explorer.known,
-    )
+    size = int(np.clip(explorer.left // GENERATIONS, SMALLEST_FRONT_POPULATION, LARGEST_FRONT_POPULATION))
+    known = explorer.known
     begun = np.flatnonzero(known.feasible)
     if len(begun):
         rows = begun[front(known.values[begun] * signs)]

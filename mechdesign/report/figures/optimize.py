@@ -78,7 +78,7 @@ def label(compared: Comparison, name: str) -> str:
 
 def in_words(compared: Comparison, row: int) -> str:
     """``l_a = 1, l_b = 2.15`` of a design."""
-    return ", ".join(f"{name} = {values[row]:.4g}" for name, values in compared.designs.variables.items())
+    return ", ".join(f"{name} = {value:.4g}" for name, value in compared.designs.numbers(row).items())
 
 
 def score_curves(compared: Comparison) -> Figure:

@@ -11,13 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.poses import Shown
+from mechdesign.analyses.poses import Shown, pose_in_words
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Link, Slot
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Ints
 from mechdesign.report.figures.framing import extent
 
 _TRAVEL_POSES = 100  # poses from which the travel of the slides is taken
@@ -182,11 +182,6 @@ class Sweep(Shown):
         return self.study.mechanism
 
     @cached_property
-    def values(self) -> dict[str, Floats]:
-        """The coordinates given, in the study's units."""
-        return {name: self.poses.values[name][self.rows] for name in self.poses.groups[0].names}
-
-    @cached_property
     def valid(self) -> Ints:
         """Indices of the valid poses."""
         return np.flatnonzero(self.configuration.valid)
@@ -235,11 +230,8 @@ class Sweep(Shown):
 
     def words(self, index: int) -> str:
         """``crank = 60 deg`` for one pose; a line may be broken between coordinates only."""
-        parts = []
-        for name, values in self.values.items():
-            unit = self.study.units.label(self.mechanism.quantity(name))
-            parts.append(f"{name} = {values[index] + 0.0:.4g} {unit}".rstrip().replace(" ", "\N{NO-BREAK SPACE}"))
-        return ", ".join(parts)
+        words = pose_in_words(self.study, self.poses, int(self.rows[index]), digits=4)
+        return words.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
 
 
 def ranks(mechanism: Mechanism, outputs: tuple[str, ...] = ()) -> dict[str, int]:
