@@ -17,7 +17,7 @@ from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
 from mechdesign.analyses.poses import POSES_AT_ONCE, solve_poses, study_poses
 from mechdesign.analyses.region.panels import BATCH
-from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, questions, split
+from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, split
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -98,9 +98,8 @@ class Evaluator:
                 message = "an optimisation compares one workspace a design: hold one value of each coordinate"
                 raise StudyError([study.problem(message, "workspace", "at")])
             self.question = asked[0]
-            self._regions_together = all(each.batched for each in self._regional) and not follows(
-                study, study.optimize.variables, ("workspace",)
-            )
+            one_by_one = follows(study, study.optimize.variables, ("workspace",))
+            self._regions_together = not one_by_one and all(batched(each.column) for each in self._regional)
         # Where the study names each.
         self._keys = goals_of(study.optimize) | conditions_of(study.optimize)
         commands = dict.fromkeys(each.command for each in self.goals if not each.regional)

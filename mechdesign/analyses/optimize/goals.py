@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.question import COLUMNS, batched, split
+from mechdesign.analyses.workspace.question import COLUMNS, split
 from mechdesign.commands import COMMANDS
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result
@@ -47,11 +47,6 @@ class Goal:
         """Whether it is a number of the whole workspace."""
         found = self.column in COLUMNS or bool(split(self.column)[0])
         return self.command == "workspace" and found and not self.where
-
-    @property
-    def batched(self) -> bool:
-        """Whether it is a number of the workspace that is evaluated for many designs at once."""
-        return self.regional and batched(self.column)
 
     def margin(self, values: Floats) -> Floats:
         """By how much values keep the bound, negative where they do not."""

@@ -133,9 +133,13 @@ def search(
 
 
 def _start(
-    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator,
-    begin: int, use_all: bool,
-) -> None:  # fmt: skip
+    explorer: Explorer,
+    smallest: Sequence[bool],
+    rows: Sequence[Sequence[float]],
+    rng: np.random.Generator,
+    begin: int,
+    use_all: bool,
+) -> None:
     """Search from points of its own, rows of `explorer.known` from `begin` on, until its evaluations are used up.
 
     Where not all need be used it ends after `MIN_ROUNDS` of descents, or one in which two came to the same.

@@ -163,7 +163,7 @@ def draw_mechanism(
     travel : mapping, optional
         Range of each slide (lengths from the line's origin), which its guide should cover.
     size : float
-        Size of the symbols; 1 for a drawing as wide as the page.
+        Of the symbols; 1 for a drawing as wide as the page.
     """
     scene = pose(mechanism, configuration, index)
     if scene is None:

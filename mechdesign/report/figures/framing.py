@@ -54,9 +54,16 @@ def fit(places: Complexes | Iterable[complex], width: float, height: float, pad:
 
 
 def windows(
-    window: Window, unit: str, count: int = 1, columns: int = 1, *, gap: float = LEFT, above: float = ABOVE,
-    top: float = 0.0, below: float = BELOW,
-) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    window: Window,
+    unit: str,
+    count: int = 1,
+    columns: int = 1,
+    *,
+    gap: float = LEFT,
+    above: float = ABOVE,
+    top: float = 0.0,
+    below: float = BELOW,
+) -> tuple[Figure, list[Axes]]:
     """A figure of `count` windows in rows; inches between columns, above each window, above all and below all of them.
 
     Where the gap between columns has room for it each has an axis label of its own, or else the first one.

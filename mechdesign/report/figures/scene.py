@@ -51,16 +51,9 @@ class Guide:
 
 @dataclass(frozen=True)
 class Scene:
-    """One pose of a mechanism.
+    """One pose of a mechanism: places of the points, unit vectors of the links' x axes, lines of the slides.
 
-    Parameters
-    ----------
-    points : mapping of str to complex
-        World place of every named point.
-    rotations : mapping of str to complex
-        Unit vector of every link's x axis.
-    span : float
-        Width or height of the sketch pose, the larger: what guides are drawn longer by must not change with the pose.
+    `span` is the width or height of the sketch pose, the larger: guides must not change their length with the pose.
     """
 
     description: Description

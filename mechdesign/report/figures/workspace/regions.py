@@ -54,17 +54,10 @@ _MAX_HEIGHT = 6.5
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The region for one value of each held coordinate.
+    """The region for one value of each held coordinate: its row of the table of indices, and its part of the others.
 
-    Parameters
-    ----------
-    title : str
-        ``platform.angle = 15 deg``; empty where nothing is held.
-    held : mapping of str to float
-    row : int
-        Its row of the table of indices.
-    others : (Table, Table) or None
-        Grids and boundary of pieces that are left out.
+    The title is ``platform.angle = 15 deg``, empty where nothing is held; `others` are grids and boundary of the pieces
+    that are left out.
     """
 
     title: str
