@@ -16,7 +16,7 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import deciding_joints
 from mechdesign.mechanism.structure import Group, Structure
 
-# What stands for everything that is placed before a group.
+# Stands for all bodies that are placed before a group.
 BASE = ""
 
 
@@ -48,7 +48,7 @@ def groups_in_words(mechanism: Mechanism) -> list[str]:
 
 
 def describe(mechanism: Mechanism) -> str:
-    """Links, joints, mobility, the order of solution, assembly modes, measures, limits, and what is odd."""
+    """Links, joints, mobility, the order of solution, assembly modes, measures, limits, and a warning if singular."""
     description, graph = mechanism.description, mechanism.graph
     loops = len(graph.edges) - len(graph.nodes) + 1
     lines = [
@@ -110,7 +110,7 @@ def assemblies_in_words(mechanism: Mechanism) -> list[str]:
 
 
 def placed_before(graph: Graph, structure: Structure) -> list[set[str]]:
-    """Bodies that lie fast before each group is solved, and last those that do in the end."""
+    """Bodies whose places are known before each group is solved, and last those known in the end."""
     roots, nodes = {0}, {0} | {node for node, _, _ in structure.known_nodes}
     found = []
     for group in structure.groups:
@@ -163,7 +163,7 @@ def chain_of(description: Description, graph: Graph, structure: Structure, group
     if walk and walk[-1] != BASE:
         walk.append(("R", graph.nodes[loop.end]))
     if [step[0] for step in walk if isinstance(step, tuple)] in (["P", "R", "R"], ["P", "P", "R"]):
-        # Told from the pin on, as textbooks do.
+        # Read from the pin on, as textbooks do.
         walk.reverse()
     joints = [step for step in walk if isinstance(step, tuple)]
     links = [step.removesuffix(":rod") for step in walk if isinstance(step, str) and step != BASE]

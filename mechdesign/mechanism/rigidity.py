@@ -27,13 +27,15 @@ from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # Singular values below this fraction of the largest are zeros, of columns scaled to length 1.
 RANK = 1e-7
-# What closes to this fraction of the mechanism's size is assembled.
+# Gaps below this fraction of the mechanism's size are closed.
 CLOSED = 1e-9
-# A step along the null space (radians, or fractions of the size), and the part of it by which a real motion is told.
-STEP, KEPT = 0.05, 0.3
-# Directions and starts that are tried: deterministic, and enough that chance leaves none out.
-TRIES = 6
-# Draws of the dimensions of which one has to be regular: of a train of 200 four-bars one in three is.
+# Step along the null space (radians, or fractions of the size).
+NULL_SPACE_STEP = 0.05
+# A motion that goes on for at least this part of a step is a finite one.
+REAL_MOTION = 0.3
+# Directions and starts that are tried, drawn from fixed seeds.
+ATTEMPTS = 6
+# Random dimensions that are tried until one is regular: of a train of 200 four-bars one in three is.
 DRAWS = 50
 
 
@@ -121,7 +123,7 @@ class Equations:
         Of several draws one of the largest rank: chance can only lower it. Not finite where no draw is, as a held
         expression may be defined for few values only.
         """
-        draws = [self.drawn(held, seed) for seed in range(TRIES)]
+        draws = [self.drawn(held, seed) for seed in range(ATTEMPTS)]
         finite = [jacobian for jacobian in draws if np.isfinite(jacobian).all()]
         return min(finite, key=lambda jacobian: null_space(jacobian).shape[1], default=draws[0])
 
@@ -198,7 +200,7 @@ class Equations:
 
     def assemble(self, sketch: Sketch) -> Floats | None:
         """An assembled configuration near the sketch; None where there is none."""
-        for attempt in range(TRIES):
+        for attempt in range(ATTEMPTS):
             x, gap = self.solve(self.from_sketch(sketch, 0.1 * attempt, attempt))
             if gap < CLOSED:
                 return x
@@ -212,9 +214,9 @@ class Equations:
             return ordinary, x
         best = (0, x)
         rng = np.random.default_rng(2)
-        for _ in range(TRIES):
+        for _ in range(ATTEMPTS):
             step = motions @ rng.uniform(-1, 1, motions.shape[1])
-            step *= STEP / np.abs(step).max()
+            step *= NULL_SPACE_STEP / np.abs(step).max()
             y, gap = self.solve(x, step=step)
             if gap < CLOSED:
                 best = max(best, (self._realised(y, ordinary), y), key=lambda found: found[0])
@@ -227,11 +229,11 @@ class Equations:
             return ordinary
         kept = np.zeros((motions.shape[1], motions.shape[1]))
         for k, motion in enumerate(motions.T):
-            step = motion * (STEP / np.abs(motion).max())
+            step = motion * (NULL_SPACE_STEP / np.abs(motion).max())
             y, gap = self.solve(x, step=step)
             if gap < CLOSED:
                 kept[:, k] = motions.T @ (y - x) / np.linalg.norm(step)
-        return int((np.linalg.svd(kept, compute_uv=False) > KEPT).sum())
+        return int((np.linalg.svd(kept, compute_uv=False) > REAL_MOTION).sum())
 
     def without(self, jacobian: Floats, edges: Collection[int], classes: Collection[int]) -> tuple[int, int]:
         """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place.

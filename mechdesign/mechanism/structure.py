@@ -43,20 +43,11 @@ class Loop:
 
 @dataclass(frozen=True)
 class Group:
-    """Unknowns that are solved together.
+    """Unknowns that are solved together: angles of classes (roots of ties), slides, and places of `bases`.
 
-    Parameters
-    ----------
-    angles, slides : tuple of int
-        Unknown angle classes (roots of ties) and slides.
-    loops : tuple of Loop
-        Closures between nodes known before.
-    tree : tuple of (int, int)
-        Edges, each with its sign, that place the group's nodes in order once angles and slides are known.
-    conditions : tuple of int
-        Scalar equations: which given coordinates the group's unknowns must meet beside its loops.
-    bases : tuple of int
-        Nodes whose place is unknown too: each begins the tree of a part that only scalar equations hold.
+    Their equations are `loops` between nodes known before and `conditions`, the given coordinates that they determine
+    besides. The edges of `tree`, each with its sign, then place the group's nodes in order; each base begins the tree
+    of a part that only conditions hold.
     """
 
     form: Form

@@ -39,7 +39,7 @@ from mechdesign.threads import one_thread
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
 # Assembly modes that a picture has room for.
-MOST_DRAWN = 12
+MAX_DRAWN_MODES = 12
 # What a step of a motion may lead beside its rates, as a part of it.
 ASTRAY = 1e-3
 
@@ -132,7 +132,7 @@ def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table
             keeper = Keeper(other.study, other.poses)
             motion = move(other, also=keeper.keep)
             seen = keeper.shown
-        if seen.configuration.valid.any() and len(pictured) < MOST_DRAWN:
+        if seen.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
             pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = seen
         labels += [assembly.label] * poses.count
         parts.append(motion.columns())

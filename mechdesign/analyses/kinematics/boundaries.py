@@ -12,8 +12,7 @@ from mechdesign.analyses.poses import CHUNK, in_study_units, radians
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins
-from mechdesign.mechanism.turning import turning_point
+from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins, turning_point
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.minima import lowest
 from mechdesign.numerics.roots import bracketed_roots
@@ -21,22 +20,22 @@ from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
 # Step, as a part of that between two poses, that tells whether a margin rises or falls at a pose.
-SLOPE = 1e-4
+SLOPE_STEP = 1e-4
 # Steps that may hold something are divided into so many parts, so often: until what ends the motion is alone in one,
 # and a margin that falls to zero without crossing it is below `TOUCHING`.
-PARTS, ROUNDS = 8, 6
+PARTS, DIVISIONS = 8, 6
 # Halvings of a step that reach the last bit of any drive's value.
 HALVINGS = 45
 # Precision of roots, as a part of a step.
-FINE = 1e-13
+ROOT_PRECISION = 1e-13
 # A limit this near to the first or the last value of the sweep lies at it (as a part of the value, or of 1).
 AT_END = 1e-9
 # Ends within this part of the sweep's size are one; a change point within this part of a step of a pose is at it.
-ONE_END, AT_POSE = 1e-11, 1e-6
+SAME_END, CHANGE_AT_POSE = 1e-11, 1e-6
 # How far beside a single place, as a part of the step, the motion must go on for it to have no gap there.
-BESIDE = 1e-5
+GAP_PROBE = 1e-5
 # A change point this near to zero, as a part of the sweep, is there.
-SMALL = 1e-7
+CHANGE_AT_ZERO = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,12 +138,12 @@ class _Search:
         found = []
         for first in range(0, len(step), CHUNK):
             here, x = step[first : first + CHUNK], np.stack([low, high])[:, first : first + CHUNK]
-            ahead = x + SLOPE * (x[1] - x[0])
+            ahead = x + SLOPE_STEP * (x[1] - x[0])
             start = None if self.start is None else self.start.take(np.tile(here, 4))
             values, valid = self.margins.look(np.concatenate([x, ahead]).ravel(), start)
             values, valid = values.reshape(len(values), 4, -1), valid.reshape(4, -1)
             with np.errstate(invalid="ignore"):
-                rises = (values[:, 2:] - values[:, :2]) / SLOPE
+                rises = (values[:, 2:] - values[:, :2]) / SLOPE_STEP
             found.append(_Parts(here, x, valid[:2], values[:, :2], rises))
         return _Parts.joined(found)
 
@@ -154,7 +153,7 @@ class _Search:
         parts = self.look(step, self.at[step], self.at[step + 1])
         self.scale = np.nanmax(np.where(np.isfinite(parts.values), np.abs(parts.values), 0.0), axis=(1, 2))
         touched = []
-        for _ in range(ROUNDS):
+        for _ in range(DIVISIONS):
             suspect, touching = self._suspects(parts)
             touched.append(parts.take(touching))
             parts = parts.take(suspect)
@@ -170,7 +169,7 @@ class _Search:
         span = float(np.ptp(self.at))
         kept: list[Boundary] = []
         for end in ends:
-            if not kept or abs(end.place - kept[-1].place) > ONE_END * span or end.cause != kept[-1].cause:
+            if not kept or abs(end.place - kept[-1].place) > SAME_END * span or end.cause != kept[-1].cause:
                 kept.append(end)
         return kept, changes
 
@@ -243,7 +242,7 @@ class _Search:
 
         every, none = np.arange(len(step)), np.full(len(step), np.nan)
         a, b = margin(every, low), margin(every, high)
-        place = bracketed_roots(margin, low, a, high, b, none, none, FINE * np.abs(high - low))
+        place = bracketed_roots(margin, low, a, high, b, none, none, ROOT_PRECISION * np.abs(high - low))
         return np.where((a >= 0) != (b >= 0), place, np.nan)
 
     def _turned(self, step: int, place: float, pose: Configuration, cause: Cause) -> Boundary | None:
@@ -282,7 +281,7 @@ class _Search:
 
     def _goes_on(self, step: Ints, place: Floats) -> Flags:
         """Whether the motion has no gap at single places."""
-        side = BESIDE * self.length[step]
+        side = GAP_PROBE * self.length[step]
         return np.asarray(self.solve(step, place - side).valid & self.solve(step, place + side).valid)
 
     def _endless(self, parts: _Parts) -> list[Boundary]:
@@ -312,14 +311,14 @@ class _Search:
             return np.where(np.isnan(values), np.inf, values)
 
         place, value = lowest(closure, low, high)
-        side = BESIDE * self.length[step]
+        side = GAP_PROBE * self.length[step]
         some = (value <= touch[function, 0]) & (closure(place - side) > value) & (closure(place + side) > value)
         found: dict[tuple[int, float], ChangePoint] = {}
         for k in np.flatnonzero(some & self._goes_on(step, place)).tolist():
             beside = self.at[step[k] : step[k] + 2]
-            beside = beside[np.abs(beside - place[k]) <= AT_POSE * self.length[step[k]]]
+            beside = beside[np.abs(beside - place[k]) <= CHANGE_AT_POSE * self.length[step[k]]]
             at = float(np.clip(beside[0], *sorted(self.at[[1, -2]]))) if len(beside) else float(place[k])
-            found.setdefault((int(function[k]), round(at / (AT_POSE * self.length[step[k]]))),
+            found.setdefault((int(function[k]), round(at / (CHANGE_AT_POSE * self.length[step[k]]))),
                              ChangePoint(at, self.margins.causes[function[k]]))  # fmt: skip
         return list(found.values())
 
@@ -397,7 +396,7 @@ def _warnings(study: Study, margins: SweepMargins, swept: str, changes: list[Cha
     places: dict[str, dict[str, None]] = {}
     for change in sorted(changes, key=lambda change: change.place):
         # The smallest value of a smooth function is found to the root of rounding.
-        at = change.place if abs(change.place) > SMALL * np.ptp(margins.at) else 0.0
+        at = change.place if abs(change.place) > CHANGE_AT_ZERO * np.ptp(margins.at) else 0.0
         place = f"{in_study_units(study, margins.coordinate, at):.6g} {unit}".rstrip()
         places.setdefault(place, {})[change.cause.joint] = None
     return [

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.motion import NEAR, Motion, thinned
+from mechdesign.analyses.kinematics.motion import NEAR_SINGULAR, Motion, thinned
 from mechdesign.analyses.kinematics.rates import drive_velocities
 from mechdesign.analyses.poses import CHUNK, dimensions, in_study_units, radians, starts
 from mechdesign.mechanism import Configuration
@@ -20,11 +20,11 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 
 # How far a link may turn between neighbouring poses (radians), by their places and by its slope at either.
-SURE = 0.3
+MAX_TURN = 0.3
 # How far the rise of a function may be from the mean of its slopes, as a part of its range.
-SMOOTH = 0.02
+MAX_BEND = 0.02
 # Halvings of a step of the sweep, at most: a link that turns faster is taken to jump.
-ROUNDS = 14
+MAX_HALVINGS = 14
 # Where a pose has no slopes (a dead centre, from which functions start as a root does), looks beside it: parts of the
 # step to the next pose.
 GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
@@ -114,7 +114,7 @@ class PoseLine:
         # Limits that count the turns of angles are judged along the motion; here its ends tell of them.
         self._limits = not study.mechanism.counting
         self.followed = self.plan.change_points is not None
-        self._steady = NEAR if self.followed else STALLED
+        self._steady = NEAR_SINGULAR if self.followed else STALLED
         self.which = group.names.index(swept)
         self.given = [
             np.asarray(radians(study, c, v), dtype=float)
@@ -271,17 +271,17 @@ class PoseLine:
         sizes = np.array([function.size for function in self._functions])[:, None]
         moves = high - low > STILL * np.maximum(sizes, np.maximum(np.abs(low), np.abs(high)))
         scale = np.where(np.isnan(self._radians)[:, None], np.where(moves, high - low, np.inf), self._radians[:, None])
-        for _ in range(ROUNDS):
+        for _ in range(MAX_HALVINGS):
             length = self.place[self.end] - self.place[self.begin]
             rise = self.values[:, self.end] - self.values[:, self.begin]
             rise[len(self.rows) :] = wrap(rise[len(self.rows) :])
             one, other = self.slopes[:, self.begin] * length, self.slopes[:, self.end] * length
             with np.errstate(invalid="ignore"):
                 steep = np.fmax(np.fmax(np.abs(one), np.abs(other)), np.abs(rise))
-                rough = np.abs(rise - (one + other) / 2) > SMOOTH * scale[:, self.row[self.begin] // self.each]
+                rough = np.abs(rise - (one + other) / 2) > MAX_BEND * scale[:, self.row[self.begin] // self.each]
             # What is this near to a dead centre has been looked at already.
             wide = np.abs(self.position[self.end] - self.position[self.begin]) > GRADED[1]
-            split = np.flatnonzero(((steep[len(self.rows) :] > SURE).any(axis=0) | rough.any(axis=0)) & wide)
+            split = np.flatnonzero(((steep[len(self.rows) :] > MAX_TURN).any(axis=0) | rough.any(axis=0)) & wide)
             if not len(split):
                 return
             self.divide(split, np.array([0.5]))

@@ -18,14 +18,14 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 
 # Angles within this of each other are one (radians).
-BEYOND = 1e-12
+SAME_ANGLE = 1e-12
 # Angles this near to 0 or a right angle are that (radians): there is a corner, found to this.
-SQUARE = 1e-10
+AT_CORNER = 1e-10
 # Sines below these are zero: as the pose at a limit of motion tells, and at another pose.
-IN_LINE, AT_POSE = 1e-6, 1e-12
+IN_LINE_AT_LIMIT, IN_LINE_AT_POSE = 1e-6, 1e-12
 # Toggles this near to each other are one, in rows of the sweep.
-ONE_TOGGLE = 1e-5
-PARTS = ("frame", "input", "coupler", "output")
+SAME_TOGGLE = 1e-5
+ROLES = ("frame", "input", "coupler", "output")
 
 
 def functions(loops: Sequence[FourBar], toggles: bool) -> dict[str, Function]:
@@ -72,14 +72,14 @@ def loops_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine | None)
     columns = [
         Column("kind", np.array([loop.kind for loop in loops]), "", "what the four bodies and their joints are"),
         *(Column(part, np.array([loop.links[k] for loop in loops]), "", f"the {part} link")
-          for k, part in enumerate(PARTS)),
+          for k, part in enumerate(ROLES)),
         Column("joints", np.array([" ".join(joint.name for joint in loop.joints) for loop in loops]), "",
                "joints from the frame round"),
     ]  # fmt: skip
     if poses.designs == 1:
         columns += [
             *(Column(f"{part}_length", np.array([loop.lengths[k] for loop in loops]), length, f"length of the {part}")
-              for k, part in enumerate(PARTS)),
+              for k, part in enumerate(ROLES)),
             Column("offset", np.array([loop.offset for loop in loops]), length, "offset of the slide"),
             Column("class", np.array([loop.type for loop in loops]), "",
                    "Grashof's class, or the kind of slider-crank"),
@@ -114,7 +114,7 @@ def _at_poses(motion: Motion, loops: Sequence[FourBar]) -> list[tuple[Floats, Fl
     found = []
     for sign in (1, -1):
         values = np.where(np.isnan(each), np.inf, sign * each)
-        best = (values <= values.min(axis=2, keepdims=True) + BEYOND).argmax(axis=2)
+        best = (values <= values.min(axis=2, keepdims=True) + SAME_ANGLE).argmax(axis=2)
         value = np.take_along_axis(each, best[..., None], axis=2)[..., 0]
         found.append((value, np.where(np.isnan(value), np.nan, best)))
     return found
@@ -125,11 +125,11 @@ def _between(motion: Motion, line: PoseLine, count: int) -> list[tuple[Floats, F
     squares = np.array([line.rows[f"square {k}"] for k in range(count)])
     angles = np.array([line.rows[f"angle {k}"] for k in range(count)])
     found = []
-    for peak in peaks(line, squares, np.full((count, line.poses.designs), BEYOND), all_poses=True):
+    for peak in peaks(line, squares, np.full((count, line.poses.designs), SAME_ANGLE), all_poses=True):
         values = line.at(peak.node.ravel(), peak.place.ravel())[angles].reshape(count, *peak.node.shape)
         value = np.stack([values[k, k] for k in range(count)])
         for whole in (0.0, np.pi / 2):
-            value = np.where(np.abs(value - whole) <= SQUARE, whole, value)
+            value = np.where(np.abs(value - whole) <= AT_CORNER, whole, value)
         place = as_given(motion, line.swept, peak.place, np.nan_to_num(peak.position))
         found.append((np.where(np.isnan(peak.place), np.nan, value), place))
     return found
@@ -140,7 +140,7 @@ def toggles_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine) -> T
     study, swept = motion.question.study, line.swept
     which = [(k, end) for end in (0, 3) for k in range(len(loops))]
     sines, cosines = (np.array([line.rows[f"{name} {k} {end}"] for k, end in which]) for name in ("sine", "cosine"))
-    found = zeros(line, sines, AT_POSE, IN_LINE)
+    found = zeros(line, sines, IN_LINE_AT_POSE, IN_LINE_AT_LIMIT)
     found = found.take(_once(found.position(line), found.function))
     position = found.position(line)
     cosine = line.at(found.node, found.place)[cosines[found.function], np.arange(len(found.node))]
@@ -185,7 +185,7 @@ def _together(position: Floats, loop: Ints) -> Flags:
 
 def _apart(position: Floats, kind: Ints) -> Flags:
     """Which of some sorted toggles are not one with the toggle before them."""
-    near = (np.diff(position) <= ONE_TOGGLE) & (np.diff(kind) == 0)
+    near = (np.diff(position) <= SAME_TOGGLE) & (np.diff(kind) == 0)
     return np.append(True, ~near)[: len(position)]
 
 

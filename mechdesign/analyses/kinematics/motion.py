@@ -27,9 +27,8 @@ from mechdesign.analyses.poses import (
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
+from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.jacobians import Jacobian, mixes
 from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -40,19 +39,19 @@ from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.kinematics import KinematicsSection
 
 # A place this near to a pose or to zero, as a part of the sweep, is there.
-AT_POSE = 1e-12
+AT_GIVEN_PLACE = 1e-12
 # Poses with a conditioning below this have lost digits.
-NEAR = 1e-3
+NEAR_SINGULAR = 1e-3
 # h: radians, or parts of the mechanism's size. What the formula leaves out is about 1e-12, what accelerations lose of
 # their digits this near to a change point about 1e-10.
-DISTANCE = 1e-2
-STEPS = DISTANCE * np.array([-3, -2, -1, 1, 2, 3])
-WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
+CHANGE_POINT_STEP = 1e-2
+STENCIL = CHANGE_POINT_STEP * np.array([-3, -2, -1, 1, 2, 3])
+STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
 
 
 # Poses of a design's sweep that tell of it between them, about: of a finer sweep some are left out, but no step becomes
 # longer than so many radians, or so much of the mechanism's size.
-ENOUGH, LONGEST = 4096, 0.02
+ENOUGH_POSES, LONGEST_STEP = 4096, 0.02
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
@@ -289,8 +288,8 @@ def thinned(motion: Motion, swept: str) -> Flags:
     study, poses = motion.question.study, motion.question.poses
     coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
     steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
-    longest = LONGEST * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
-    stride = min(-(-each // ENOUGH), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
+    longest = LONGEST_STEP * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
+    stride = min(-(-each // ENOUGH_POSES), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
     taken: Flags = np.arange(each) % max(stride, 1) == 0
     taken[-1] = True
     taken = np.tile(taken, poses.designs)
@@ -313,7 +312,7 @@ def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> F
     (group,), study = motion.question.poses.groups, motion.question.study
     given = group.values[swept]
     values = in_study_units(study, study.mechanism.coordinate(swept), places)
-    beside, near = given[np.round(positions).astype(int)], AT_POSE * np.ptp(given)
+    beside, near = given[np.round(positions).astype(int)], AT_GIVEN_PLACE * np.ptp(given)
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(beside - values) <= near, beside, np.where(np.abs(values) <= near, 0.0, values))
 
@@ -378,26 +377,26 @@ def _through_change_points(motion: Motion) -> None:
     motion.smooth = np.zeros(question.poses.count, dtype=bool)
     if plan.change_points is None or len(question.poses.groups) > 1:
         return
-    rows = np.flatnonzero(motion.valid & (motion.arrays["conditioning"] < NEAR))
+    rows = np.flatnonzero(motion.valid & (motion.arrays["conditioning"] < NEAR_SINGULAR))
     if not len(rows):
         return
     (name,) = group.names
     coordinate = plan.structure.given[0]
     scale = 1.0 if coordinate.quantity == "angle" else study.mechanism.size
-    steps = in_study_units(study, coordinate, scale * STEPS)
+    steps = in_study_units(study, coordinate, scale * STENCIL)
     values = (group.values[name][rows][:, None] + steps).ravel()
     beside = Poses((PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),))
     around = Motion(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
-    each = np.repeat(rows, len(STEPS))
+    each = np.repeat(rows, len(STENCIL))
     for solved in solve_poses(study, beside):
         near = {angle: radians(study, c, motion.arrays[angle][each[solved.rows]])
                 for angle, c in angles_of(question.watched).items() if angle != name}  # fmt: skip
         configuration = replace(solved.configuration, near={**solved.configuration.near, **near})
         around.fill(replace(solved, configuration=configuration))
-    good = around.valid.reshape(-1, len(STEPS)).all(axis=1)
+    good = around.valid.reshape(-1, len(STENCIL)).all(axis=1)
     for column, array in motion.arrays.items():
         if column in (name, "conditioning"):
             continue
-        table = around.arrays[column].reshape(-1, len(STEPS))
-        array[rows[good]] = (table @ WEIGHTS)[good]
+        table = around.arrays[column].reshape(-1, len(STENCIL))
+        array[rows[good]] = (table @ STENCIL_WEIGHTS)[good]
     motion.smooth[rows[good]] = True

@@ -24,7 +24,7 @@ Wanted = Callable[[int, Floats, Floats], Flags]
 Along = Callable[[Ints, Floats], Floats]
 
 # How far from its place an extreme or a zero may be found, as a part of its segment.
-PRECISION = 1e-13
+PLACE_PRECISION = 1e-13
 # Where a segment that may hold an extreme is looked at first.
 LOOKS = np.array([0.25, 0.5, 0.75])
 
@@ -119,7 +119,7 @@ def _roots(
     none = np.full(len(rising), np.nan)
     return bracketed_roots(
         lambda lane, x: rising[lane] * evaluate(lane, x),
-        at[0], rising * ends[0], at[1], rising * ends[1], none, none, PRECISION * np.abs(at[1] - at[0]),
+        at[0], rising * ends[0], at[1], rising * ends[1], none, none, PLACE_PRECISION * np.abs(at[1] - at[0]),
     )  # fmt: skip
 
 

@@ -11,8 +11,7 @@ from mechdesign.analyses.poses import SolvedPoses, radians
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import STALLED, Linearization
-from mechdesign.mechanism.jacobians import Jacobian
+from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization
 from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study

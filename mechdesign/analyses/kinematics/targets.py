@@ -18,9 +18,9 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema.targets import Target, timing
 
 # Distances between poses and pieces of a path that are held at once.
-BLOCK = 1 << 20
+MAX_DISTANCES = 1 << 20
 # A drive's value this part of the table's range beyond its end is still at the end: rounding.
-ROUNDING = 1e-9
+TABLE_END_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ def _interpolated(table: Floats, at: Floats, turn: float | None) -> list[Floats]
     Where `turn` is given, values outside the table are taken at the turn in which it may hold them.
     """
     first, last = table[0, 0], table[-1, 0]
-    slack = ROUNDING * max(last - first, abs(first))
+    slack = TABLE_END_ROUNDING * max(last - first, abs(first))
     outside = (at < first - slack) | (at > last + slack)
     if turn is not None:
         at = np.where(outside, first + np.mod(at - first, turn), at)
@@ -139,7 +139,7 @@ def nearest(points: Complexes, corners: Complexes) -> Complexes:
     # A piece without length is its corner: any positive divisor gives part 0.
     lengths = np.where(lengths > 0, lengths, 1.0)
     found = np.empty(len(points), dtype=complex)
-    step = max(1, BLOCK // len(spans))
+    step = max(1, MAX_DISTANCES // len(spans))
     for first in range(0, len(points), step):
         some = points[first : first + step, None]
         feet = begins + np.clip(dot(spans, some - begins) / lengths, 0.0, 1.0) * spans
