@@ -222,7 +222,7 @@ class Linearization(State):
             (lead([w[k] for w, _ in each]), lead([d[k] for _, d in each])) for k in range(len(self.structure.edges))
         ]
         offsets = {
-            body: lead([self.geometry.offset_derivative(body, place, sizes) for place in places])
+            body: lead([self.geometry.angle_derivative(turns, place, sizes) for place in places])
             for body, (_, turns) in self.geometry.graph.bodies.items()
             if turns
         }

@@ -31,6 +31,10 @@ class Tie:
     given: tuple[tuple[int, int], ...] = ()
     offsets: tuple[tuple[int, str], ...] = ()
 
+    def reversed(self, frame: int) -> Tie:
+        """How the root turns with class `frame`, whose tie this is."""
+        return Tie(frame, tuple((-s, k) for s, k in self.given), tuple((-s, body) for s, body in self.offsets))
+
 
 @dataclass(frozen=True)
 class Loop:
@@ -109,17 +113,11 @@ class _Ties:
         if a.root == b.root:
             raise Undetermined("the given angles contradict each other: two of them fix the same angle")
         if a.root == 0:
-            # The ground stays the root: turn the relation round.
-            back = Tie(
-                frame,
-                tuple((-s, k) for s, k in step.given),
-                tuple((-s, body) for s, body in step.offsets),
-            )
-            self.join(reference, frame, back)
+            # The ground stays the root.
+            self.join(reference, frame, step.reversed(frame))
             return
-        undo_given = tuple((-s, k) for s, k in a.given)
-        undo_offsets = tuple((-s, body) for s, body in a.offsets)
-        self.parent[a.root] = Tie(b.root, b.given + step.given + undo_given, b.offsets + step.offsets + undo_offsets)
+        back = a.reversed(frame)
+        self.parent[a.root] = Tie(b.root, b.given + step.given + back.given, b.offsets + step.offsets + back.offsets)
 
 
 def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:

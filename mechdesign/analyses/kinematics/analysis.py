@@ -38,9 +38,9 @@ from mechdesign.threads import one_thread
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
-# Assembly modes that a picture has room for.
+# Assembly modes that a picture shows at most.
 MAX_DRAWN_MODES = 12
-# What a step of a motion may lead beside its rates, as a part of it.
+# How far a step of a motion may deviate from the direction of its rates, as a part of it.
 ASTRAY = 1e-3
 
 
@@ -118,7 +118,7 @@ def kinematics(
 
 
 def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
-    """The motion of every assembly, the sketch's first; what is to be said of each, how many they are, some to draw."""
+    """The motion of every assembly, the sketch's first; warnings, the number of assemblies, and some to draw."""
     study, poses = question.study, question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
     labels: list[str] = []

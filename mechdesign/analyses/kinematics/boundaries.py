@@ -19,20 +19,23 @@ from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
-# Step, as a part of that between two poses, that tells whether a margin rises or falls at a pose.
+# Step of the differences that are the slopes of margins, as a part of the step between two poses.
 SLOPE_STEP = 1e-4
-# Steps that may hold something are divided into so many parts, so often: until what ends the motion is alone in one,
-# and a margin that falls to zero without crossing it is below `TOUCHING`.
-PARTS, DIVISIONS = 8, 6
+# Steps in which the motion may end are divided into so many parts,
+PARTS = 8
+# so often: until each end is alone in one, and a margin that falls to zero without crossing it is below `TOUCHING`.
+DIVISIONS = 6
 # Halvings of a step that reach the last bit of any drive's value.
 HALVINGS = 45
 # Precision of roots, as a part of a step.
 ROOT_PRECISION = 1e-13
 # A limit this near to the first or the last value of the sweep lies at it (as a part of the value, or of 1).
 AT_END = 1e-9
-# Ends within this part of the sweep's size are one; a change point within this part of a step of a pose is at it.
-SAME_END, CHANGE_AT_POSE = 1e-11, 1e-6
-# How far beside a single place, as a part of the step, the motion must go on for it to have no gap there.
+# Ends within this part of the sweep's size are one.
+SAME_END = 1e-11
+# A change point within this part of a step of a pose is at it.
+CHANGE_AT_POSE = 1e-6
+# The motion has no gap at a single place if it is valid this far to both sides, as a part of the step.
 GAP_PROBE = 1e-5
 # A change point this near to zero, as a part of the sweep, is there.
 CHANGE_AT_ZERO = 1e-7
@@ -40,16 +43,9 @@ CHANGE_AT_ZERO = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """An end of the motion.
+    """An end of the motion: where it is along the sweep in rows, and the pose there (None at infinity).
 
-    Parameters
-    ----------
-    position : float
-        Where it is along the sweep, in rows.
-    place : float
-        Value of the swept coordinate (radians or length): the last at which the mechanism is valid.
-    configuration : Configuration
-        The pose there; None at infinity.
+    `place` is the last value of the swept coordinate (radians or length) at which the mechanism is valid.
     """
 
     position: float
@@ -68,15 +64,10 @@ class ChangePoint:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """Parts of the steps of a sweep: of both ends the place, whether it is valid, the margins and what they rise by.
+    """Parts of the steps of a sweep; `step` is the step of each, shape (n,).
 
-    Parameters
-    ----------
-    step : ndarray of int, shape (n,)
-        The step that each is a part of.
-    x, valid : ndarray, shape (2, n)
-    values, rises : ndarray, shape (margins, 2, n)
-        `rises` are slopes times the length of the part.
+    Of both ends the place, whether it is valid, shape (2, n), the margins, and their slopes times the length of the
+    part, shape (margins, 2, n).
     """
 
     step: Ints
@@ -95,15 +86,10 @@ class _Parts:
 
 
 def boundaries(margins: SweepMargins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint]]:
-    """All ends of the motion in the order of the sweep, and all change points.
+    """All ends of the motion in the order of the sweep, and all change points; `valid` for each pose, shape (poses,).
 
     Between two poses a margin is looked for that changes its sign, or whose slopes at the poses admit that it does so
     twice; a step of the sweep must therefore resolve the motion, but not the gaps in it.
-
-    Parameters
-    ----------
-    valid : bool array, shape (poses,)
-        Whether each pose of the sweep is.
     """
     if len(margins.at) < 2 or not margins.causes:
         return [], []
@@ -324,21 +310,9 @@ class _Search:
 
 
 def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Boundary]]:
-    """Every value of the swept coordinate at which the motion ends, with the pose there, and change points as warnings.
+    """Table of the values of the swept coordinate at which the motion ends, warnings, and these ends.
 
-    `kind` is ``dead centre`` (a group of links is stretched or folded), ``singularity`` (links that are solved
-    together turn back, or the motion goes to infinity), ``leg at zero length`` or ``limit`` (one that the study
-    states); `joint` names the joints of the group, the leg or the limit.
-
-    Parameters
-    ----------
-    swept : str
-        The one coordinate that moves.
-
-    Returns
-    -------
-    (Table, list of str, list of Boundary)
-        The table of limits, what is to be said beside it, and the ends of the motion.
+    `kind` and `joint` are those of `mechdesign.mechanism.margins.Cause`; change points are among the warnings.
     """
     study, outputs = motion.question.study, motion.question.outputs
     (group,) = motion.question.poses.groups
@@ -379,7 +353,7 @@ def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> Floats:
 
 
 def _hidden(swept: str, unit: str, places: Floats, ends: list[Boundary], valid: Flags) -> list[str]:
-    """A warning where the motion ends between neighbouring poses that are both valid: their rows do not tell."""
+    """A warning where the motion ends between neighbouring poses that are both valid: the motion table hides it."""
     hidden = [
         f"{swept} = {place:.6g} {unit}".rstrip()
         for place, end in zip(places.tolist(), ends, strict=True)

@@ -1,4 +1,4 @@
-"""A sweep as a line of poses fine enough to tell what happens between them, from limit of motion to limit of motion."""
+"""A sweep as a line of poses so fine that functions are smooth between them, from limit to limit of the motion."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ MAX_TURN = 0.3
 MAX_BEND = 0.02
 # Halvings of a step of the sweep, at most: a link that turns faster is taken to jump.
 MAX_HALVINGS = 14
-# Where a pose has no slopes (a dead centre, from which functions start as a root does), looks beside it: parts of the
-# step to the next pose.
+# Poses added beside one without slopes (a dead centre, from which functions start as a root does), as parts of the step
+# to the next pose.
 GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
 # A range below this part of a function's size is rounding.
 STILL = 1e-12
@@ -36,18 +36,9 @@ AT_ROW = 1e-9
 
 @dataclass(frozen=True)
 class Function:
-    """A function of the motion.
+    """A function of configurations, and its slope, of configurations and the velocities at unit speed of the sweep.
 
-    Parameters
-    ----------
-    value : callable
-        Of configurations.
-    slope : callable
-        Derivative by the swept coordinate: of configurations and the velocities at its unit speed.
-    size : float
-        What rounding in it is judged by.
-    radian : float or None
-        What a radian is in its unit, where it is an angle.
+    Rounding is judged by `size`; `radian` is a radian in its unit, where it is an angle.
     """
 
     value: Callable[[Configuration], Value]
@@ -77,20 +68,15 @@ class PoseLine:
     Poses are those of the sweep (of a very fine one, some), the limits of motion, and as many between them as the
     turning of the links and the smoothness of the functions need.
 
-    Parameters
-    ----------
-    coordinates : sequence of Coordinate
-    others : mapping of str to Function
-        Further functions, by names that no coordinate has.
-    ends : sequence of Boundary
-        Limits of motion, of a single design.
+    It follows coordinates and `others`, functions by names that no coordinate has; `ends` are limits of motion, known
+    for a single design only.
 
     Attributes
     ----------
     rows : dict of str to int
         Row of each function in `values` and `slopes`.
     row, position, place : ndarray, shape (n,)
-        A pose of the sweep beside each pose, place along the sweep in rows, and swept coordinate (core's units).
+        A row of the sweep beside each pose, position along the sweep in rows, and swept coordinate (core's units).
     values, slopes : ndarray, shape (functions, n)
         In the study's units, angles on the branch of the motion; slopes nan where there are none.
     begin, end : ndarray of int, shape (segments,)

@@ -17,55 +17,52 @@ from mechdesign.mechanism.outputs import Rates
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 
-# Angles within this of each other are one (radians).
+# Angles nearer than this are the same (radians).
 SAME_ANGLE = 1e-12
-# Angles this near to 0 or a right angle are that (radians): there is a corner, found to this.
+# Transmission angles this near to 0 or a right angle are that (radians): they have a corner there.
 AT_CORNER = 1e-10
-# Sines below these are zero: as the pose at a limit of motion tells, and at another pose.
-IN_LINE_AT_LIMIT, IN_LINE_AT_POSE = 1e-6, 1e-12
+# Links are in line where the sine of their angle is below this at a limit of motion,
+IN_LINE_AT_LIMIT = 1e-6
+# and at other poses.
+IN_LINE_AT_POSE = 1e-12
 # Toggles this near to each other are one, in rows of the sweep.
 SAME_TOGGLE = 1e-5
 ROLES = ("frame", "input", "coupler", "output")
 
 
 def functions(loops: Sequence[FourBar], toggles: bool) -> dict[str, Function]:
-    """What a line must follow: by loop the transmission angle, the square of its sine, and what tells of `toggles`.
+    """Functions of a line for each loop: transmission angle, square of its sine, and for `toggles` sines and cosines.
 
     The square has the same extremes as the angle and is smooth where that is 0 or a right angle.
     """
     found: dict[str, Function] = {}
     for k, loop in enumerate(loops):
-        found |= {f"{name} {k}": function for name, function in _transmission(loop).items()}
+        found[f"square {k}"] = _sine(loop, 3, 2)
+        found[f"angle {k}"] = Function(loop.transmission, lambda configuration, _: np.nan)
         for end in (0, 3) if toggles else ():
-            found |= {f"{name} {k} {end}": function for name, function in _in_line(loop, end).items()}
+            found[f"sine {k} {end}"] = _sine(loop, end, 1)
+            found[f"cosine {k} {end}"] = _cosine(loop, end)
     return found
 
 
-def _transmission(loop: FourBar) -> dict[str, Function]:
+def _sine(loop: FourBar, end: int, power: int) -> Function:
+    """A power of the sine of the angle from the arm of the input (`end` 0) or output (3) to the coupler's action."""
+
     def slope(configuration: Configuration, velocity: Rates) -> Value:
-        sine, cosine = loop.squareness(configuration, 3)
-        return 2 * sine * cosine * loop.turning(configuration, velocity, 3)
+        sine, cosine = loop.squareness(configuration, end)
+        return power * sine ** (power - 1) * cosine * loop.turning(configuration, velocity, end)
 
-    square = Function(lambda configuration: loop.squareness(configuration, 3)[0] ** 2, slope)
-    return {"square": square, "angle": Function(loop.transmission, lambda configuration, velocity: np.nan)}
+    return Function(lambda configuration: loop.squareness(configuration, end)[0] ** power, slope)
 
 
-def _in_line(loop: FourBar, end: int) -> dict[str, Function]:
-    def slope(configuration: Configuration, velocity: Rates) -> Value:
-        return loop.squareness(configuration, end)[1] * loop.turning(configuration, velocity, end)
-
-    sine = Function(lambda configuration: loop.squareness(configuration, end)[0], slope)
-    cosine = Function(lambda configuration: loop.squareness(configuration, end)[1], lambda configuration, _: np.nan)
-    return {"sine": sine, "cosine": cosine}
+def _cosine(loop: FourBar, end: int) -> Function:
+    return Function(lambda configuration: loop.squareness(configuration, end)[1], lambda configuration, _: np.nan)
 
 
 def loops_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine | None) -> Table:
     """Every loop of every design: its links and lengths (of a single design), and how well it transmits.
 
-    Parameters
-    ----------
-    line : PoseLine or None
-        The motion along its sweep, with `functions` of the loops; None where not just one coordinate is swept.
+    `line` is the motion along its sweep, with `functions` of the loops; None where not just one coordinate is swept.
     """
     study, poses = motion.question.study, motion.question.poses
     length, angle = study.units.label("length"), study.units.label("angle")

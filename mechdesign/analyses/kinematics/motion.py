@@ -1,13 +1,12 @@
 """One motion of a mechanism: every pose of its kinematics solved, and the columns that say how it moves.
 
-Poses at a change point that the motion follows are told from those on both sides.
+At a change point that the motion follows, values are interpolated from poses on both sides.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,6 @@ from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
@@ -38,20 +36,19 @@ from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.kinematics import KinematicsSection
 
-# A place this near to a pose or to zero, as a part of the sweep, is there.
+# A place this near to a pose or to zero, as a part of the sweep, is at it.
 AT_GIVEN_PLACE = 1e-12
 # Poses with a conditioning below this have lost digits.
 NEAR_SINGULAR = 1e-3
-# h: radians, or parts of the mechanism's size. What the formula leaves out is about 1e-12, what accelerations lose of
-# their digits this near to a change point about 1e-10.
+# Step of the interpolation at change points (radians, or parts of the mechanism's size): its error is about 1e-12, that
+# of accelerations this near to a change point about 1e-10.
 CHANGE_POINT_STEP = 1e-2
 STENCIL = CHANGE_POINT_STEP * np.array([-3, -2, -1, 1, 2, 3])
 STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
-
-
-# Poses of a design's sweep that tell of it between them, about: of a finer sweep some are left out, but no step becomes
-# longer than so many radians, or so much of the mechanism's size.
-ENOUGH_POSES, LONGEST_STEP = 4096, 0.02
+# Of a sweep of more poses than about this some are left out where the motion between the poses is followed,
+ENOUGH_POSES = 4096
+# but no step becomes longer than this (radians, or parts of the mechanism's size).
+LONGEST_STEP = 0.02
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
@@ -78,17 +75,13 @@ class MotionQuestion:
 
     Parameters
     ----------
-    poses : Poses
-        Of kinematics.
     outputs : list of Coordinate
-        Those of the tables: the listed ones, then those that have a target and are not listed.
+        Outputs in the tables: the listed ones, then those that have a target and are not listed.
     listed : list of Coordinate
-        Those that the Jacobian is of.
-    square : bool
-        Whether the study lists as many outputs as drives.
+        Rows of the Jacobian, which is wanted where it is `square`: where the study lists as many outputs as drives.
     watched : list of Coordinate
-        All whose values are needed: drives, outputs, what targets depend on, and the angles in the expressions of
-        these and of limits.
+        All coordinates whose values are needed: drives, outputs, those that targets depend on, and the angles in
+        expressions of these and of limits.
     of_given : bool
         Whether rates and accelerations are those of the given coordinates rather than of the drives.
     """
@@ -142,14 +135,8 @@ def motion_question(study: Study) -> MotionQuestion:
 class Motion:
     """The solved poses of one assembly; `arrays` holds every column but those of the poses, nan where it has no value.
 
-    Parameters
-    ----------
-    reason : int8 array, shape (poses,)
-        See `mechdesign.mechanism.Reason`.
-    errors : list of Error
-        Of the targets.
-    smooth : bool array, shape (poses,)
-        Poses at a change point whose values are those of the motion that goes through it.
+    `reason` is that of `mechdesign.mechanism.Reason`, `errors` those of the targets; `smooth` are poses at a change
+    point whose values are those of the motion that goes through it.
     """
 
     question: MotionQuestion
@@ -157,11 +144,6 @@ class Motion:
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
     smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    @cached_property
-    def given(self) -> dict[str, Floats]:
-        """Values of the coordinates that the poses give."""
-        return self.question.poses.values
 
     @property
     def valid(self) -> Flags:
@@ -177,11 +159,12 @@ class Motion:
     def fill(self, solved: SolvedPoses) -> None:
         """Take up poses that give the same coordinates."""
         study, rows, configuration = self.question.study, solved.rows, solved.configuration
+        given = self.question.poses.values
         self.reason[rows] = configuration.reason
         for coordinate in self.question.watched:
             if coordinate.name in solved.given:
                 # As the study gives it, not there and back through radians; also where the pose fails.
-                self.put(coordinate.name, rows, self.given[coordinate.name][rows])
+                self.put(coordinate.name, rows, given[coordinate.name][rows])
             else:
                 self.put(coordinate.name, rows, in_study_units(study, coordinate, configuration.value(coordinate)))
         linear = study.mechanism.linearize(configuration)
@@ -247,7 +230,7 @@ class Motion:
             for order in ("velocity", "acceleration"):
                 rate = f"{name}_{order}"
                 if rate in arrays:
-                    kind = _RATES[output.quantity, order]
+                    kind = {"length": order, "angle": f"angular_{order}"}.get(output.quantity, "none")
                     columns.append(Column(rate, arrays[rate], label(kind), f"{order} of {name}"))
             point, _, axis = name.rpartition(".")
             columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
@@ -284,7 +267,7 @@ class Motion:
 
 
 def thinned(motion: Motion, swept: str) -> Flags:
-    """Poses of a sweep that tell the motion: its ends, those where it ceases to be valid, and enough between."""
+    """Poses of a sweep that are enough to follow the motion: its ends, those where validity changes, some between."""
     study, poses = motion.question.study, motion.question.poses
     coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
     steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
@@ -300,14 +283,9 @@ def thinned(motion: Motion, swept: str) -> Flags:
 
 
 def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> Floats:
-    """Places on a sweep in the study's unit; those at a pose as the study gives it, not there and back through radians.
+    """Places on a sweep (core's units) in the study's unit; those at a pose exactly as the study gives it.
 
-    Parameters
-    ----------
-    places : ndarray
-        In the core's units.
-    positions : ndarray
-        Where they are along the sweep, in rows.
+    `positions` is where they are along the sweep, in rows.
     """
     (group,), study = motion.question.poses.groups, motion.question.study
     given = group.values[swept]
@@ -315,16 +293,6 @@ def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> F
     beside, near = given[np.round(positions).astype(int)], AT_GIVEN_PLACE * np.ptp(given)
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(beside - values) <= near, beside, np.where(np.abs(values) <= near, 0.0, values))
-
-
-_RATES: Mapping[tuple[Quantity, str], str] = {
-    ("length", "velocity"): "velocity",
-    ("length", "acceleration"): "acceleration",
-    ("angle", "velocity"): "angular_velocity",
-    ("angle", "acceleration"): "angular_acceleration",
-    ("none", "velocity"): "none",
-    ("none", "acceleration"): "none",
-}
 
 
 def entry(output: Coordinate, drive: Coordinate) -> str:
@@ -339,12 +307,7 @@ def move(
     *,
     also: Callable[[SolvedPoses], object] | None = None,
 ) -> Motion:
-    """Solve every pose; one that fails is nan, with its reason.
-
-    Parameters
-    ----------
-    also : callable, optional
-        Called with the solved poses, so that who needs more of them does not solve them again.
+    """Solve every pose; one that fails is nan, with its reason. `also` is called with the solved poses of each chunk.
 
     Raises
     ------
