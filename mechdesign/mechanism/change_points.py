@@ -65,11 +65,11 @@ class ChangePoints:
         high = max(end, high, self.sketch + self._period)
         count = int(np.ceil((high - low) / self._period * SAMPLES_PER_TURN)) + 1
         samples = np.linspace(low, high, count)
-        # Modes of a group decide where those behind it have their change points.
+        # The modes of a group decide where the groups after it have their change points.
         self._places = [np.empty(0) for _ in self._modes]
         for index, (group, mode) in enumerate(zip(self._groups, self._modes, strict=True)):
             if group.form == "newton":
-                # Its assembly is followed by continuity; what is solved behind it stays as drawn.
+                # Its assembly is followed by continuity; groups solved after it stay as drawn.
                 break
             if mode:
                 self._places[index] = self._search(index, samples)

@@ -143,7 +143,7 @@ class Configuration:
 
 
 def hide(value: Value, lost: Flags) -> Value:
-    """nan for poses that cannot be assembled; what is the same for every pose (the ground) is left alone."""
+    """nan for poses that cannot be assembled; a value that is the same for every pose (the ground) stays one."""
     value = np.asarray(value)
     if value.ndim == 0 and not lost.all():
         value = np.broadcast_to(value, lost.shape)

@@ -21,7 +21,7 @@ BASE = ""
 
 
 @dataclass(frozen=True)
-class Chain:
+class GroupChain:
     """The bodies that a group places, and its joints in order: their letters (R, P), pins and slides."""
 
     links: tuple[str, ...]
@@ -129,10 +129,12 @@ def _lying(graph: Graph, structure: Structure, roots: set[int], nodes: set[int])
     } | {GROUND}
 
 
-def chain_of(description: Description, graph: Graph, structure: Structure, group: Group, placed: set[str]) -> Chain:
+def chain_of(
+    description: Description, graph: Graph, structure: Structure, group: Group, placed: set[str]
+) -> GroupChain:
     """Walk round a group's only loop."""
     (loop,) = group.loops
-    # Round the loop: bodies (str) and between them joints (letter, name); what is placed already is the base.
+    # Round the loop: bodies (str) and between them joints (letter, name); bodies placed already are the base.
     walk: list[str | tuple[str, str]] = []
     node = loop.start
 
@@ -177,7 +179,7 @@ def chain_of(description: Description, graph: Graph, structure: Structure, group
             joints.insert(0, ("R", outer[1]))
             if outer[2] == joints[2][1]:
                 joints[1:] = joints[:0:-1]
-    return Chain(
+    return GroupChain(
         tuple(link for link in dict.fromkeys(links) if not link.startswith("pin in ")),
         letters,
         tuple(dict.fromkeys(name for letter, name in joints if letter == "R" and ":" not in name)),
@@ -242,7 +244,7 @@ def _displacement(graph: Graph, slide: int) -> str:
     return f"{graph.slides[slide]}.{'length' if slide in graph.telescopic else 'slide'}"
 
 
-def _side(graph: Graph, group: Group, mode: int, chain: Chain) -> str:
+def _side(graph: Graph, group: Group, mode: int, chain: GroupChain) -> str:
     if mode == 0:
         return ""
     if group.form == "two angles" and len(chain.pins) == 3:

@@ -182,7 +182,7 @@ def over_constrained(
 def undetermined(
     description: Description, equations: Equations, sketch: Sketch, given: Sequence[Coordinate], reason: str
 ) -> MechanismError:
-    """Which links given coordinates fix twice and which they leave free; `reason` where that cannot be told."""
+    """Which links given coordinates fix twice and which they leave free; otherwise the `reason` that is known."""
     graph = equations.graph
     still = _still(description, graph, given)
     if still is not None:

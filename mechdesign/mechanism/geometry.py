@@ -163,11 +163,8 @@ class Geometry:
                 continue
             total: Value = 0j
             for sign, body, point in edge.locals:
-                turned = (
-                    1j
-                    * self.angle_derivative(self.graph.bodies[body][1], place, values)
-                    * self.local(body, point, values)
-                )
+                turn = self.angle_derivative(self.graph.bodies[body][1], place, values)
+                turned = 1j * turn * self.local(body, point, values)
                 total = total + sign * (self.local_derivative(body, point, place) + turned) * vectors.offsets[body]
             w_z.append(total)
             d_z.append(1j * self.angle_derivative(edge.turns, place, values) * vectors.d[k])

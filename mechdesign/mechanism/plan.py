@@ -313,6 +313,6 @@ class Plan:
 
 
 def _flat(value: Value, shape: tuple[int, ...]) -> Value:
-    """A flat batch; what is the same for every pose stays a single number."""
+    """A flat batch; a value that is the same for every pose stays a single number."""
     value = np.asarray(value)
     return value if value.ndim == 0 else np.broadcast_to(value, shape).reshape(-1)

@@ -82,7 +82,7 @@ class Equations:
         return nodes, np.concatenate([[0.0], x[: self.angles]]), x[self.angles : self.inner]
 
     def from_sketch(self, sketch: Sketch, spread: float = 0.0, seed: int = 0) -> Floats:
-        """Unknowns as drawn; what is not drawn is put anywhere, and everything is moved by up to `spread`."""
+        """Unknowns as drawn, those not drawn at random, all moved at random by up to `spread`."""
         rng = np.random.default_rng(seed)
         drawn = np.array([np.nan if node is None else node for node in sketch.nodes], dtype=complex)
         known = np.isfinite(drawn)
@@ -285,10 +285,9 @@ def separated(basis: Floats, pivots: int) -> list[Floats]:
 def check_independent(equations: Equations, structure: Structure) -> None:
     """Check a mechanism with groups without a closed form for equations that depend on each other.
 
-    A perfect matching of equations and unknowns is necessary, but not enough: in two dimensions a part may be joined
-    within itself too often while another floats, and every count still fits. So the rank of the equations is taken for
-    dimensions drawn at random. Chance, or a long train, can make a draw singular, but never singular equations regular:
-    one regular draw tells.
+    A perfect matching of equations and unknowns is necessary, but not enough: a part may be joined within itself too
+    often while another floats. So the rank of the equations is taken for random dimensions. Chance can make a draw
+    singular, but never singular equations regular: one regular draw is proof.
 
     Raises
     ------
@@ -300,7 +299,7 @@ def check_independent(equations: Equations, structure: Structure) -> None:
     singular = False
     for seed in range(DRAWS):
         draw = equations.drawn(structure.given, seed)
-        # A given expression may have no value at what is drawn, which says nothing.
+        # A given expression may have no value at random dimensions; such a draw does not count.
         if np.isfinite(draw).all():
             singular = null_space(draw).shape[1] > 0
             if not singular:

@@ -108,7 +108,7 @@ class PoseLine:
         ]
         self.each = poses.count // poses.designs
         self.torn = np.zeros(poses.designs, dtype=bool)
-        # First the angles by whose values at a pose those beside it are told.
+        # First the angles, which continue from a pose to those beside it.
         self._angles = {name: c for name, c in angles_of(coordinates).items() if name not in group.names}
         functions = {c.name: function_of(study, c) for c in [*self._angles.values(), *coordinates]} | dict(others)
         self.rows = {name: k for k, name in enumerate(functions)}
