@@ -1,4 +1,4 @@
-"""What ends the motion or the region of a mechanism: functions that are positive within it, zero where it ends."""
+"""What ends the motion or the region of a mechanism: margins, positive within and zero where it ends, and folds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The compiled mechanism: plans for any given coordinates, and the batch solution of each."""
+"""The compiled mechanism: plans for any given coordinates, and variants with other dimensions."""
 
 from __future__ import annotations
 

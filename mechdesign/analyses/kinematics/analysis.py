@@ -261,22 +261,20 @@ def _astray(motion: Motion) -> list[str]:
 def _stalled(motion: Motion) -> list[str]:
     study, poses = motion.question.study, motion.question.poses
     stalled = motion.valid & ~motion.smooth & ~(motion.arrays["conditioning"] >= STALLED)
-    warnings = []
-    rows = np.flatnonzero(stalled)
-    if len(rows):
-        lie = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
-        warnings.append(
-            f"{lie} at a dead centre or change point, where the drives do not move the mechanism in one way "
-            f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
-            f"nothing there; the first: {pose_in_words(study, poses, rows[0])}"
-        )
+    texts = {
+        "at a dead centre or change point, where the drives do not move the mechanism in one way (conditioning below "
+        f"{STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean nothing there": stalled
+    }
     if motion.question.of_given:
-        rates = motion.arrays[f"{study.mechanism.drives[0]}_velocity"]
-        rows = np.flatnonzero(motion.valid & ~stalled & np.isnan(rates))
+        lost = np.isnan(motion.arrays[f"{study.mechanism.drives[0]}_velocity"])
+        text = (
+            "where no drive rates give what is asked: the drives cannot move it in every direction; rates are nan there"
+        )
+        texts[text] = motion.valid & ~stalled & lost
+    warnings = []
+    for text, where in texts.items():
+        rows = np.flatnonzero(where)
         if len(rows):
             lie = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
-            warnings.append(
-                f"{lie} where no drive rates give what is asked: the drives cannot move it in every direction; rates "
-                f"are nan there; the first: {pose_in_words(study, poses, rows[0])}"
-            )
+            warnings.append(f"{lie} {text}; the first: {pose_in_words(study, poses, rows[0])}")
     return warnings
