@@ -17,8 +17,8 @@ from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value, wrap
 from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
+from mechdesign.mechanism.mechanism import drawn
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.parallel import map_chunks
 from mechdesign.results import Column

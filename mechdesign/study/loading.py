@@ -18,8 +18,8 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, Problem, StudyError
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
-from mechdesign.mechanism.variant import Variant
 from mechdesign.study import overrides, poses
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build

@@ -22,8 +22,8 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Fixed
-from mechdesign.mechanism.variant import Variant
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document
@@ -47,7 +47,7 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
     StudyError
         If a name is neither a parameter nor a place, or the values make no mechanism.
     MechanismError, AssemblyError
-        See `mechdesign.mechanism.variant.Variant`.
+        See `mechdesign.mechanism.mechanism.Variant`.
     """
     file, path = str(study.path or ""), study.path or pathlib.Path()
     check_names(study, changed)

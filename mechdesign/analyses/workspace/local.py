@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.analyses.region.field import Field, Places
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.jacobians import Jacobian
+from mechdesign.mechanism.derivatives import Jacobian
 from mechdesign.numerics.arrays import Complexes
 
 
