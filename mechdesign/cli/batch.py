@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,10 +55,9 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
         answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
     terminal.show(_summary(answers), as_json=options.json)
     if options.junit is not None:
-        from mechdesign.cli.junit import to_xml
         from mechdesign.report.writer import write_file
 
-        write_file(options.junit, to_xml(answers).encode())
+        write_file(options.junit, _junit(answers).encode())
     return max(given.exit_code for given in answers)
 
 
@@ -150,3 +150,33 @@ def _summary(answers: Sequence[Outcome]) -> Table:
         for name, (kind, tell_of) in told.items()
     )
     return Table("summary", tuple(columns), meaning="what became of each question")
+
+
+def _junit(answers: Sequence[Outcome]) -> str:
+    """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
+
+    A requirement that is not met is a failure; whatever kept a command from its result is an error.
+    """
+    from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
+
+    report = JUnitXml("mechdesign")
+    for study, group in groupby(answers, key=lambda given: given.study):
+        suite, name = TestSuite(study or "mechdesign"), f"mechdesign.{study}".rstrip(".")
+        for given in group:
+            case = TestCase(given.command or "run", classname=name, time=round(given.seconds, 3))
+            if given.exit_code > 1:
+                words = given.failed.splitlines()[0] if given.failed else "failed"
+                error = Error(words, type_=f"exit code {given.exit_code}")
+                error.text = given.failed
+                case.result = [error]
+            suite.add_testcase(case)
+            for verdict in given.verdicts:
+                case = TestCase(f"{given.command}: {verdict.requirement}", classname=name, time=0)
+                if not verdict.met:
+                    case.result = [Failure(str(verdict), type_="requirement")]
+                suite.add_testcase(case)
+        report.add_testsuite(suite)
+    report.update_statistics()  # type: ignore[no-untyped-call]
+    text = report.tostring()  # type: ignore[no-untyped-call]
+    body = text.decode() if isinstance(text, bytes) else str(text)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'

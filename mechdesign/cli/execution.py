@@ -25,15 +25,7 @@ BUILT_IN = "two_link_arm"
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one command gave.
-
-    Parameters
-    ----------
-    exit_code : int
-        0, 1 (a requirement is not met) or 3 (a pose that was asked for cannot be assembled).
-    rows : int
-        Rows of the main table.
-    """
+    """The outcome of one command; `rows` are those of the main table."""
 
     study: str
     command: str
@@ -156,6 +148,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
 
 
 def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
+    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met."""
     return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
 
 

@@ -82,12 +82,7 @@ OWN = {"kinematics": (ANIMATE, ALL_MODES), "optimize": (RESUME_DESIGNS,)}
 
 @dataclass(frozen=True)
 class Options:
-    """What the options of a command say.
-
-    Parameters
-    ----------
-    out : Path or None
-        Folder for the results; None is ``results/<study>/<command>``.
+    """Values of the options of a command.
 
     Raises
     ------

@@ -20,19 +20,18 @@ from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Description
 from mechdesign.mechanism.variant import Variant
-from mechdesign.study import overrides, poses
+from mechdesign.study import poses
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
-from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.study.schema.study_file import StudyFile
+from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text.document import Document, KeyPath, leaves, plain, read
@@ -44,45 +43,15 @@ from mechdesign.threads import one_thread
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A validated study.
+    """A validated study; sections are None where it does not ask."""
 
-    Parameters
-    ----------
-    name : str
-        Its name, by default that of its file.
-    path : Path or None
-        Its file.
-    text_sha256 : str
-        SHA-256 of the file as it was read.
-    seed : int
-        Seed of random numbers.
-    overrides : tuple of str
-        As given to `load`.
-    units : Units
-        What bare numbers mean.
-    resolved : dict
-        The study as plain data, overrides applied.
-    mechanism : Mechanism
-        The compiled mechanism.
-    parameters : Parameters
-        Parameters and the places of the geometry that depend on them.
-    kinematics, workspace, optimize, reliability, stiffness : section or None
-        The questions; None where the study does not ask.
-    requirements : tuple of Condition
-        The gate.
-    targets : mapping of str to Target
-        What outputs should be, by the coordinate or point.
-    warnings : tuple of Problem
-        What is likely a mistake, such as a parameter that nothing uses.
-    """
-
-    name: str
+    name: str  # by default that of its file
     path: pathlib.Path | None
-    text_sha256: str
+    text_sha256: str  # of the file as it was read
     seed: int
     overrides: tuple[str, ...]
     units: Units
-    resolved: dict[str, Any]
+    resolved: dict[str, Any]  # the study as plain data, overrides applied
     mechanism: Mechanism
     parameters: Parameters
     kinematics: KinematicsSection | None
@@ -91,8 +60,8 @@ class Study:
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
     requirements: tuple[Condition, ...]
-    targets: Mapping[str, Target]
-    warnings: tuple[Problem, ...] = ()
+    targets: Mapping[str, Target]  # by the coordinate or point
+    warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -121,7 +90,7 @@ class Study:
         if hashlib.sha256(content).hexdigest() != self.text_sha256:
             return Problem(message, ".".join(map(str, keys)), str(self.path or ""))
         document = read(content, str(self.path))
-        overrides.apply(document, self.overrides)
+        override(document, self.overrides)
         reporter = Reporter(document)
         reporter.report(keys, message)
         return reporter.problems[-1]
@@ -160,7 +129,7 @@ def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), 
     document = read(content, str(path))
     if isinstance(changes, str):
         changes = (changes,)
-    overrides.apply(document, changes)
+    override(document, changes)
     return load_document(document, path, hashlib.sha256(content).hexdigest(), tuple(changes), seed)
 
 
