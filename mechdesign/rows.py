@@ -27,23 +27,13 @@ class UnknownColumnError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """A column and the rows of its table that count.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (rows,)
-        All rows; absolute values where these are judged.
-    counts : ndarray of bool, shape (rows,)
-        Which of them count.
-    missing : str
-        Where none counts because the table never has what was asked for: what it has instead.
-    """
+    """A column and the rows of its table that count."""
 
     table: Table
     column: str
-    values: Floats
-    counts: Flags
-    missing: str = ""
+    values: Floats  # all rows; absolute values where these are judged
+    counts: Flags  # which rows count
+    missing: str = ""  # where none counts because the table never has what was asked for: what it has instead
 
 
 def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:

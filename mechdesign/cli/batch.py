@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import Outcome, answer, claim, folder, load_study, tell
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Interrupted, StudyError, explain
+from mechdesign.mechanism.describe import describe
+from mechdesign.report.requirements import command_of, foresee
+from mechdesign.report.writer import write_file, write_sketch
+from mechdesign.results import Column, Table
+from mechdesign.study import Study
+from mechdesign.study.schema.reliability import in_words
 from mechdesign.threads import one_thread
-
-if TYPE_CHECKING:
-    from mechdesign.results import Table
-    from mechdesign.study import Study
 
 _OUTCOMES = {
     0: "done",
@@ -30,8 +33,6 @@ _OUTCOMES = {
 
 def questions(study: Study) -> tuple[str, ...]:
     """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing."""
-    from mechdesign.report.requirements import command_of
-
     judged = {command_of(requirement) for requirement in study.requirements}
     asked = [command for command in COMMANDS if command in study.questions or command in judged]
     return tuple(asked) or ("kinematics",)
@@ -55,8 +56,6 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
         answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
     terminal.show(_summary(answers), as_json=options.json)
     if options.junit is not None:
-        from mechdesign.report.writer import write_file
-
         write_file(options.junit, _junit(answers).encode())
     return max(given.exit_code for given in answers)
 
@@ -64,10 +63,6 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
 @one_thread()
 def check(paths: Sequence[Path] | None, options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
-    from mechdesign.mechanism.describe import describe
-    from mechdesign.report.requirements import foresee
-    from mechdesign.study.schema.reliability import in_words
-
     worst = 0
     owners: dict[str, Path | None] = {}
     asked: Sequence[Path | None] = paths or [None]
@@ -82,8 +77,6 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 terminal.say(f"warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS)
             if not options.no_plots:
-                from mechdesign.report.writer import write_sketch
-
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
                 terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
@@ -128,10 +121,6 @@ def _failure(label: str, command: str, directory: Path, error: Exception) -> Out
 
 
 def _summary(answers: Sequence[Outcome]) -> Table:
-    import numpy as np
-
-    from mechdesign.results import Column, Table
-
     def met(given: Outcome) -> str:
         return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
 

@@ -11,6 +11,8 @@ import typer
 
 from mechdesign.errors import StudyError
 
+# Template of the study that is taken where there is none.
+BUILT_IN = "two_link_arm"
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 

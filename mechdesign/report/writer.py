@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError, explain
 from mechdesign.files import replace
@@ -17,9 +16,7 @@ from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import Result
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 MECHANISM = "mechanism.png"
 ANIMATION = "motion.gif"

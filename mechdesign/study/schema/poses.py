@@ -218,10 +218,9 @@ class KinematicsSection(MotionSection):
         """Check the outputs as well, and what loads act on."""
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         for index, load in enumerate(self.loads):
+            path: KeyPath = ("kinematics", "loads", index)
             if load.at is not None:
-                checker.known(load.at, checker.mechanism.owners, "point", ("kinematics", "loads", index, "at"))
+                checker.known(load.at, checker.mechanism.owners, "point", (*path, "at"))
             if load.link is not None:
-                checker.known(
-                    load.link, checker.mechanism.moving, "moving link", ("kinematics", "loads", index, "link")
-                )
+                checker.known(load.link, checker.mechanism.moving, "moving link", (*path, "link"))
         return super().checked(checker)

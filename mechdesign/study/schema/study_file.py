@@ -16,7 +16,7 @@ from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, parse_value
+from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, read
 from mechdesign.study.text.reporter import LIST_FORM, schema_fields
 
 
@@ -67,7 +67,8 @@ def _apply(document: Document, text: str) -> None:
         raise StudyError([Problem("an override is <dotted name>=<value>", file=label)])
     if len(name) > MAX_NAME:
         raise StudyError([Problem(f"a name longer than {MAX_NAME} characters", file=label)])
-    parsed = parse_value(value, label)
+    # Bytes that the terminal could not decode are reported as not UTF-8, as they would be in a file.
+    parsed = read(value.encode(errors="surrogateescape"), label) if value.strip() else Document(label, None)
     if parsed.problems:
         raise StudyError(parsed.problems)
     if not isinstance(document.data, dict):

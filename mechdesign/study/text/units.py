@@ -100,13 +100,7 @@ class QuantityError(ValueError):
 
 @dataclass(frozen=True)
 class Units:
-    """Units that bare numbers of a study mean.
-
-    Parameters
-    ----------
-    length, angle, time, force : str
-        As the study writes them; length may be ``dimensionless``.
-    """
+    """Units of a study's bare numbers; length may be ``dimensionless``."""
 
     length: str = "mm"
     angle: str = "deg"
@@ -131,14 +125,7 @@ class Units:
         return f"{above or '1'}/{below[0] if len(below) == 1 else '(' + '*'.join(below) + ')'}"
 
     def convert(self, text: str, kind: str | None = None) -> float:
-        """Convert a quantity to the study's units.
-
-        Parameters
-        ----------
-        text : str
-            A number and a unit.
-        kind : str, optional
-            What is expected, a name of `KINDS`; left out: whatever the unit says.
+        """Convert a quantity of a kind (a name of `KINDS`, or any) to the study's units.
 
         Raises
         ------
