@@ -36,14 +36,10 @@ def digest(columns: Sequence[Floats]) -> bytes:
 
 
 class Journal:
-    """Finished batches in a file.
+    """Finished batches in a file, written whole or not at all by `save` and every half minute.
 
-    Parameters
-    ----------
-    origin : mapping
-        What decides the results: study, overrides, seed, versions. A file of another origin is not used.
-    resume : bool
-        Whether to use what the file holds; `usable` says whether there is any.
+    `origin` is what decides the results: study, overrides, seed, versions. To resume, a file of the same origin is
+    used; `usable` says whether there is one.
     """
 
     def __init__(self, path: Path, origin: Mapping[str, Any], *, resume: bool = False) -> None:

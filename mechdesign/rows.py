@@ -76,7 +76,7 @@ def _one_unit(table: Table, column: str, counts: Flags) -> None:
         return
     named = [each for each in table.columns if not each.numeric and each.name != "unit"]
     pairs = {each.name: dict.fromkeys(zip(each.values[counts].tolist(), units.tolist(), strict=True)) for each in named}
-    # The words that tell the rows of one unit from those of another.
+    # The column of words that distinguishes the rows of one unit from those of another.
     telling = [name for name, found in pairs.items() if len({word for word, _ in found}) == len(found)]
     words = telling[0] if telling else named[0].name
     rows = [f"{word} ({unit or 'no unit'})" for word, unit in pairs[words]]

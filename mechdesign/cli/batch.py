@@ -43,7 +43,7 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
     """Answer every question of the studies; returns the exit code, the highest of them all.
 
     A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
-    summary and the JUnit file then tell what was finished.
+    summary and the JUnit file then show what was finished.
     """
     answers: list[Outcome] = []
     try:

@@ -38,13 +38,7 @@ def emit(text: str) -> None:
 
 
 def show(table: Table, *, as_json: bool, rest: str = "") -> None:
-    """A table to stdout: JSON if asked, else for people on a terminal and CSV in a pipe.
-
-    Parameters
-    ----------
-    rest : str
-        Where the rows and columns are that a terminal has no room for.
-    """
+    """A table to stdout: JSON if asked, else CSV in a pipe; on a terminal what fits, and where the `rest` is."""
     if as_json:
         emit(to_json(table))
     elif sys.stdout.isatty():

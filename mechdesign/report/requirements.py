@@ -54,7 +54,7 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
             # Of so few designs some rows may be missing that all of them have.
             judge(look(study, command), study.requirements, problem=study.problem, whole=command != "optimize")
         except AssemblyError:
-            # The answer itself will tell.
+            # Its own computation reports it.
             continue
         except StudyError as error:
             problems += error.problems

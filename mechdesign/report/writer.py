@@ -43,7 +43,7 @@ def check_writable(directory: Path) -> None:
 
 
 def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Extras) -> tuple[str, ...]:
-    """Write a result into a directory and return what is to be told of its pictures: those that could not be drawn.
+    """Write a result into a directory and return a warning for each picture that could not be drawn.
 
     Each file appears whole or not at all. The tables come first, with a manifest that vouches for them alone: whatever
     becomes of the pictures, they are there. Of an interrupted computation no pictures are drawn. Files of an older
@@ -115,15 +115,7 @@ def write_sketch(directory: Path, study: Study) -> str:
 
 
 def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """Pictures of a result: those of its command, the mechanism, and the motion as a GIF if it is one.
-
-    Returns
-    -------
-    pictures : dict of str to bytes
-        By the names of their files.
-    warnings : tuple of str
-        Those that could not be drawn, and why.
-    """
+    """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings."""
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
     from mechdesign.report.figures.rendering import Drawing, Gallery, render

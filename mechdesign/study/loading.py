@@ -97,16 +97,7 @@ class Study:
 
 
 def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:
-    """Load a study.
-
-    Parameters
-    ----------
-    path : str or Path
-        The study file.
-    overrides : sequence of str
-        ``a.b.c=value``, applied before validation.
-    seed : int, optional
-        In place of the study's own.
+    """Load a study file; overrides ``a.b.c=value`` apply before validation, a seed replaces the study's own.
 
     Raises
     ------
@@ -143,10 +134,7 @@ def load_document(
 ) -> Study:
     """Load a study from the data of a file, overrides applied; see `load`.
 
-    Parameters
-    ----------
-    original : Mechanism, optional
-        Of a study that differs in numbers alone: its assembly is taken, where else the sketch would choose one.
+    The assembly is that of the `original`, a study that differs in numbers alone, where else the sketch would choose.
     """
     reporter = Reporter(document)
     data = _sections(document, reporter)
@@ -200,7 +188,7 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
 def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
     """Units and parameters, which all other numbers are read with."""
     units = Units()
-    # A wrong unit is told with the mistakes of the other sections.
+    # A wrong unit is reported with the mistakes of the other sections.
     with contextlib.suppress(ValidationError):
         units = Units(**UnitsSection.model_validate(data.get("units") or {}).model_dump())
     mechanism = data.get("mechanism")
@@ -247,7 +235,7 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
             parts[key] = _adapter(key).validate_python(raw, context=context)
         except ValidationError as error:
             reporter.report_validation(error, StudyFile, (key,))
-            # Names are checked all the same where the mistakes told so far are in numbers and keys alone.
+            # Names are checked all the same where the mistakes so far are in numbers and keys alone.
             with contextlib.suppress(ValidationError):
                 parts[key] = _adapter(key).validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts

@@ -179,7 +179,7 @@ def _path(path: Mapping[str, paths.PathSection], folder: Path) -> Poses:
     ((owner, along),) = moving
     slopes: dict[str, Floats] = {}
     for name, column in values.items():
-        # What is listed beside the point's path changes evenly between the places.
+        # What is listed along with the point's path changes evenly between the places.
         with np.errstate(divide="ignore", invalid="ignore"):
             steps = np.where(np.diff(column) == 0, 0.0, np.diff(column) / np.diff(along.way))
         slopes[name] = np.append(steps, steps[-1:])

@@ -192,16 +192,10 @@ def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[An
 
 
 def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, dict[str, str]]:
-    """A study's text where it says other values, and the files it needs beside it, by their names.
+    """The text of a study with other values, headed by a comment, and the files that it reads, by their names.
 
-    Overrides are part of the new text, as is the seed. Comments are kept where no more than single values change.
-
-    Parameters
-    ----------
-    data : dict
-        The study as plain data, `Study.resolved` with other values; its names of files are brought up to date.
-    heading : str
-        What the first line says, as a comment.
+    Overrides are part of the new text, as is the seed. Comments are kept where no more than single values change. The
+    names of files in `data`, which is `Study.resolved` with other values, are brought up to date.
     """
     files: dict[str, str] = {}
     for keys, file, content in study.inputs():

@@ -131,7 +131,7 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
             if of_given:
                 message = f"{name!r} is not among what the poses give: {key} are those of {', '.join(sorted(one))}"
             elif one and not one <= set(drives):
-                message += f", or of all that the poses give, {', '.join(sorted(one))}"
+                message += f", or of all coordinates that the poses give, {', '.join(sorted(one))}"
             elif len(given) > 1:
                 message += " where poses give different coordinates"
             checker.report((section.command, key, name), message, at_key=True)

@@ -67,7 +67,7 @@ class StudyNumber:
 
 
 LOST = StudyNumber(math.nan)
-"""Stands for a number whose own mistake has been told, so that the rest can be checked."""
+"""Stands for a number whose own mistake has been reported, so that the rest can be checked."""
 
 
 def failure(message: str) -> PydanticCustomError:
@@ -131,7 +131,7 @@ def read_expression(raw: object, context: Context) -> Expression:
     """Read an expression whose names are looked up later; a number is one without names."""
     if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
         number = read_number(raw, context).nominal
-        # A number that is lost has been told already.
+        # A number that is lost has been reported already.
         return Expression.parse(repr(0.0 if math.isnan(number) else number))
     try:
         expression = context.expression(raw)
@@ -283,22 +283,12 @@ class OrShort:
 
 
 class Model(BaseModel):
-    """Base of all sections: frozen, unknown keys are errors, values come in study units.
-
-    Attributes
-    ----------
-    bare : str
-        Key that a value stands for which is written alone, instead of a mapping.
-    short : tuple of dict
-        JSON Schema of the short forms.
-    one_of : tuple of str
-        Keys of which exactly one is given, after the message where they are none or several.
-    """
+    """Base of all sections: frozen, unknown keys are errors, values come in study units."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
-    bare: ClassVar[str] = ""
-    short: ClassVar[tuple[Form, ...]] = ()
-    one_of: ClassVar[tuple[str, ...]] = ()
+    bare: ClassVar[str] = ""  # key of a value that is written alone, instead of a mapping
+    short: ClassVar[tuple[Form, ...]] = ()  # JSON Schema of the short forms
+    one_of: ClassVar[tuple[str, ...]] = ()  # a message, and keys of which exactly one is given
 
     @model_validator(mode="before")
     @classmethod
