@@ -13,7 +13,7 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.minima import lowest
+from mechdesign.numerics.roots import lowest
 
 # A closure that falls below this part of its largest value touches zero: it is a difference of squared lengths.
 TOUCHING = 1e-10

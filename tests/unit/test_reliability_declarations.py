@@ -20,7 +20,7 @@ from mechdesign.errors import StudyError
 from mechdesign.report.figures import style
 from mechdesign.report.figures.reliability import figures
 from mechdesign.report.tables import to_csv
-from mechdesign.study.schema.methods import METHODS, Method, register
+from mechdesign.study.schema.methods import METHODS, Method
 from mechdesign.study.schema.study_file import schema
 
 LEVER = """
@@ -50,7 +50,7 @@ def rung(
 def cautious() -> Iterator[None]:
     method = Method("cautious", "cautious first order", "first-order errors, twice as wide", 2, step=1, module=__name__)
     known = dict(METHODS)
-    register(method)
+    METHODS[method.name] = method
     yield
     METHODS.clear()
     METHODS.update(known)

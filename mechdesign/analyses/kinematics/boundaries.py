@@ -14,8 +14,7 @@ from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins, turning_point
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.numerics.minima import lowest
-from mechdesign.numerics.roots import bracketed_roots
+from mechdesign.numerics.roots import bracketed_roots, lowest
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 

@@ -34,7 +34,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
-from mechdesign.study.schema.kinematics import KinematicsSection
+from mechdesign.study.schema.poses import KinematicsSection
 
 # A place this near to a pose or to zero, as a part of the sweep, is at it.
 AT_GIVEN_PLACE = 1e-12

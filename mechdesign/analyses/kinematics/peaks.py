@@ -13,8 +13,7 @@ from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.numerics.minima import lowest
-from mechdesign.numerics.roots import bracketed_roots
+from mechdesign.numerics.roots import bracketed_roots, lowest
 from mechdesign.results import Column, Table
 
 # Which segments are of interest, by a sign, the functions times it at both ends, of shape (functions, 2, segments), and

@@ -22,7 +22,7 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
 from mechdesign.study.text.units import QUANTITY
-from mechdesign.study.variants import follows, places_of
+from mechdesign.study.variants import follows
 
 _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
     "motion": kinematics.motion_table,
@@ -64,7 +64,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
     """
     mechanism, section = study.mechanism, getattr(study, command)
     graph, joints, links = mechanism.graph, mechanism.description.joints, mechanism.description.links
-    places = places_of(study, names)
+    places = study.parameters.moved_places(names)
     if follows(_without_poses(study), names, (command, ALSO_READ[command])):
         return False
     # Angles of slides and clamps in a ring may contradict each other, which is found design by design.

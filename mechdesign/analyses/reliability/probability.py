@@ -15,7 +15,7 @@ from scipy.special import ndtr, ndtri
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import Band, Disc
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.statistics import FAR, outside, rectangle_failure
+from mechdesign.numerics.statistics import MAX_DEVIATION, outside, rectangle_failure
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _LATTICE = 8191
@@ -170,7 +170,7 @@ def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) 
         half = np.sqrt(radius**2 - n * n) if abs(n) <= radius else 0.0
         return float(outside((-half - m) / a, (half - m) / a)) if half else 1.0
     total = float(outside((-radius - m) / a, (radius - m) / a))
-    begin, end = (np.arcsin(np.clip((m + way * FAR * a) / radius, -1.0, 1.0)) for way in (-1, 1))
+    begin, end = (np.arcsin(np.clip((m + way * MAX_DEVIATION * a) / radius, -1.0, 1.0)) for way in (-1, 1))
     if begin == end:
         return total
     # The chance that y is outside changes within b of where the circle is as high as y's mean: panels shrink there.

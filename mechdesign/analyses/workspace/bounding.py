@@ -7,7 +7,7 @@ import numpy as np
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import Designs, trace
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.numerics.minima import dips
+from mechdesign.numerics.roots import dips
 
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9
