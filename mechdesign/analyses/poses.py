@@ -67,7 +67,7 @@ def study_poses(study: Study, section: str) -> Poses:
         asked: PoseSection | None = getattr(study, name)
         if asked is not None and asked.at_nodes:
             # Here, for regions need SciPy, which is slow to import.
-            from mechdesign.analyses.region.nodes import workspace_nodes
+            from mechdesign.analyses.region.curves import workspace_nodes
 
             return workspace_nodes(study)
         if asked is not None:

@@ -12,7 +12,7 @@ from scipy import ndimage
 import mechdesign
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.region.nodes import workspace_nodes
+from mechdesign.analyses.region.curves import workspace_nodes
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 

@@ -7,7 +7,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region import nodes
+from mechdesign.analyses.region import curves
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
@@ -100,7 +100,7 @@ def test_all_methods_agree_about_limits_of_rates_and_of_several_outputs(limits: 
 
 def a_few_nodes(study: Study) -> Poses:
     """Some of the nodes, at the region's edges too: all are more than a test needs."""
-    whole = nodes.workspace_nodes(study)
+    whole = curves.workspace_nodes(study)
     (group,) = whole.groups
     rows = np.unique(np.linspace(0, whole.count - 1, 12).astype(int))
     values = {name: value[rows] for name, value in group.values.items()}
@@ -111,7 +111,7 @@ def a_few_nodes(study: Study) -> Poses:
 def test_nodes_of_a_workspace(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     study = study_of(POLAR_ARM, f"reliability.methods=[{method}]")
     few = a_few_nodes(study)
-    monkeypatch.setattr(nodes, "workspace_nodes", lambda _: few)
+    monkeypatch.setattr(curves, "workspace_nodes", lambda _: few)
     result = mechdesign.reliability(study, jobs=2)
     table = result.tables["reliability"]
     assert len(table) == few.count

@@ -1,16 +1,21 @@
-"""The region of one design as patches: boundary curves and a grid between them, for tables and pictures."""
+"""The region of one design as patches: boundary curves and a grid between them, and poses at its nodes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.panels import SINGLE, Panels, find_panels
 from mechdesign.analyses.region.pieces import Pieces
-from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, trace
+from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, ray_through, trace
+from mechdesign.analyses.region.regions import RAYS, Region, regions
+from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.study import Study
+from mechdesign.study.poses import PoseGroup, Poses
 
 SLACK = 1e-9
 # Rays of the narrowest panel; and how far inside its ends it is traced where the ends themselves are degenerate.
@@ -20,6 +25,9 @@ BESIDE = 1e-9
 GRID = 33
 # An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
 INSET = 1e-6
+# Poses of all regions together, about (a question may cost much at each), and rays of a patch at least.
+MAX_POSES = 2000
+MIN_RAYS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +63,7 @@ class Patch:
 
     def holds(self, z: Complexes, about: complex) -> Flags:
         """Which places lie in the patch, as far as its rays tell."""
-        radius, theta = np.abs(z - about), self.theta[0] + (np.angle(z - about) - self.theta[0]) % (2 * np.pi)
+        radius, theta = np.abs(z - about), ray_through(z - about, self.theta[0])
         inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
         return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
 
@@ -109,3 +117,52 @@ def _most(margins: Ints) -> int:
     """The margin that most rays name: single rays may meet another (a corner)."""
     names, counts = np.unique(margins, return_counts=True)
     return int(names[np.argmax(counts)])
+
+
+def workspace_nodes(study: Study) -> Poses:
+    """Nodes of a grid that follows the boundary, as that of ``local.csv`` but with fewer rays.
+
+    Returns
+    -------
+    Poses
+        The point's x and y, then the held coordinates; a grid of rays by nodes.
+
+    Raises
+    ------
+    StudyError
+        If the workspace section lacks what cannot be assumed.
+    AssemblyError
+        If nothing is reachable.
+    """
+    asked = regions(study)
+    parts = [(region, grid) for region in asked for grid in _grids(region, MAX_POSES // GRID // len(asked))]
+    if not parts:
+        raise AssemblyError("poses: workspace has no node: nothing is reachable")
+    z = np.concatenate([grid.ravel() for _, grid in parts])
+    ends = np.cumsum([0, *(len(grid) for _, grid in parts)]).tolist()
+    point = study.workspace.point if study.workspace is not None else ""
+    values = {f"{point}.x": z.real, f"{point}.y": z.imag}
+    for name in asked[0].held:
+        values[name] = np.concatenate([np.full(grid.size, region.held[name]) for region, grid in parts])
+    group = PoseGroup(tuple(values), values, np.arange(len(z)))
+    spans = tuple(slice(begin, end) for begin, end in pairwise(ends))
+    return Poses((group,), len(z), False, (len(z) // GRID, GRID), patches=spans)
+
+
+def _grids(region: Region, most: int) -> list[Complexes]:
+    """Nodes of the patches of one region, shape (rays, GRID), on about `most` rays."""
+    designs = Designs(region.field, {}, 1, region.about)
+    panels = find_panels(designs, region.scan, SINGLE)
+    if region.field.same_assembly:
+        designs, panels = Pieces.of(designs, panels, region.scan, SINGLE.samples).only(0)
+    if not panels.closes[0]:
+        return []
+    found = list(patches(designs, panels, min(region.rays or RAYS, most), SINGLE.samples))
+    # Every panel has a fewest number of rays: of too many some are left out, never the ends of a patch: others begin.
+    total = sum(float(np.ptp(patch.theta)) for patch in found)
+    grids = []
+    for patch in found:
+        number = max(MIN_RAYS, round(most * float(np.ptp(patch.theta)) / total))
+        kept = np.unique(np.linspace(0, len(patch.theta) - 1, min(number, len(patch.theta))).round().astype(int))
+        grids.append(patch.grid(region.about)[kept])
+    return grids

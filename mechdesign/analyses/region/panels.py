@@ -91,7 +91,7 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     least = raster.farthest(designs.about)
     design = np.repeat(np.arange(count), effort.rays + 1)
     angle = np.tile(np.linspace(*scan, effort.rays + 1), count)
-    reach = np.where(least > 0, least, _first_guess(designs))
+    reach = np.where(least > 0, least, raster.reach(designs.about))
     reach, intervals = _extent(designs, design, angle, reach, least, samples)
     owner = np.arange(count)
     for _ in range(LOOKS):
@@ -122,15 +122,6 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     closes = np.bincount(design, intervals.counts, count) > 0
     area, doubt = raster.area
     return Panels(owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
-
-
-def _first_guess(designs: Designs) -> Floats:
-    """The sum of all rigid vectors: more than a mechanism without slides can reach."""
-    mechanism = designs.field.mechanism
-    vectors = mechanism.geometry.vectors(designs.places)
-    drawn = sum(float(np.abs(z)) for z in mechanism.sketch_configuration.nodes)
-    total = sum(np.abs(w) for w in vectors.w) + abs(designs.about)
-    return np.broadcast_to(np.asarray(total + drawn, dtype=float), (designs.count,)).copy()
 
 
 def _extent(

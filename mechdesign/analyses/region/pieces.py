@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.region.panels import MIDDLE, Panels
-from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, trace
+from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, is_turn, ray_through, trace
 from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -120,7 +120,7 @@ class Pieces:
         number = np.where(has, np.cumsum(has).reshape(has.shape) - 1, -1)
         one = np.flatnonzero((panels.design[1:] == panels.design[:-1]) & (panels.high[:-1] == panels.low[1:]))
         other = one + 1
-        if _is_turn(self.scan):
+        if is_turn(self.scan):
             start, stop = np.flatnonzero(panels.low == self.scan[0]), np.flatnonzero(panels.high == self.scan[1])
             _, at_start, at_stop = np.intersect1d(panels.design[start], panels.design[stop], return_indices=True)
             one, other = np.concatenate([one, stop[at_stop]]), np.concatenate([other, start[at_start]])
@@ -185,7 +185,7 @@ class Pieces:
         """The piece that holds the point's place in the sketch; -1 where none does."""
         place = self._sketched(design) - self.designs.about
         reach = self.panels.reach[design]
-        theta = self.scan[0] + (np.angle(place) - self.scan[0]) % (2 * np.pi)
+        theta = ray_through(place, self.scan[0])
         # At the centre of the scan one ray is as good as another.
         centre = np.abs(place) <= SAME_ROOT * reach
         theta = np.where(centre, self.scan[0] + MIDDLE * (self.scan[1] - self.scan[0]), theta)
@@ -203,13 +203,10 @@ class Pieces:
         """The point's place in the sketch of each design: its drives as drawn, as far as it can be assembled so."""
         field, places = self.designs.field, self.designs.of(design)
         mechanism, (x, y) = field.mechanism, field.outputs[:2]
-        if not places:
-            sketch = mechanism.sketch_configuration
-            return np.full(len(design), complex(float(sketch.value(x)), float(sketch.value(y))))
         poses = drawn(mechanism, places)
-        found = np.asarray(poses.value(x) + 1j * poses.value(y), dtype=complex)
-        found = np.where(poses.valid, found, complex(np.nan, np.nan))
-        for k in [] if mechanism.forward.iterative else np.flatnonzero(~poses.valid).tolist():
+        valid = np.broadcast_to(poses.valid, design.shape)
+        found = np.where(valid, poses.value(x) + 1j * poses.value(y), complex(np.nan, np.nan))
+        for k in [] if mechanism.forward.iterative else np.flatnonzero(~valid).tolist():
             pose = elsewhere(mechanism, {name: value[k] for name, value in places.items()})
             found[k] = complex(float(pose.value(x)), float(pose.value(y)))
         return found
@@ -218,37 +215,27 @@ class Pieces:
         """The piece of each interval of rays of designs with several pieces; -1 where it has no area."""
         panel = self._panel_at(design, theta)
         piece = self._of_counted(panel, found)
-        # Rays through the end of a panel, or through a single point that divides them, are compared with one beside.
+        # Rays through the end of a panel, or through a single point that divides them, are compared with two beside.
         for step in BESIDE:
-            left = np.flatnonzero((found.counts != self.counts[panel]) & (panel >= 0))
-            left = np.intersect1d(left, found.ray[piece == UNKNOWN])
+            left = np.unique(found.ray[piece == UNKNOWN])
             if not left.size:
                 break
-            turned = theta[left] + step * np.array([[0], [-1], [1]])
-            if _is_turn(self.scan):
+            turned = (theta[left] + step * np.array([[-1], [1]])).ravel()
+            if is_turn(self.scan):
                 turned = self.scan[0] + (turned - self.scan[0]) % (2 * np.pi)
-            ends = np.concatenate([self._beside(design[left], there, step, samples) for there in turned], axis=2)
+            owner = np.tile(design[left], 2)
+            beside = trace(self.designs, owner, turned, self.panels.reach[owner], samples)
+            names = self._of_counted(self._panel_at(owner, turned), beside)
             some = np.flatnonzero(np.isin(found.ray, left))
-            inner, outer, names = ends[:, np.searchsorted(left, found.ray[some])]
-            overlap = np.minimum(found.outer[some, None], outer) - np.maximum(found.inner[some, None], inner)
-            best = np.where(np.isnan(overlap), -np.inf, overlap).argmax(axis=1)
-            told = names[np.arange(len(some)), best]
-            piece[some] = np.where(np.isnan(told), UNKNOWN, told)
+            at = np.searchsorted(left, found.ray[some])
+            ends = beside.by_ray(beside.inner, beside.outer, names)
+            inner, outer, told = np.concatenate([ends[..., at], ends[..., len(left) + at]], axis=1)
+            overlap = np.minimum(found.outer[some], outer) - np.maximum(found.inner[some], inner)
+            overlap = np.where(np.isnan(overlap) | (told == UNKNOWN), -np.inf, overlap)
+            if len(overlap):
+                best = overlap.argmax(axis=0), np.arange(len(some))
+                piece[some] = np.where(np.isinf(overlap[best]), UNKNOWN, told[best])
         return piece
-
-    def _beside(self, design: Ints, theta: Floats, step: float, samples: int) -> Floats:
-        """Radii and piece of the intervals of rays near `theta`, not at a panel's end; (3, rays, most intervals)."""
-        panel = self._panel_at(design, theta)
-        known = np.flatnonzero(panel >= 0)
-        if not known.size:
-            return np.full((3, len(panel), 1), np.nan)
-        low, high = self.panels.low[panel[known]], self.panels.high[panel[known]]
-        inset = np.minimum(step, PART * (high - low))
-        turned = np.clip(theta[known], low + inset, high - inset)
-        beside = trace(self.designs, design[known], turned, self.panels.reach[design[known]], samples)
-        ends = np.full((3, len(panel), int(beside.counts.max(initial=1))), np.nan)
-        ends[:, known[beside.ray], beside.slot] = beside.inner, beside.outer, self._of_counted(panel[known], beside)
-        return ends
 
     def _of_counted(self, panel: Ints, found: Intervals) -> Ints:
         """The piece of each interval of rays within panels; unknown where a ray has more or fewer than its panel."""
@@ -289,17 +276,13 @@ class _OnePiece(Designs):
         return found.kept(keep)
 
 
-def _is_turn(scan: tuple[float, float]) -> bool:
-    return scan[1] - scan[0] >= 2 * np.pi * (1 - 1e-12)
-
-
 def _doubtful(panels: Panels, scan: tuple[float, float], count: int) -> Flags:
     """Designs whose region may have several pieces: several intervals a ray, or rays between that meet nothing."""
     doubtful = np.bincount(panels.design[panels.intervals != 1], minlength=count) > 0
     apart = panels.low[1:] != panels.high[:-1]
     begins = np.append(True, apart | (panels.design[1:] != panels.design[:-1]))[: len(panels.low)]
     runs = np.bincount(panels.design[begins], minlength=count)
-    if _is_turn(scan):
+    if is_turn(scan):
         at_start, at_stop = (
             np.bincount(panels.design[end], minlength=count)
             for end in (panels.low == scan[0], panels.high == scan[1])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.region.rays import Designs, Intervals
+from mechdesign.analyses.region.rays import Designs, Intervals, ray_through
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.model import Term
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -52,9 +52,8 @@ class Raster:
         for _ in range(DOUBLINGS):
             found = Raster(low, (high - low) / cells, np.zeros((designs.count, cells, cells), dtype=bool))
             for some, z in found._centres(np.arange(designs.count)):
-                found.inside[some] = (designs.inside(z, some) & _within(z - designs.about, scan)).T.reshape(
-                    -1, cells, cells
-                )
+                inside = designs.inside(z, some) & (ray_through(z - designs.about, scan[0]) <= scan[1])
+                found.inside[some] = inside.T.reshape(-1, cells, cells)
             rim = found.inside.copy()
             rim[:, 1:-1, 1:-1] = False
             open_ = rim.any(axis=(1, 2)) & ~bounded
@@ -77,6 +76,12 @@ class Raster:
             edge[tuple(other)] |= change
         return inside.sum(axis=(1, 2)) * one, EDGE * edge.sum(axis=(1, 2)) * one
 
+    def reach(self, about: complex) -> Floats:
+        """Distance from a point to the farthest corner of each box."""
+        size = self.inside.shape[1] * self.cell
+        corners = self.low + np.stack([0 * size, size.real + 0j, 1j * size.imag, size])
+        return np.asarray(np.abs(corners - about).max(axis=0))
+
     def farthest(self, about: complex) -> Floats:
         """Distance from a point within which all cells inside lie, shape (designs,); 0 where there is none."""
         found = np.zeros(len(self.low))
@@ -98,18 +103,17 @@ class Raster:
             The rays, ascending by both; for each design at least those at both ends of the scan.
         """
         every = np.arange(len(self.low) + 1)
-        first, held = np.searchsorted(design, every), _Held(intervals)
+        first, ends = np.searchsorted(design, every), intervals.by_ray(intervals.inner, intervals.outer)
         owners, angles = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
         for block, z in self._centres(some):
             inside = self.inside[block].reshape(len(block), -1).T
             way = z - about
-            theta = scan[0] + (np.angle(way) - scan[0]) % (2 * np.pi)
-            radius = np.abs(way)
+            theta, radius = ray_through(way, scan[0]), np.abs(way)
             at = np.empty(z.shape, dtype=np.intp)
             for lane, k in enumerate(block):
                 rays = angle[first[k] : first[k + 1]]
                 at[:, lane] = first[k] + np.clip(np.searchsorted(rays, theta[:, lane]) - 1, 0, len(rays) - 2)
-            before, after = held.at(at, radius), held.at(at + 1, radius)
+            before, after = _hold(ends, at, radius), _hold(ends, at + 1, radius)
             passed = np.where(inside, ~before & ~after, before & after) & (theta < scan[1]) & (theta > scan[0])
             if not passed.any():
                 continue
@@ -136,26 +140,12 @@ class Raster:
             yield some, low.real + x * cell.real + 1j * (low.imag + y * cell.imag)
 
 
-class _Held:
-    """Which radii the intervals of rays hold."""
-
-    def __init__(self, intervals: Intervals) -> None:
-        rays = len(intervals.beyond)
-        slot = intervals.slot
-        most = int(slot.max(initial=-1)) + 1
-        self.inner, self.outer = np.full((most, rays), np.inf), np.full((most, rays), -np.inf)
-        self.inner[slot, intervals.ray], self.outer[slot, intervals.ray] = intervals.inner, intervals.outer
-
-    def at(self, ray: Ints, radius: Floats) -> Flags:
-        held = np.zeros(ray.shape, dtype=bool)
-        for inner, outer in zip(self.inner, self.outer, strict=True):
-            held |= (inner[ray] <= radius) & (radius <= outer[ray])
-        return held
-
-
-def _within(way: Complexes, scan: tuple[float, float]) -> Flags:
-    """Whether places seen from the centre of a scan lie between its first and last ray."""
-    return np.asarray((np.angle(way) - scan[0]) % (2 * np.pi) <= scan[1] - scan[0])
+def _hold(ends: Floats, ray: Ints, radius: Floats) -> Flags:
+    """Whether rays hold radii between the `ends` of one of their intervals."""
+    held = np.zeros(ray.shape, dtype=bool)
+    for inner, outer in zip(*ends, strict=True):
+        held |= (inner[ray] <= radius) & (radius <= outer[ray])
+    return held
 
 
 def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:

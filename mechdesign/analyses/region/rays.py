@@ -32,6 +32,16 @@ INSET = 1e-10
 FIVE = np.linspace(0.0, 1.0, 5)
 
 
+def is_turn(scan: tuple[float, float]) -> bool:
+    """Whether a scan goes all the way round, but for rounding."""
+    return scan[1] - scan[0] >= 2 * np.pi * (1 - 1e-12)
+
+
+def ray_through(way: Complexes, start: float) -> Floats:
+    """Angles of the rays to places seen from their centre, from the first ray of the scan on."""
+    return np.asarray(start + (np.angle(way) - start) % (2 * np.pi))
+
+
 @dataclass(frozen=True, eq=False)
 class Designs:
     """Several designs of one mechanism, scanned about one point.
@@ -86,8 +96,6 @@ class Intervals:
         Margin that is zero there; -1 where it begins at the centre or is not closed within the reach.
     beyond : ndarray of bool, shape (rays,)
         Rays still inside at their reach.
-    crossings : (ray, radius, margin, direction)
-        All roots of all margins; direction +1 where the margin becomes positive.
     """
 
     ray: Ints
@@ -96,7 +104,6 @@ class Intervals:
     enters: Ints
     leaves: Ints
     beyond: Flags
-    crossings: tuple[Ints, Floats, Ints, Ints]
 
     @property
     def counts(self) -> Ints:
@@ -107,6 +114,12 @@ class Intervals:
     def slot(self) -> Ints:
         """Place of each interval on its ray, outwards from 0."""
         return np.arange(len(self.ray)) - np.searchsorted(self.ray, self.ray)
+
+    def by_ray(self, *values: Floats | Ints) -> Floats:
+        """Values of intervals in order outwards, shape (values, most intervals of a ray, rays); nan where none is."""
+        found = np.full((len(values), int(self.counts.max(initial=0)), len(self.beyond)), np.nan)
+        found[:, self.slot, self.ray] = values
+        return found
 
     def kept(self, keep: Flags) -> Intervals:
         """Some of the intervals, on the same rays."""
@@ -139,13 +152,8 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
     def join(name: str) -> Any:
         return np.concatenate([getattr(part, name) for part in parts])
 
-    crossings: Any = tuple(np.concatenate([part.crossings[k] for part in parts]) for k in range(4))
-    lengths = [len(part.crossings[0]) for part in parts]
-    return Intervals(
-        join("ray") + np.repeat(starts, [len(part.ray) for part in parts]), join("inner"), join("outer"),
-        join("enters"), join("leaves"), join("beyond"),
-        (crossings[0] + np.repeat(starts, lengths), *crossings[1:]),
-    )  # fmt: skip
+    first = np.repeat(starts, [len(part.ray) for part in parts])
+    return Intervals(join("ray") + first, *(join(end) for end in ("inner", "outer", "enters", "leaves", "beyond")))
 
 
 def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
@@ -316,13 +324,7 @@ def _replace(found: Intervals, lanes: Ints, part: Intervals, tie: Floats) -> Int
     order = np.lexsort((inner, owner))
     beyond = np.zeros(len(found.beyond), dtype=bool)
     beyond[owner[leaves < 0]] = True
-    ray, radius, margin, turn = (np.concatenate([a, b]) for a, b in zip(
-        found.crossings, (found.ray[lanes[part.crossings[0]]], *part.crossings[1:]), strict=True))  # fmt: skip
-    sort = np.lexsort((radius, ray))
-    return Intervals(
-        owner[order], inner[order], outer[order], enters[order], leaves[order], beyond,
-        (ray[sort], radius[sort], margin[sort], turn[sort]),
-    )  # fmt: skip
+    return Intervals(owner[order], inner[order], outer[order], enters[order], leaves[order], beyond)
 
 
 def intervals_between(
@@ -357,7 +359,7 @@ def intervals_between(
     tie = SAME_ROOT * reach
     enters = _first_named(owner, inner, enters, margin[turn > 0], ray[turn > 0], radius[turn > 0], tie)
     leaves = _first_named(owner, outer, leaves, margin[turn < 0], ray[turn < 0], radius[turn < 0], tie)
-    return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, (ray, radius, margin, turn))
+    return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond)
 
 
 def _first_named(owner: Ints, at: Floats, label: Ints, margin: Ints, ray: Ints, radius: Floats, tie: Floats) -> Ints:

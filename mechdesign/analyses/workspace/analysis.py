@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.analyses.columns import SHARED, shared
+from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
-from mechdesign.analyses.region.panels import SINGLE
+from mechdesign.analyses.region.panels import SINGLE, Effort
+from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.region.regions import RAYS
-from mechdesign.analyses.workspace.index import determinant_power, power_of_length, prepare
+from mechdesign.analyses.workspace.index import Local, determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
-from mechdesign.analyses.workspace.local import Local
-from mechdesign.analyses.workspace.orientation import reachable
 from mechdesign.analyses.workspace.point_path import point_path
+from mechdesign.analyses.workspace.quadrature import FINEST_AREA
 from mechdesign.analyses.workspace.question import (
     COLUMNS,
     Evaluation,
@@ -25,20 +26,22 @@ from mechdesign.analyses.workspace.question import (
     questions,
     split,
 )
-from mechdesign.analyses.workspace.shown import poses_along
-from mechdesign.analyses.workspace.singularities import singular_everywhere
+from mechdesign.analyses.workspace.ranged import Every, Ranged, Some, SomeDesigns
+from mechdesign.analyses.workspace.singularities import causes, singular_everywhere
 from mechdesign.analyses.workspace.tables import (
+    boundary_columns,
     held_columns,
     inscribed_columns,
     left_out,
     outlines,
     piece_columns,
+    poses_along,
     stacked,
     where,
 )
-from mechdesign.errors import AssemblyError
+from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.indices import index
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -47,6 +50,9 @@ from mechdesign.threads import one_thread
 
 # An error of the area beyond this part of it is told.
 AREA_SURE = 1e-3
+# How finely a region over a range is looked for, and what is answered of it; its margins cost a hundred times as much.
+OVER_RANGE = Effort(48, 16, 96)
+OF_RANGE = ("SUI", "area", "box_area")
 ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; redraw the sketch at those values"
 
 
@@ -80,7 +86,6 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     regions: list[tuple[Study, Question, list[Patch]]] = []
     shapes: list[Floats] = []
     pieces: list[list[Column]] = []
-    several = False
     warnings: list[str] = []
     for question in asked:
         if singular_everywhere(question.field):
@@ -94,8 +99,8 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             warnings += _doubts(question, given)
         answers.append(given)
         if given.panels.closes[0]:
-            assert given.pieces is not None
-            found = patches_of_pieces(given.pieces, question.rays or RAYS, SINGLE.samples)
+            found, columns = _pieces(study, question, given, SINGLE, warnings)
+            pieces.append(columns)
             local.append(_local(study, question, found))
             counted = [patch for patch in found if patch.piece == 1 or not question.field.same_assembly]
             others = [patch for patch in found if patch not in counted]
@@ -106,11 +111,6 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
                     f"the largest circle or rectangle inside the region{where(question)} was not found: where a limit "
                     "jumps (an angle's turn ends there) no slope leads along the boundary"
                 )
-            areas, drawn = areas_of_pieces(question, given, SINGLE), bool(given.pieces.drawn[0])
-            pieces.append(piece_columns(study, question, found, areas, drawn))
-            several |= len(areas) > 1
-            if others:
-                warnings.append(left_out(study, question, areas, drawn))
         else:
             shapes.append(np.full(len(INSCRIBED), np.nan))
         progress.update(1)
@@ -121,13 +121,31 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
               "performance indices over the region"),
         Table("local", stacked(local), "local indices on a grid that follows the boundary"),
         *outlines(regions),
+        *_several(pieces),
     ]  # fmt: skip
-    if several:
-        tables.append(Table("pieces", stacked(pieces), "pieces of the region that do not hang together"))
     empty = sum(not given.panels.closes[0] for given in answers)
     named = {table.name: table for table in tables}
     along = poses_along(study, regions[0][1].held, named["boundary"])
     return Result("workspace", named, tuple(warnings), {"regions": len(asked), "empty": empty}, drawn={"along": along})
+
+
+def _pieces(
+    study: Study, question: Question, given: Evaluation, effort: Effort, warnings: list[str]
+) -> tuple[list[Patch], list[Column]]:
+    """Patches and pieces of a region, and a warning where pieces are left out."""
+    assert given.pieces is not None
+    found = patches_of_pieces(given.pieces, question.rays or RAYS, effort.samples)
+    areas, drawn = areas_of_pieces(question, given, effort), bool(given.pieces.drawn[0])
+    if len(areas) > 1 and question.field.same_assembly:
+        warnings.append(left_out(study, question, areas, drawn))
+    return found, piece_columns(study, question, found, areas, drawn)
+
+
+def _several(pieces: Sequence[Sequence[Column]]) -> Iterator[Table]:
+    """The table of pieces, where a region has several."""
+    table = Table("pieces", stacked(pieces), "pieces of the region that do not hang together")
+    if (table["piece"] > 1).any():
+        yield table
 
 
 def _unreachable(study: Study, asked: Sequence[Question]) -> str:
@@ -228,3 +246,97 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
         Column("node", node, "", "node along the ray, from the inner to the outer boundary"),
         *shared(study.units, piece=np.repeat([patch.piece for patch in found], [grid.size for grid in grids])),
     ]
+
+
+def reachable(study: Study, progress: Progress) -> Result:
+    """Region of a point over a range of a held coordinate: area, the rectangle around it, and its boundary.
+
+    Raises
+    ------
+    StudyError
+        If the section lacks what cannot be assumed, or the inverse problem has no closed form.
+    AssemblyError
+        If nothing can be reached, or the region has no end.
+    """
+    section = study.workspace
+    assert section is not None
+    name, over = next((name, value) for name, value in section.at.items() if isinstance(value, Over))
+    asked = list(_questions(study, name, over))
+    progress.start(len(asked), "regions")
+    answers: list[Evaluation] = []
+    boundaries: list[list[Column]] = []
+    pieces: list[list[Column]] = []
+    warnings: list[str] = []
+    for question in asked:
+        given = answer(question, {}, 1, OVER_RANGE)
+        answers.append(given)
+        if given.panels.closes[0]:
+            found, columns = _pieces(study, question, given, OVER_RANGE, warnings)
+            pieces.append(columns)
+            boundaries.append(_outline(study, question, name, found))
+        progress.update(1)
+    if not boundaries:
+        held = "".join(f", {key} = {value:g}" for key, value in asked[0].held.items())
+        raise AssemblyError(
+            f"point {section.point} reaches nothing over the range of {name} from {over.from_:g} to {over.to:g}{held}"
+        )
+    values = {key: np.concatenate([given.values[key] for given in answers]) for key in OF_RANGE}
+    area, error = values["area"], np.concatenate([given.errors["area"] for given in answers])
+    indices = (
+        *stacked([held_columns(study, question, 1) for question in asked]),
+        *shared(study.units, **values),
+        Column("area_error", error, study.units.label("area"), "estimated error of area"),
+    )
+    tables = [
+        Table("indices", indices, f"the region over the range of {name}"),
+        Table("boundary", stacked(boundaries), "boundary of the region, curve by curve"),
+        *_several(pieces),
+    ]
+    late = (area > 0) & (error > FINEST_AREA * area)
+    if late.any():
+        known = (error[late] / area[late]).max()
+        warnings.append(
+            f"the area is known to {known:.1g} of itself only (area_error): over the range of {name} the boundary "
+            "is too rough for more"
+        )
+    counts = {"regions": len(asked), "empty": len(asked) - len(boundaries)}
+    return Result("workspace", {table.name: table for table in tables}, tuple(warnings), counts)
+
+
+def _questions(study: Study, name: str, over: Over) -> Iterator[Question]:
+    """One question a value of the other held coordinates."""
+    assert study.workspace is not None
+    # Only the area is asked, in which angles and lengths do not mix.
+    update = {"at": {**study.workspace.at, name: (over.from_,)}, "indices": (),
+              "characteristic_length": study.workspace.characteristic_length or 1.0}  # fmt: skip
+    coordinate = study.mechanism.coordinate(name)
+    low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
+    for question in questions(replace(study, workspace=study.workspace.model_copy(update=update)), wanted=OF_RANGE):
+        base = question.field
+        if base.plan.iterative:
+            message = (
+                f"over a range of {name} the inverse problem must have a closed form, which it has not here; "
+                f"ask for single values: at: {{{name}: [...]}}"
+            )
+            raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
+        common = base.mechanism, base.plan, base.held, base.same_assembly, base.length
+        field = (Every if over.all else Some)(*common, list(study.workspace.at).index(name), low, high)
+        held = {k: v for k, v in question.held.items() if k != name}
+        yield replace(question, field=field, held=held, rays_through=Designs if over.all else SomeDesigns)
+
+
+def _outline(study: Study, question: Question, name: str, found: Sequence[Patch]) -> list[Column]:
+    """Points of the boundary, the value of the range at which each is reached, and what ends the region there."""
+    over = question.field
+    assert isinstance(over, Ranged)
+    single = [words for _, words in causes(over.sliced)]
+    told = [*single * 3, *(f"{a} and {b}" for a in single for b in single)]
+    coordinate = study.mechanism.coordinate(name)
+
+    def deciding(z: Complexes, within: Complexes, inwards: Floats, margin: Ints) -> Iterator[Column]:
+        row = np.array([over.extreme(label) for label in range(len(over.labels))])[margin]
+        value = np.take_along_axis(over.deciding(z)[1], row[None], axis=0)[0]
+        shown = np.asarray(in_study_units(study, coordinate, value))
+        yield Column(name, shown, study.units.label(coordinate.quantity), "value of the range that decides there")
+
+    return [column for column in boundary_columns(study, question, found, told, deciding) if column.name != "theta"]

@@ -2,26 +2,52 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mechdesign import indices
-from mechdesign.analyses.workspace.local import Local
+from mechdesign.analyses.region.field import Field, Places
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.numerics.arrays import Floats
+from mechdesign.mechanism.derivatives import Jacobian
+from mechdesign.numerics.arrays import Complexes, Floats
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.region.field import Field
     from mechdesign.study import Study
 
-Evaluate = Callable[[Local], Value]
 # Configurations that an index is computed from at once.
 BLOCK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Local(Jacobian):
+    """The Jacobian of a field's outputs at a batch of points.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    found : dict
+        Values of indices that were computed already, by name.
+    """
+
+    configuration: Configuration
+    found: dict[str, Value] = dataclasses.field(default_factory=dict)
+
+    @staticmethod
+    def at(field: Field, z: Complexes, places: Places) -> Local:
+        """What local indices at points `z` are computed from."""
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            configuration = field.configuration(z, places)
+            jacobian = Jacobian.of(field.mechanism.linearize(configuration), field.outputs, field.length)
+            return Local(jacobian.entries, jacobian.homogeneous, jacobian.shape, configuration)
+
+
+Evaluate = Callable[[Local], Value]
 
 
 @dataclass(frozen=True)
@@ -59,7 +85,7 @@ class Prepared:
 
     name: str
     index: Index
-    evaluate: Evaluate = field(repr=False)
+    evaluate: Evaluate = dataclasses.field(repr=False)
 
     @quiet
     def values(self, local: Local) -> Value:

@@ -15,6 +15,7 @@ import numpy as np
 
 from mechdesign.analyses.region.curves import Patch
 from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.region.rays import is_turn
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 # What is told of both shapes.
@@ -115,7 +116,7 @@ def _sector(about: complex, scan: tuple[float, float]) -> Callable[[Complexes], 
     span = scan[1] - scan[0]
 
     def margins(z: Complexes) -> Floats:
-        if span >= 2 * np.pi * (1 - 1e-12):
+        if is_turn(scan):
             return np.zeros((0, *z.shape))
         left, right = ((z - about) * np.conj(start)).imag, -((z - about) * np.conj(stop)).imag
         return np.stack([left, right]) if span <= np.pi * (1 + 1e-12) else np.maximum(left, right)[None]

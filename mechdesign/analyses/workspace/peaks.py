@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import Designs, trace
 from mechdesign.analyses.region.rules import cosine, cubic, spread
-from mechdesign.analyses.workspace.index import Prepared
-from mechdesign.analyses.workspace.local import Local
+from mechdesign.analyses.workspace.index import Local, Prepared
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Places in the maps stay this far from the ends: rounding leaves nothing nearer to corners, or to the boundary.

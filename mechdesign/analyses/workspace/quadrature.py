@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import Designs, Intervals, trace
 from mechdesign.analyses.region.rules import Rule, cosine, cubic, spread
-from mechdesign.analyses.workspace.index import Prepared
-from mechdesign.analyses.workspace.local import Local
+from mechdesign.analyses.workspace.index import Local, Prepared
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 ANGLES = Rule.of(20, 4, 6.0)

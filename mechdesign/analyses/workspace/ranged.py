@@ -27,8 +27,6 @@ from mechdesign.numerics.roots import bracketed_roots
 SAMPLES, BLOCK = 25, 2048
 # Distance of the values close to an extreme, as a part of the distance between samples.
 CLOSE = 0.03
-# Distances of the values close to where a leg is stretched or folded, step by step.
-WIDTHS = (1.0, 0.1, 0.01)
 # An extreme farther from zero than so many times the difference to the neighbouring samples keeps its sign. Where every
 # value is to be reached curves are followed from farther away.
 FAR = (2.0, 100.0)
@@ -36,8 +34,6 @@ FAR = (2.0, 100.0)
 RIVALS = 4
 # Places looked at between stretches of a ray that samples of the range reach, as parts of the distance.
 BETWEEN = np.array([0.03, 0.3, 0.7, 0.97])
-# Between samples a gap closes that a parabola leaves this part of itself.
-GAP = 0.02
 # In place of a margin that does not count.
 HIGH = 1e30
 # Accuracy of radii, as a part of the reach.
@@ -109,16 +105,13 @@ class Ranged(Field):
         found, value = height.max(axis=1), self.values[node]
         lowest = np.where(np.isnan(margins), np.inf, margins)[:, node[0], np.arange(len(z))].argmin(axis=0)
         pair = np.array(np.broadcast_to(lowest, (2, *found.shape)))
-        candidates = [self._refined(z, margins, height)]
-        if not every and self.same_assembly:
-            candidates.append(self._at_closures(z, margins))
-        for row, lane, top, at, names in candidates:
-            better = np.flatnonzero(top > found[row, lane])
-            better = better[np.argsort(top[better], kind="stable")]
-            # Of several extremes of one place the last assigned is the highest.
-            where = row[better], lane[better]
-            found[where], value[where] = top[better], at[better]
-            pair[:, where[0], where[1]] = names[:, better]
+        row, lane, top, at, names = self._refined(z, margins, height)
+        better = np.flatnonzero(top > found[row, lane])
+        better = better[np.argsort(top[better], kind="stable")]
+        # Of several extremes of one place the last assigned is the highest.
+        where = row[better], lane[better]
+        found[where], value[where] = top[better], at[better]
+        pair[:, where[0], where[1]] = names[:, better]
         return np.where(np.isinf(found), np.nan, -found if every else found), value, pair
 
     def _refined(self, z: Complexes, margins: Floats, height: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
@@ -141,37 +134,6 @@ class Ranged(Field):
         there = self.at(z[lane], at)
         top = _known(-there[row, each]) if every else _smallest(there)
         return row, lane, top, at, names
-
-    def _at_closures(self, z: Complexes, margins: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
-        """As `_refined`, where a leg is stretched or folded: there margins of the assembly end with a square root."""
-        closures = np.flatnonzero(self.sliced.singular)
-        positive = margins[closures] > 0
-        which, cell, lane = np.nonzero(positive[:, 1:] != positive[:, :-1])
-        closure, each = closures[which], np.arange(len(which))
-        low, high = self.values[cell], self.values[cell + 1]
-        ends, none = (margins[closure, cell + k, lane] for k in range(2)), np.full(len(which), np.nan)
-        at_low, at_high = ends
-        root = bracketed_roots(
-            lambda k, value: self.at(z[lane[k]], value, False)[closure[k], np.arange(len(k))],
-            low, at_low, high, at_high, none, none, np.full(len(which), 1e-13),
-        )  # fmt: skip
-        # Margins are smooth in the root of the distance: closer and closer to the extreme, up to the end of the range.
-        way = np.where(at_high > at_low, 1.0, -1.0) * (high - low) / 9
-        last = np.sqrt((np.where(way > 0, self.high, self.low) - root) / way)
-        t = np.full(len(root), 2.0)
-        for width in WIDTHS:
-            centre = np.clip(t, 2 * width, np.maximum(last - width, 2 * width))
-            place = centre + width * np.array([[-1.0], [0.0], [1.0]])
-            near = self.at(np.broadcast_to(z[lane], (3, len(lane))), root + way * place**2)
-            known = ~np.isnan(near).any(axis=(0, 1))
-            near[closure, :, each] = np.inf
-            place, top, names = _highest(near, np.maximum(-centre / width, -3), np.minimum((last - centre) / width, 3))
-            t = centre + width * place
-        # What lies behind the end of the range does not count, and then the leg alone ends the region.
-        near_end = last < top
-        top, other = np.where(known, np.minimum(top, last), -np.inf), np.where(near_end, closure, names[0])
-        at = np.where(near_end, np.where(way > 0, self.high, self.low), root + way * t**2)
-        return 0 * lane, lane, top, at, np.sort([closure, other], axis=0)
 
 
 class Every(Ranged):
@@ -346,37 +308,11 @@ class SomeDesigns(Designs):
         high_of, high = np.concatenate([owner, every]), np.concatenate([inner, reach])
         one, two = np.lexsort((low, low_of)), np.lexsort((high, high_of))
         between = low[one] + BETWEEN[:, None] * (high[two] - low[one])
-        hidden_ray, hidden = _hidden(found, len(over.single))
-        ray = np.concatenate([every, every, owner, owner, owner, *[low_of[one]] * len(BETWEEN), hidden_ray])
-        radius = np.concatenate([0 * reach, reach, inner, 0.5 * (inner + outer), outer, between.ravel(), hidden])
+        ray = np.concatenate([every, every, owner, owner, owner, *[low_of[one]] * len(BETWEEN)])
+        radius = np.concatenate([0 * reach, reach, inner, 0.5 * (inner + outer), outer, between.ravel()])
         order = np.lexsort((radius, ray))
         ray, radius = ray[order], radius[order]
         slot = np.arange(len(ray)) - np.searchsorted(ray, ray)
         x = np.tile(reach, (int(slot.max()) + 1, 1))
         x[slot, ray] = radius
         return x
-
-
-def _hidden(found: Intervals, margins: int) -> tuple[Ints, Floats]:
-    """Rays and radii where something may be reached between two samples of the range.
-
-    At a sample one margin becomes negative just before another becomes positive; the gap between both radii is a
-    parabola over the range, and so is its middle.
-    """
-    lane, radius, margin, turn = found.crossings
-    miss = np.flatnonzero((lane[1:] == lane[:-1]) & (turn[:-1] < 0) & (turn[1:] > 0) & (margin[1:] != margin[:-1]))
-    # The same two margins at neighbouring samples have neighbouring keys.
-    key = ((lane[miss] // SAMPLES * margins + margin[miss]) * margins + margin[miss + 1]) * (SAMPLES + 1)
-    key, first = np.unique(key + lane[miss] % SAMPLES, return_index=True)
-    miss = miss[first]
-    gap, middle = radius[miss + 1] - radius[miss], 0.5 * (radius[miss + 1] + radius[miss])
-    at = 1 + np.flatnonzero((key[1:-1] - key[:-2] == 1) & (key[2:] - key[1:-1] == 1))
-    before, here, after = gap[at - 1], gap[at], gap[at + 1]
-    lowest = (here < before) & (here <= after)
-    at, before, here, after = at[lowest], before[lowest], here[lowest], after[lowest]
-    bend, slope = 0.5 * (before + after) - here, 0.5 * (after - before)
-    place = -0.5 * slope / bend
-    hidden = here - 2 * 0.25 * slope**2 / bend <= GAP * (np.maximum(before, after) - here)
-    at, place = at[hidden], place[hidden]
-    slope, bend = 0.5 * (middle[at + 1] - middle[at - 1]), 0.5 * (middle[at + 1] + middle[at - 1]) - middle[at]
-    return lane[miss[at]] // SAMPLES, middle[at] + place * (slope + bend * place)
