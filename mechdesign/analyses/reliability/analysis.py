@@ -14,14 +14,14 @@ from mechdesign.analyses.reliability import methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
-from mechdesign.analyses.reliability.engine.intervals import Precision
+from mechdesign.analyses.reliability.engine.problem import Precision
 from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
 from mechdesign.analyses.reliability.notes import notes
 from mechdesign.analyses.reliability.question import ask, unsaid
 from mechdesign.analyses.reliability.simulation import Setting, forward_plan
 from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.sources import Sources, find_sources
-from mechdesign.analyses.reliability.task import MOST, MethodResult, Partial, Task
+from mechdesign.analyses.reliability.task import MAX_SAMPLES, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Reason
 from mechdesign.parallel import keep_freed_memory
@@ -32,7 +32,7 @@ from mechdesign.study.poses import Poses
 from mechdesign.threads import one_thread
 
 # Poses whose sensitivities are computed together.
-_BLOCK = 2048
+_POSES_TOGETHER = 2048
 # Listed poses that get a density of their own.
 _DENSITIES = 12
 # Poses that give the same coordinates, and the rates of their drives.
@@ -78,7 +78,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     failures, failed = judge_failures(study, poses, task.reason)
     task = replace(
         task, settings=_settings(task, groups), seed=study.seed if seed is None else seed, samples=section.samples,
-        most=section.samples if "samples" in section.model_fields_set else MOST, jobs=jobs, progress=progress,
+        most=section.samples if "samples" in section.model_fields_set else MAX_SAMPLES, jobs=jobs, progress=progress,
     )  # fmt: skip
     if section.precision is not None:
         task = replace(task, precision=Precision(section.precision.relative, section.precision.half_width))
@@ -173,8 +173,8 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
             rates = drive_rates(study, section, poses, solved, mechanism.linearize(configuration))
         for row, value in zip(nominal, nominal_values(mechanism, configuration, channels, rates), strict=True):
             row[rows] = value
-        for begin in range(0, len(rows), _BLOCK):
-            block = np.arange(begin, min(begin + _BLOCK, len(rows)))
+        for begin in range(0, len(rows), _POSES_TOGETHER):
+            block = np.arange(begin, min(begin + _POSES_TOGETHER, len(rows)))
             part, here = configuration.take(block), None
             if bent is not None and elastic is not None:
                 here = bent.at(part, channels)

@@ -33,7 +33,7 @@ class FirstOrder:
     components : ndarray, shape (channels, components, poses)
         Derivative of each channel (radians, lengths) by each independent component of the sources.
     offset : ndarray, shape (channels, poses), or None
-        Errors that nothing random causes: deflections.
+        Deflections under the mean load.
     """
 
     sources: Sources
@@ -197,13 +197,7 @@ def linear_errors(
     rates: DriveRates,
     elastic: Elastic | None = None,
 ) -> FirstOrder:
-    """Linear error model at a flat batch of nominal configurations, the drives held, perhaps under a load.
-
-    Raises
-    ------
-    MechanismError
-        For the acceleration of a measure that is an expression.
-    """
+    """Linear error model at a flat batch of nominal configurations, the drives held; raises as `derivatives`."""
     directions = [direction for source in sources.all for direction in source.directions]
     names = list(dict.fromkeys(name for direction in directions for name in direction))
     slopes = np.array([[direction.get(name, 0.0) for name in names] for direction in directions])

@@ -6,8 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 
-from mechdesign.analyses.reliability.engine.intervals import WIDTH
-from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate
 from mechdesign.analyses.reliability.methods.auto import FACTOR, disagree
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS

@@ -52,14 +52,9 @@ class Disc:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is asked: channels (outputs by order), and the limits on them.
+    """Channels (outputs order by order, all positions first), and the limits on their errors.
 
-    Parameters
-    ----------
-    channels : tuple of Channel
-        Outputs, order by order: all positions first.
-    pair : (int, int) or None
-        The two limited channels, where there are just two; without limits, the two outputs.
+    `pair` are the two limited channels, where there are just two; without limits, the two outputs.
     """
 
     channels: tuple[Channel, ...]
@@ -79,7 +74,7 @@ class Question:
 
     @cached_property
     def narrowed(self) -> Question:
-        """The question of these alone."""
+        """The same with the limited channels alone."""
         place = {channel: k for k, channel in enumerate(self.limited_channels)}
         return Question(
             tuple(self.channels[k] for k in self.limited_channels),
@@ -102,9 +97,9 @@ class Question:
 
     @property
     def _ends(self) -> list[tuple[int, float, float]]:
-        """Ends of the bands that are finite: error, end, and 1 of an upper one, -1 of a lower one."""
-        both = [(b.output, end, way) for b in self.bands for end, way in ((b.high, 1.0), (b.low, -1.0))]
-        return [each for each in both if np.isfinite(each[1])]
+        """Finite ends of the bands: error, end, and 1 of an upper one, -1 of a lower one."""
+        return [(b.output, end, way) for b in self.bands for end, way in ((b.high, 1.0), (b.low, -1.0))
+                if np.isfinite(end)]  # fmt: skip
 
     def margins(self, errors: Floats) -> Floats:
         """How far errors, of shape (channels, n), are from each limit, negative beyond it, shape (limits, n)."""

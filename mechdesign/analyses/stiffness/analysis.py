@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
-from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held, put
+from mechdesign.analyses.stiffness.elements import Guide, Hinge, beams_of
 from mechdesign.analyses.stiffness.force_method import Effects, Loaded, effects_of, load, twists_of
 from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
-from mechdesign.analyses.stiffness.network import Guide, Hinge, Network, build_network, carrying_edges
+from mechdesign.analyses.stiffness.network import Network, build_network, carrying_edges
 from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,
@@ -37,8 +37,9 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.threads import one_thread
 
+# Poses solved together.
 CHUNK = 8192
-# Wrenches (of unit size) nearer to dependence than this are told: the answer hangs on rounding and on tolerances.
+# Wrenches (of unit size) nearer to dependence than this get a warning: rounding and tolerances decide the answer.
 NEAR_SINGULAR = 1e-4
 Pose = tuple[int, Configuration]
 
@@ -106,18 +107,9 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """How the body is held in every pose.
+    """How the body is held in every pose, why poses fail (`Reason`, shape (poses,)), and the effects of any loads.
 
-    Parameters
-    ----------
-    reason : int8 array, shape (poses,)
-        See `mechdesign.mechanism.Reason`.
-    springs : Springs
-        Of the legs, by pose.
-    effects : Effects or None
-        What the study's loads do, where it has any.
-    first, loose : (int, Configuration) or None
-        The first valid pose and the first that has a free twist, with their rows.
+    `first` and `loose` are the first valid pose and the first that has a free twist, with their rows.
     """
 
     held: Held
@@ -130,17 +122,7 @@ class Solved:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """What pictures show of one pose.
-
-    Parameters
-    ----------
-    row : int
-        Its row among the study's poses.
-    springs : Springs
-        Those of this pose.
-    twists : mapping of str to ndarray, shape (3, loads)
-        How each vertex shifts and turns under the study's loads, about the asked point.
-    """
+    """One pose as pictures show it, and the row of it; `twists` by vertex, shape (3, loads), about the asked point."""
 
     body: Body
     row: int
@@ -215,13 +197,7 @@ def tables(study: Study, body: Body, poses: Poses, solved: Solved) -> dict[str, 
 
 
 def ask(study: Study) -> Body:
-    """Find the legs that hold what the study asks.
-
-    Raises
-    ------
-    StudyError
-        If the study has no stiffness section.
-    """
+    """Find what carries the asked body; a StudyError where the study has no stiffness section."""
     section = study.stiffness
     if section is None:
         message = "is missing: say which point's stiffness is asked, for example {link: platform, at: P}"

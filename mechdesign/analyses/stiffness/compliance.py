@@ -83,14 +83,8 @@ def by_wrenches(
 ) -> tuple[Floats, Floats, Flags]:
     """Stiffness and compliance, shape (n, size, size), where as many wrenches as needed hold the body, and where so.
 
-    Parameters
-    ----------
-    wrenches, compliances : sequence of ndarray, shape (3, m, n) and (m, m, n)
-        Of all legs.
-    length : float
-        Moments are divided by it wherever sizes are compared.
-    size : int
-        3 for a body; 2 for a pin, on which no leg exerts a moment.
+    Wrenches and compliances are those of all legs, shapes (3, m, n) and (m, m, n). Moments are divided by `length`
+    wherever sizes are compared; on a pin (`size` 2) no leg exerts a moment.
     """
     scale = np.array([1.0, 1.0, 1.0 / length])[:size]
     outer = np.outer(scale, scale)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.stiffness.bodies import Bodies
-from mechdesign.analyses.stiffness.chains import freedoms, looked_at_from
 from mechdesign.analyses.stiffness.compliance import Held, by_wrenches
-from mechdesign.analyses.stiffness.network import Beam, Edge, Element, Hinge, Shift
+from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, looked_at_from
+from mechdesign.analyses.stiffness.network import Edge
 from mechdesign.analyses.stiffness.screws import (
     RIGID,
     Chain,
@@ -26,22 +26,16 @@ from mechdesign.analyses.stiffness.screws import (
 from mechdesign.analyses.stiffness.tables import Springs
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes, Ints
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.study.schema.stiffness import StiffnessSection
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A serial chain from the ground to the asked body.
+    """A serial chain from the ground to the asked body, its joints and beams in order from the base.
 
-    Parameters
-    ----------
-    name : str
-        Its links, from the base, joined by ``+``; that of its joint where it has none.
-    base, tip : str
-        Points of its first and last joint.
-    elements : tuple
-        Joints and beams in order from the base; rigid drives and rigid links are not among them.
+    Its `name` is that of its links, joined by ``+``, or else of its joint; `base` and `tip` are the points of its first
+    and last joint. Rigid drives and links are not among its elements.
     """
 
     name: str
@@ -51,15 +45,7 @@ class Leg:
 
 
 def find_legs(edges: Sequence[Edge], bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
-    """The legs that carry a body, in the order of their links; None where they are not serial chains.
-
-    Parameters
-    ----------
-    edges : sequence of Edge
-        Those that carry.
-    links : sequence of str
-        All links, in the study's order.
-    """
+    """The legs among the edges that carry, in the order of their `links`; None where they are not serial chains."""
     found: list[tuple[int, Leg]] = []
     for piece in _pieces(edges, bodies.asked):
         ends = {end for edge in piece for end in (edge.a, edge.b)}
@@ -126,14 +112,7 @@ def hold_by_legs(
 ) -> tuple[Held, list[Springs]]:  # fmt: skip
     """Springs in a batch of assembled poses of shape (n,), and how they hold the body: rank 0 where not in closed form.
 
-    Parameters
-    ----------
-    length : float
-        What turns rotations into lengths where sizes are compared.
-    size : int
-        3 for a body's twist, 2 for the displacement of a pin.
-    condensed : bool
-        The pin is a point of one link only: the link turns freely under forces at it.
+    `length`, `size` and `condensed` are those of the `Body`.
     """
     n, body = configuration.shape[0], 3 if condensed else size
     at = configuration.point(section.at)
@@ -143,7 +122,9 @@ def hold_by_legs(
     ranks = [np.broadcast_to(joint_rank(chain.passive, length), (n,)) for chain in chains]
     springs: list[Springs] = []
     held = Held.unknown(n, body)
-    for signature, rows in _signatures(np.stack(ranks, axis=1)):
+    kinds, which = np.unique(np.stack(ranks, axis=1), axis=0, return_inverse=True)
+    for kind, signature in enumerate(kinds.tolist()):
+        rows = np.flatnonzero(which.reshape(-1) == kind)
         here = chains if len(rows) == n else [chain.take(rows) for chain in chains]
         wrenches = [
             reciprocal_wrenches(chain.passive, rank, length, len(rows))
@@ -159,14 +140,6 @@ def hold_by_legs(
                     Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + origin[rows], spring.angle)
                 )
     return _restrict(held.seen_from(at - origin), condensed), springs
-
-
-def _signatures(ranks: Ints) -> list[tuple[list[int], Ints]]:
-    """Poses in which all legs have the same ranks together."""
-    if (ranks == ranks[:1]).all():
-        return [(ranks[0].tolist(), np.arange(len(ranks)))]
-    kinds, which = np.unique(ranks, axis=0, return_inverse=True)
-    return [(kind.tolist(), np.flatnonzero(which.reshape(-1) == k)) for k, kind in enumerate(kinds)]
 
 
 def _restrict(held: Held, condensed: bool) -> Held:

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.beams import Beams, beams_of
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact
+from mechdesign.analyses.stiffness.elements import Beam, Bearing, Element, Guide, Hinge, Shift, beams_of
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
@@ -26,61 +26,11 @@ Way = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
-class Hinge:
-    """A revolute joint at a point; driven if `drive` names a drive."""
-
-    point: str
-    drive: str | None = None
-
-
-@dataclass(frozen=True)
-class Guide:
-    """A slide of the mechanism's graph (its index); driven if `drive` names a drive."""
-
-    slide: int
-    drive: str | None = None
-
-
-@dataclass(frozen=True)
-class Beam:
-    """The beams of an elastic link between the feet of two points; see `mechdesign.analyses.stiffness.beams`."""
-
-    beams: Beams
-    tail: str
-    head: str
-    section: str
-
-
-@dataclass(frozen=True)
-class Shift:
-    """A free displacement along a direction of the world: between links that only a motor holds to each other."""
-
-    direction: complex
-
-
-@dataclass(frozen=True)
-class Bearing:
-    """The give of a joint itself, so many times; across its slide, or in all directions of a pin."""
-
-    name: str
-    point: str
-    slide: int | None = None
-    give: float = 1.0
-
-
-Element = Hinge | Guide | Beam | Shift | Bearing
-
-
-@dataclass(frozen=True)
 class Edge:
     """A joint or a beam from vertex `a` to vertex `b`, its freedoms in order from `a`.
 
-    Parameters
-    ----------
-    name : str
-        Of the joint's point or slide, or of the link whose beams it goes along.
-    point : str
-        Where it is; along beams, what sits at its end.
+    Its `name` is that of the joint's point or slide, or of the link whose beams it goes along; there, `point` is what
+    sits at its end.
     """
 
     a: str
@@ -97,12 +47,10 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """Vertices, edges and loops.
+    """Vertices, of which one is asked, edges and loops.
 
     Parameters
     ----------
-    asked : str
-        The vertex whose displacement is asked.
     paths : mapping of str to ((int, int), ...)
         To each vertex, the edges on the way from the ground and whether they are gone along (1) or against (-1).
     loops : tuple of ((int, int), ...)

@@ -42,18 +42,9 @@ def screw_product(a: Floats, b: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A serial leg in n poses.
+    """A serial leg in n poses: twists, shape (3, n), of its free and its elastic joints, and compliances of the latter.
 
-    Parameters
-    ----------
-    passive : sequence of ndarray, shape (3, n)
-        Twists of the free joints.
-    elastic : sequence of ndarray, shape (3, n)
-        Twists of the elastic joints.
-    compliance : sequence of float or ndarray, shape (n,)
-        Of each elastic joint.
-    base, tip : complex ndarray, shape (n,)
-        Places of the first and last joint from the origin.
+    `base` and `tip` are the places of its first and last joint from the origin.
     """
 
     passive: Sequence[Floats]

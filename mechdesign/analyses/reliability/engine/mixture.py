@@ -13,8 +13,8 @@ import numpy as np
 from mechdesign.analyses.reliability.engine.problem import Problem
 from mechdesign.numerics.arrays import Floats
 
-# A learned density is what it would be if so many samples a dimension of the law itself had been seen too.
-PRIOR = 0.25
+# Samples of the law itself, a dimension, that a learned density counts besides those seen.
+_PRIOR_SAMPLES = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +23,8 @@ class Mixture:
 
     Parameters
     ----------
-    problem : Problem
-        Tells which variables are normal and which directions.
     weight : ndarray, shape (parts,)
-        What they lack to 1 is the weight of what is beyond.
+        The law beyond has the rest to 1.
     centre : ndarray, shape (parts, normal variables)
     root : ndarray, shape (parts, normal variables, normal variables)
         Cholesky factors of the covariances.
@@ -123,13 +121,7 @@ class Mixture:
         )  # fmt: skip
 
     def fitted(self, u: Floats, worth: Floats, least: float) -> Mixture:
-        """Parts with the moments of the points that are theirs; parts of less weight than `least` end.
-
-        Parameters
-        ----------
-        u : ndarray, shape (dimension, n)
-        worth : ndarray, shape (n,)
-        """
+        """Parts with the moments of their own points `u`, shape (dimension, n); those below a share `least` end."""
         logs = self.logs(u)
         share = np.exp(logs - logs.max(axis=0, initial=-np.inf))
         share *= worth / share.sum(axis=0)
@@ -144,7 +136,7 @@ class Mixture:
             centre = normal @ own / mass
             apart = normal - centre[:, None]
             covariance = (own * apart) @ apart.T / mass
-            prior = PRIOR * self.problem.dimension
+            prior = _PRIOR_SAMPLES * self.problem.dimension
             covariance = (effective * covariance + prior * np.eye(d)) / (effective + prior)
             weight.append(mass)
             centres.append(centre)

@@ -9,17 +9,17 @@ from importlib import import_module
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
-from mechdesign.analyses.reliability.engine.intervals import Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Precision, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, pose_by_pose
 from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 
 # Plain samples that every rung is checked with, and up to how many of them need no other method.
-PILOT, FEW = 4000, 40_000
-# So many failures tell their probability well enough to plan by.
-MANY = 30
+PILOT = 4000
+FEW = 40_000
+# Failures from which on their share is known well enough to plan by.
+_ENOUGH_FAILURES = 30
 # A step beyond plain samples: from the problem, its design points, a generator, the most samples and the precision.
 # None says nothing; an estimate without samples claims no interval, and checks those that do.
 Rung = Callable[[Problem, DesignPoints, np.random.Generator, int, Precision], Estimate | None]
@@ -99,8 +99,8 @@ def climb(
         return precision.reached(estimate.failure, estimate.low, estimate.high)
 
     def enough(estimate: Estimate) -> float:
-        # Few failures say little about how many there are; the interval's end leaves their number in doubt no longer.
-        share = estimate.failure if estimate.failures >= MANY else estimate.high
+        # Of few failures the interval's end is the safe number to plan with.
+        share = estimate.failure if estimate.failures >= _ENOUGH_FAILURES else estimate.high
         return 1.1 * precision.needed(share, share * (1.0 - share))
 
     found, used = said["monte_carlo"], "monte_carlo"
@@ -120,7 +120,7 @@ def climb(
                 if precise(tried):
                     break
         if not any(map(precise, candidates.values())):
-            found = plainly(enough(found) if found.failures >= MANY else np.inf)
+            found = plainly(enough(found) if found.failures >= _ENOUGH_FAILURES else np.inf)
         for name, tried in candidates.items():
             if precise(tried) or tried.high - tried.low < found.high - found.low:
                 found, used = tried, name

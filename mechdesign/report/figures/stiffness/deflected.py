@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
-from mechdesign.analyses.stiffness.beams import course_of
+from mechdesign.analyses.stiffness.elements import course_of
 from mechdesign.analyses.stiffness.network import Edge
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
