@@ -148,14 +148,9 @@ def derivatives(
     rates: DriveRates,
     elastic: Elastic | None = None,
 ) -> Floats:
-    """Derivative of each channel by places, drives and loads, shape (channels, names, n).
+    """Derivative of each channel by places, drives and loads, shape (channels, names, n), at a flat batch.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        A flat batch.
-    elastic : Elastic, optional
-        At these configurations, or at the single pose that all of them are about.
+    `elastic` is known at these configurations, or at the single pose that all of them are about.
 
     Raises
     ------

@@ -119,9 +119,8 @@ def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Fl
 
     Parameters
     ----------
-    normals : ndarray, shape (half-spaces, dimension)
-        Unit vectors.
-    distances : ndarray, shape (half-spaces,)
+    normals, distances : ndarray, shape (half-spaces, dimension) and (half-spaces,)
+        Unit vectors, and distances from the mean.
     broken : callable, optional
         Which points count, where not all in the half-spaces do: from points, shape (dimension, n), and the half-spaces
         that hold them, shape (half-spaces, n).
@@ -129,8 +128,7 @@ def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Fl
     Notes
     -----
     The sum of their probabilities, times the mean of one over how many of them hold a point that was drawn in one
-    [Owen, Maximov & Chertkov, Importance sampling the union of rare events, 2019]: however rare, and however they
-    depend on each other.
+    [Owen, Maximov & Chertkov, Importance sampling the union of rare events, 2019].
     """
     chances = ndtr(-distances)
     total = float(chances.sum())

@@ -134,7 +134,7 @@ class _Builder:
     def _node(self, body: str, point: str) -> str:
         """The vertex of a body at one of its points."""
         link = self.bodies.link_of(body)
-        if link not in self.section.elastic:
+        if body == GROUND or link not in self.section.elastic:
             return body
         telescopic = self.mechanism.description.links[link].telescopic
         # Of a telescopic leg the first body is rigid, and the second the cantilever, from the leg's base to its end.
@@ -144,17 +144,12 @@ class _Builder:
 
     def _vertex(self, contact: Contact, body: str) -> str:
         """The vertex of a body at a contact; what slides on an elastic link sits on its beams."""
-        link = self.bodies.link_of(body)
-        if body in (GROUND, ASKED) or link not in self.section.elastic:
-            return body
-        described = self.mechanism.description.links[link]
-        if described.telescopic and described.ends is not None:
-            if body == link:
-                return body
-            inner = contact.slide is not None and contact.other(body) == link
-            return f"{body}@{described.ends[0 if inner else 1]}"
+        link = self.mechanism.description.links.get(self.bodies.link_of(body))
+        if link is not None and link.telescopic and link.ends is not None:
+            inner = contact.slide is not None and contact.other(body) == link.name
+            return self._node(body, link.ends[0 if inner else 1])
         rides = contact.slide is not None and body == contact.a
-        return f"{body}@{self.mechanism.graph.slides[contact.slide or 0] if rides else contact.at(body)}"
+        return self._node(body, self.mechanism.graph.slides[contact.slide or 0] if rides else contact.at(body))
 
     def _beams(self, name: str) -> list[Edge]:
         """From the beginning of a link's beams to its other points and to what slides on it."""

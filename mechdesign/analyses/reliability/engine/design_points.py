@@ -261,8 +261,8 @@ def descend(
 
     Parameters
     ----------
-    limit : ndarray of int, shape (starts,)
-    u : ndarray, shape (dimension, starts)
+    limit, u : ndarray, shape (starts,) and (dimension, starts)
+        Limits, and points to start from.
     scale : ndarray, shape (limits,)
         Those of `sizes`.
     together : bool
@@ -270,10 +270,9 @@ def descend(
 
     Returns
     -------
-    u, normal : ndarray, shape (dimension, starts)
-        Points, and unit vectors into the failure.
-    good : ndarray of bool, shape (starts,)
-        Which of them came to their limit, once where several came together.
+    u, normal, good
+        Points and unit vectors into the failure, shape (dimension, starts), and which came to their limit, once where
+        several came together.
     """
     u = u.copy()
     straight = problem.straight[:, None]

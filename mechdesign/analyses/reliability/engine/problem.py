@@ -129,12 +129,10 @@ def counted(failures: int, samples: int, invalid: int, evaluations: int) -> Esti
 
 
 class Problem:
-    """Limit states, and how often they were evaluated.
+    """Limit states over `dimension` independent standard normal variables, and how often they were evaluated.
 
     Parameters
     ----------
-    dimension : int
-        Number of independent standard normal variables.
     margins : callable
         From points, shape (dimension, n), to margins, shape (limits, n). A limit is broken where its margin is
         negative; nan is a failure of its own kind (what cannot be assembled has no margins).

@@ -76,18 +76,14 @@ def climb(
     plain : callable
         Monte Carlo with so many samples all told; keeps what it has drawn before.
     rungs : mapping of str to Rung
-        The methods that are tried in this order where plain samples do not do.
+        The methods that are tried in this order where plain samples do not suffice.
     most, most_plain : int
         Samples that are drawn at most by any method, and by Monte Carlo.
 
     Returns
     -------
-    estimate : Estimate
-        Its evaluations are those of all rungs.
-    used : str
-        The method that it comes from.
-    said : dict of str to Estimate
-        What each method that was tried says.
+    estimate, used, said
+        The estimate, with the evaluations of all rungs; the method that it comes from; those of all methods tried.
     """
     said = {"monte_carlo": plain(min(PILOT, most, most_plain))}
 

@@ -84,19 +84,9 @@ def importance_sampling(
     samples: int,
     precision: Precision | None = None,
 ) -> Estimate:
-    """Probability of failure.
+    """Probability of failure; 0 with the interval [0, 1] where no failure was seen, or no design point is known.
 
-    Parameters
-    ----------
-    samples : int
-        At most so many for the value, beside those that the mixture learns from.
-    precision : Precision, optional
-        Where it ends; left out, all samples are drawn.
-
-    Returns
-    -------
-    Estimate
-        With failure 0 and the interval [0, 1] where no failure was seen, or no design point is known.
+    Besides those that the mixture learns from at most `samples` are drawn, all of them where no precision is given.
     """
     if not len(points.u):
         return Estimate(0.0, 0.0, 1.0, problem.evaluations)
