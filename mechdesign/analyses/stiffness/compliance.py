@@ -7,7 +7,7 @@ lambda = W^-1 w and the body the twist W^-T C_c lambda: no inverse of C_c is nee
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,6 +69,12 @@ def put(whole: object, rows: Ints, part: object) -> None:
     """Fill in some poses of a record of arrays."""
     for name, values in vars(part).items():
         getattr(whole, name)[rows] = values
+
+
+def poses_by(values: Ints) -> Iterator[tuple[int, Ints]]:
+    """Each of the values, of shape (n,), and the poses that have it."""
+    for value in np.unique(values).tolist():
+        yield value, np.flatnonzero(values == value)
 
 
 def moved_to(arm: Complexes) -> Floats:

@@ -20,13 +20,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to
+from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to, poses_by
 from mechdesign.analyses.stiffness.elements import bending, course_of, freedoms, looked_at_from
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import RANK, RIGID
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.study.schema.stiffness import StiffnessSection
 
 # Of states of self-stress, those with less than this share of the largest one's energy are rounding: rigid.
@@ -296,7 +296,7 @@ def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> He
     twist = np.full((n, size), np.nan)
     # Of the displacements that are not free: an orthonormal basis.
     _, axes = np.linalg.eigh(lost)
-    for count, rows in _by(freedom):
+    for count, rows in poses_by(freedom):
         basis = axes[rows][:, :, : size - count]
         inner = basis.swapaxes(1, 2) @ compliance[rows] @ basis
         values, vectors = np.linalg.eigh(inner)
@@ -317,11 +317,6 @@ def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> He
         with np.errstate(divide="ignore", invalid="ignore"):
             twist = np.where(twist[:, 2:] != 0, twist / twist[:, 2:], twist)
     return Held(stiffness / outer, compliance * outer, size - freedom, twist, statics.margin)
-
-
-def _by(values: Ints) -> Iterator[tuple[int, Ints]]:
-    for value in np.unique(values):
-        yield int(value), np.flatnonzero(values == value)
 
 
 @dataclass(frozen=True, eq=False)

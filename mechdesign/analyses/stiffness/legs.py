@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.stiffness.bodies import Bodies
-from mechdesign.analyses.stiffness.compliance import Held, by_wrenches
+from mechdesign.analyses.stiffness.compliance import Held, by_wrenches, poses_by
 from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, looked_at_from
 from mechdesign.analyses.stiffness.network import Edge
 from mechdesign.analyses.stiffness.screws import (
@@ -122,9 +122,9 @@ def hold_by_legs(
     ranks = [np.broadcast_to(joint_rank(chain.passive, length), (n,)) for chain in chains]
     springs: list[Springs] = []
     held = Held.unknown(n, body)
-    kinds, which = np.unique(np.stack(ranks, axis=1), axis=0, return_inverse=True)
-    for kind, signature in enumerate(kinds.tolist()):
-        rows = np.flatnonzero(which.reshape(-1) == kind)
+    # Ranks are at most 3: together they are one number to the base 4.
+    for _, rows in poses_by(np.array(ranks).T @ 4 ** np.arange(len(legs))):
+        signature = [int(rank[rows[0]]) for rank in ranks]
         here = chains if len(rows) == n else [chain.take(rows) for chain in chains]
         wrenches = [
             reciprocal_wrenches(chain.passive, rank, length, len(rows))
