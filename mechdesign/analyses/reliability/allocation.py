@@ -138,10 +138,10 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
             f"{len(rounds) - 1} times"
         )
     heading = f"Tolerances of {study.name}, the cheapest for a reliability of {reliability:.15g}"
-    text, beside = rewritten(study, retold(study, found, last.scales), heading)
+    text, others = rewritten(study, allocated_data(study, found, last.scales), heading)
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last, reliability)}
     notes += _ends(replace(last, model=model))
-    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **beside})
+    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **others})
 
 
 def _simulated(model: ToleranceModel, scales: Floats, method: str) -> list[Estimate]:
@@ -276,7 +276,7 @@ def _unreachable(model: ToleranceModel, allowed: Floats, asked: float) -> str:
     )
 
 
-def retold(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
+def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
     """The study's data where tolerances are as many times as wide.
 
     What a wildcard gives is written out, place by place, unless all of it stays alike.

@@ -282,7 +282,7 @@ def _unreached(found: Sequence[MethodResult], task: Task) -> list[str]:
     for each in found:
         for pose in each.rungs:
             estimate = each.estimates[pose]
-            # What no failure at all says is told elsewhere.
+            # Where no failure was seen, `_unseen` says so.
             if estimate.failures and not precision.reached(estimate.failure, estimate.low, estimate.high):
                 half = 0.5 * (estimate.high - estimate.low)
                 short[pose] = half / (WIDTH * estimate.failure) if precision.half_width is None else half

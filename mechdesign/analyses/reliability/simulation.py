@@ -12,7 +12,7 @@ from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, counted, slopes
 from mechdesign.analyses.reliability.first_order import derivatives, nominal_values
-from mechdesign.analyses.reliability.question import Question
+from mechdesign.analyses.reliability.question import ReliabilityQuestion
 from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Configuration, Mechanism
@@ -55,7 +55,7 @@ class Setting:
         Whether to follow the means and the failures, and to keep the errors of the first chunks.
     """
 
-    question: Question
+    question: ReliabilityQuestion
     pose: int
     mechanism: Mechanism
     plan: Plan

@@ -32,7 +32,7 @@ _REPLICATE_POINTS = 4_000
 # Mechanisms solved a pose, and poses, where the study does not say how many points.
 _POSE_MECHANISMS = 8_000
 _POSES = 4
-# Stream of random numbers, beside those of the methods.
+# Stream of random numbers, besides those of the methods.
 _STREAM = 3
 
 
@@ -161,7 +161,7 @@ def indices(task: Task, section: ReliabilitySection) -> dict[int, SobolIndices]:
     def work(item: tuple[Setting, int]) -> Replicate:
         setting, replicate = item
         rng = generator(task.seed, setting.pose, _STREAM, replicate)
-        return sample(_beside(setting, sources, linear), rows, len(owners), each, rng)
+        return sample(_both_models(setting, sources, linear), rows, len(owners), each, rng)
 
     found: dict[int, list[Replicate]] = {setting.pose: [] for setting in settings}
     items = [(setting, replicate) for setting in settings for replicate in range(replicates)]
@@ -197,7 +197,7 @@ def doubts(task: Task, found: Mapping[int, SobolIndices]) -> list[str]:
     return notes
 
 
-def _beside(setting: Setting, sources: Sources, linear: FirstOrder) -> Callable[[Floats], Floats]:
+def _both_models(setting: Setting, sources: Sources, linear: FirstOrder) -> Callable[[Floats], Floats]:
     slopes = linear.components[:, :, setting.pose]
     if not np.isfinite(slopes).all():
         slopes = np.zeros_like(slopes)

@@ -13,7 +13,7 @@ from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.engine.problem import Estimate, Precision
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
-from mechdesign.analyses.reliability.question import Question
+from mechdesign.analyses.reliability.question import ReliabilityQuestion
 from mechdesign.analyses.reliability.simulation import Setting, Sums
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.mechanism import Reason
@@ -48,7 +48,7 @@ class Task:
 
     study: Study
     poses: Poses
-    question: Question
+    question: ReliabilityQuestion
     sources: Sources
     reason: NDArray[np.int8]
     nominal: Floats

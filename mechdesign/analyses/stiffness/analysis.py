@@ -254,26 +254,26 @@ def _loaded(body: Body, configuration: Configuration) -> Loaded:
 def _cautions(study: Study, poses: Poses, body: Body, held: Held) -> list[str]:
     known = (held.rank > 0) | np.isfinite(held.stiffness).all(axis=(1, 2))
     links = study.mechanism.description.links
-    told = [
+    cautions = [
         f"link '{name}' has a single point, and so no beam: it is rigid, though 'elastic' names it; give it two ends"
         for name in body.section.elastic
         if len(beams_of(links[name]).corners) < 2
     ]
     loose = np.flatnonzero(known & (held.rank < body.size))
     if len(loose):
-        told.append(
+        cautions.append(
             f"{len(loose)} of {poses.count} poses are under-constrained: a twist is free (free_x, free_y, free_phi), "
             f"and the compliance is nan; the first: {pose_in_words(study, poses, int(loose[0]))}"
         )
     near = np.flatnonzero(known & (held.rank == body.size) & (held.margin < NEAR_SINGULAR))
     if len(near):
-        told.append(
+        cautions.append(
             f"{len(near)} of {poses.count} poses are nearly under-constrained (wrenches within "
             f"{held.margin[near].min():.1e} of dependence); the first: {pose_in_words(study, poses, int(near[0]))}"
         )
     for leg in body.legs or ():
         if not any(isinstance(element, Hinge | Guide) and element.drive is None for element in leg.elements):
-            told.append(
+            cautions.append(
                 f"leg '{leg.name}' has no free joint: it holds three ways at once and has no equivalent springs"
             )
-    return told
+    return cautions

@@ -14,10 +14,10 @@ import numpy as np
 from mechdesign.analyses.stiffness.bodies import Bodies
 from mechdesign.analyses.stiffness.compliance import Held, by_wrenches, poses_by
 from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, looked_at_from
-from mechdesign.analyses.stiffness.network import Edge
+from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.analyses.stiffness.screws import (
     RIGID,
-    Chain,
+    LegScrews,
     constraint_compliance,
     equivalent_springs,
     joint_rank,
@@ -44,7 +44,7 @@ class Leg:
     elements: tuple[Element, ...]
 
 
-def find_legs(edges: Sequence[Edge], bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
+def find_legs(edges: Sequence[NetworkEdge], bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
     """The legs among the edges that carry, in the order of their `links`; None where they are not serial chains."""
     found: list[tuple[int, Leg]] = []
     for piece in _pieces(edges, bodies.asked):
@@ -61,7 +61,7 @@ def find_legs(edges: Sequence[Edge], bodies: Bodies, links: Sequence[str]) -> tu
     return tuple(leg for _, leg in sorted(found, key=lambda each: each[0]))
 
 
-def _pieces(edges: Sequence[Edge], asked: str) -> Iterator[list[Edge]]:
+def _pieces(edges: Sequence[NetworkEdge], asked: str) -> Iterator[list[NetworkEdge]]:
     """Edges that hang together otherwise than through the ground or the asked body."""
     left = list(edges)
     while left:
@@ -76,7 +76,7 @@ def _pieces(edges: Sequence[Edge], asked: str) -> Iterator[list[Edge]]:
         yield piece
 
 
-def _path(piece: list[Edge], asked: str) -> list[str] | None:
+def _path(piece: list[NetworkEdge], asked: str) -> list[str] | None:
     """Vertices from the ground to the asked body, the edges put in their order; None where they are no plain path."""
     path, left = [GROUND], list(piece)
     piece.clear()
@@ -90,7 +90,7 @@ def _path(piece: list[Edge], asked: str) -> list[str] | None:
     return None if left else path
 
 
-def _elements(edges: Sequence[Edge], path: Sequence[str], bodies: Bodies) -> Iterator[Element]:
+def _elements(edges: Sequence[NetworkEdge], path: Sequence[str], bodies: Bodies) -> Iterator[Element]:
     """What gives along a path: of an elastic link its beams from the one joint to the other."""
     entry: str | None = None
     for k, (edge, vertex) in enumerate(zip(edges, path, strict=False)):
@@ -155,10 +155,10 @@ def _restrict(held: Held, condensed: bool) -> Held:
     return Held(stiffness, compliance, np.minimum(held.rank, 2), held.free[:, :2], held.margin)
 
 
-def _chain(leg: Leg, section: StiffnessSection, configuration: Configuration, at: Complexes) -> Chain:
+def _chain(leg: Leg, section: StiffnessSection, configuration: Configuration, at: Complexes) -> LegScrews:
     """A leg's joints and elastic elements in each pose, seen from places `at`."""
     found = list(freedoms(leg.elements, section, configuration, at))
-    return Chain(
+    return LegScrews(
         [twist for twist, compliance in found if compliance is None],
         [twist for twist, compliance in found if compliance is not None],
         [compliance for _, compliance in found if compliance is not None],

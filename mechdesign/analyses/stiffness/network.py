@@ -26,7 +26,7 @@ Way = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
-class Edge:
+class NetworkEdge:
     """A joint or a beam from vertex `a` to vertex `b`, its freedoms in order from `a`.
 
     Its `name` is that of the joint's point or slide, or of the link whose beams it goes along; there, `point` is what
@@ -59,7 +59,7 @@ class Network:
         Of each link, its points and the vertices that bear them.
     """
 
-    edges: tuple[Edge, ...]
+    edges: tuple[NetworkEdge, ...]
     asked: str
     paths: Mapping[str, Way]
     loops: tuple[Way, ...]
@@ -94,7 +94,7 @@ def build_network(mechanism: Mechanism, bodies: Bodies, section: StiffnessSectio
     return replace(network, paths=_with_idle(edges, network.paths))
 
 
-def carrying_edges(mechanism: Mechanism, bodies: Bodies, section: StiffnessSection) -> list[Edge]:
+def carrying_edges(mechanism: Mechanism, bodies: Bodies, section: StiffnessSection) -> list[NetworkEdge]:
     """Joints and beams that can carry a load from the asked body."""
     return _carrying(_Builder(mechanism, bodies, section).edges(), bodies.asked)
 
@@ -105,16 +105,16 @@ class _Builder:
     bodies: Bodies
     section: StiffnessSection
 
-    def edges(self) -> list[Edge]:
+    def edges(self) -> list[NetworkEdge]:
         """All joints, the motors that sit at no joint, and the ways along the beams of elastic links."""
-        found: list[Edge] = []
+        found: list[NetworkEdge] = []
         for contact in self.bodies.contacts:
             elements = tuple(_joint_elements(self.mechanism, contact, self.section))
             name = contact.point if contact.slide is None else self.mechanism.graph.slides[contact.slide]
             if contact.kind == "motor":
                 name = contact.drive or ""
             a, b = (self._vertex(contact, body) for body in (contact.a, contact.b))
-            found.append(Edge(a, b, elements, name, contact.point))
+            found.append(NetworkEdge(a, b, elements, name, contact.point))
         for name in self.section.elastic:
             found += self._beams(name)
         return found
@@ -151,7 +151,7 @@ class _Builder:
         rides = contact.slide is not None and body == contact.a
         return self._node(body, self.mechanism.graph.slides[contact.slide or 0] if rides else contact.at(body))
 
-    def _beams(self, name: str) -> list[Edge]:
+    def _beams(self, name: str) -> list[NetworkEdge]:
         """From the beginning of a link's beams to its other points and to what slides on it."""
         link = self.mechanism.description.links[name]
         beams, body = beams_of(link), rod_of(name) if link.telescopic else name
@@ -163,7 +163,7 @@ class _Builder:
         root, *_ = sitting
         section = self.section.elastic[name]
         return [
-            Edge(f"{body}@{root}", f"{body}@{seat}", (Beam(beams, root, point, section),), name, point)
+            NetworkEdge(f"{body}@{root}", f"{body}@{seat}", (Beam(beams, root, point, section),), name, point)
             for seat, point in sitting.items()
             if seat != root
         ]  # fmt: skip
@@ -187,7 +187,7 @@ def _joint_elements(mechanism: Mechanism, contact: Contact, section: StiffnessSe
     return found
 
 
-def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
+def _carrying(edges: list[NetworkEdge], asked: str) -> list[NetworkEdge]:
     """Edges that can carry a load from the asked vertex: what hangs by one edge is taken off, again and again."""
     while True:
         degree = Counter(end for edge in edges for end in (edge.a, edge.b))
@@ -197,9 +197,9 @@ def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
         edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
 
 
-def _pinned(edges: list[Edge], bodies: Bodies) -> list[Edge]:
+def _pinned(edges: list[NetworkEdge], bodies: Bodies) -> list[NetworkEdge]:
     """Massless pins turn with the first link that they join, so that no motion of theirs is open."""
-    found, seen = list[Edge](), set[str]()
+    found, seen = list[NetworkEdge](), set[str]()
     for edge in edges:
         pins = {end for end in (edge.a, edge.b) if bodies.is_pin(end) or (end == ASKED and bodies.link is None)}
         if pins - seen:
@@ -209,7 +209,7 @@ def _pinned(edges: list[Edge], bodies: Bodies) -> list[Edge]:
     return found
 
 
-def _with_idle(edges: Sequence[Edge], paths: Mapping[str, Way]) -> dict[str, Way]:
+def _with_idle(edges: Sequence[NetworkEdge], paths: Mapping[str, Way]) -> dict[str, Way]:
     """Ways to all vertices: to those that carry nothing as to what they hang on."""
     found = dict(paths)
     waiting = list(edges)
@@ -222,7 +222,7 @@ def _with_idle(edges: Sequence[Edge], paths: Mapping[str, Way]) -> dict[str, Way
     return found
 
 
-def _looped(edges: tuple[Edge, ...], asked: str, points: Mapping[str, tuple[tuple[str, str], ...]]) -> Network:
+def _looped(edges: tuple[NetworkEdge, ...], asked: str, points: Mapping[str, tuple[tuple[str, str], ...]]) -> Network:
     """A tree from the ground, as short ways as possible, and a loop for every other edge."""
     paths: dict[str, Way] = {GROUND: ()}
     queue = deque([GROUND])

@@ -19,7 +19,7 @@ _PRIOR_SAMPLES = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """Weighted parts, and beside them the law itself where normal variables are farther than `beyond` from their mean.
+    """Weighted parts, and the law itself where normal variables are farther than `beyond` from their mean.
 
     Parameters
     ----------
@@ -105,8 +105,8 @@ class Mixture:
         with np.errstate(over="ignore"):
             return np.asarray(np.exp(-most) / np.exp(logs - most).sum(axis=0))
 
-    def beside(self, other: Mixture, share: float) -> Mixture:
-        """Both, `other` with this share."""
+    def joined(self, other: Mixture, share: float) -> Mixture:
+        """Both mixtures, the other with this share."""
         return replace(
             self, weight=np.concatenate([(1 - share) * self.weight, share * other.weight]),
             centre=np.concatenate([self.centre, other.centre]), root=np.concatenate([self.root, other.root]),

@@ -100,7 +100,7 @@ class Estimate:
     Parameters
     ----------
     evaluations : int
-        Points at which margins were evaluated, all told.
+        Points at which margins were evaluated in all.
     samples : int
         Those that the value is a mean over; 0 where it is none.
     invalid : int

@@ -51,7 +51,7 @@ def run(task: Task) -> MethodResult:
             plain(min(FEW, task.most))
             return MethodResult("auto", sums={setting.pose: Sums.total(drawn)})
         rng = generator(task.seed, setting.pose, SEARCH, 2)
-        # Where nothing else helps, plain samples are as many all told.
+        # Where nothing else helps, plain samples are as many in all.
         problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
         estimate, used, said = climb(problem, task.precision, plain, steps, rng, task.most, shared)
         pose = setting.pose
@@ -74,7 +74,7 @@ def climb(
     Parameters
     ----------
     plain : callable
-        Monte Carlo with so many samples all told; keeps what it has drawn before.
+        Monte Carlo with so many samples in all; keeps what it has drawn before.
     rungs : mapping of str to Rung
         The methods that are tried in this order where plain samples do not suffice.
     most, most_plain : int

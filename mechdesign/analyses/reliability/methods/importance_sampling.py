@@ -150,7 +150,7 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
     count = max(_ROUND_LEAST, _ROUND_SAMPLES * problem.dimension)
     seen, known = [], []
     for rounds in range(1, _ROUNDS + 1):
-        mixture = parts.beside(fixed, _FIXED_SHARE)
+        mixture = parts.joined(fixed, _FIXED_SHARE)
         u = mixture.draw(rng, count)
         u = u[:, failed(problem.margins(u))]
         weights = mixture.worth(u)
@@ -166,7 +166,7 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
             break
     if worth.sum() > 0:
         parts = parts.fitted(failures, worth, _LEAST_SHARE)
-    return parts.beside(fixed, _FIXED_SHARE)
+    return parts.joined(fixed, _FIXED_SHARE)
 
 
 def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: int) -> Mixture:
@@ -188,5 +188,5 @@ def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: i
             break
         part = parts.about(u[:, worst])
         own = (1 - _PART_WEIGHT) * own + _PART_WEIGHT * np.exp(np.minimum(part.logs(u)[0], _MAX_LOG_DENSITY))
-        parts = parts.beside(part, _PART_WEIGHT)
+        parts = parts.joined(part, _PART_WEIGHT)
     return parts

@@ -48,7 +48,7 @@ def run(task: Task) -> MethodResult:
 
 
 def replicates(samples: int) -> list[int]:
-    """Points of each replicate: powers of two, about as many as asked all told."""
+    """Points of each replicate: powers of two, about as many as asked in all."""
     each = max(1, round(np.log2(max(samples / REPLICATES, 2))))
     return [2**each] * REPLICATES
 
