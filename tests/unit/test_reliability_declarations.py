@@ -12,8 +12,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints
-from mechdesign.analyses.reliability.engine.intervals import Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Precision, Problem
 from mechdesign.analyses.reliability.methods import normal
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.errors import StudyError

@@ -146,7 +146,7 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
 
 def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
     """The beams of a link, all in one line, and its brackets."""
-    from mechdesign.analyses.stiffness.beams import beams_of, course_of
+    from mechdesign.analyses.stiffness.elements import beams_of, course_of
 
     mechanism = study.mechanism
     link = mechanism.description.links[name]

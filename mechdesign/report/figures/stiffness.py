@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
-from mechdesign.analyses.stiffness.beams import course_of
-from mechdesign.analyses.stiffness.network import Edge
+from mechdesign.analyses.stiffness.elements import course_of
+from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
@@ -296,7 +296,7 @@ def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:
 
 
 def _bent(
-    ways: Sequence[Edge], configuration: Configuration, moved: Mapping[str, Floats],
+    ways: Sequence[NetworkEdge], configuration: Configuration, moved: Mapping[str, Floats],
     shift: Callable[[str, complex], Complexes],
 ) -> list[tuple[Complexes, Complexes]]:  # fmt: skip
     """The beams of an elastic link between the places where something sits, and its brackets."""
