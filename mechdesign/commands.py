@@ -7,13 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Command:
-    """One question of the command line, of the Python door and of the study file, where its section has this name.
-
-    Parameters
-    ----------
-    question, answer : str
-        What it asks, and what the answer consists of: the command's help.
-    """
+    """One question: a command, a function of the package and a section of the study file, all of its name."""
 
     name: str
     question: str

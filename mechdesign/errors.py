@@ -81,8 +81,6 @@ class AssemblyError(MechdesignError):
 class OutputError(MechdesignError):
     """Results could not be written."""
 
-    exit_code = 4
-
 
 class Interrupted(KeyboardInterrupt):
     """A long computation was interrupted; what was finished of it is a result.

@@ -19,10 +19,9 @@ from mechdesign.numerics.arrays import Floats
 
 Number = float | Floats
 
-MAX_LENGTH = 1000
-"""Longest text accepted: nothing that a person writes comes near it."""
-MAX_DEPTH = 50
-"""Deepest nesting of parentheses accepted."""
+# Longest text accepted, in characters, and its deepest nesting of parentheses.
+MAX_TEXT = 1000
+MAX_NESTING = 50
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
@@ -37,53 +36,44 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class _Function:
-    """A function of the language: on floats, on arrays, and its partial derivatives on arrays."""
+    """A function of the language and its partial derivatives, on floats and arrays."""
 
-    scalar: Callable[..., float]
-    array: Callable[..., Any]
+    value: Callable[..., Any]
     partials: Callable[..., tuple[Any, ...]]
     angles: Literal["", "takes", "gives"] = ""
 
 
-def _divide(a: float, b: float) -> float:
-    if b == 0:
-        raise ExpressionError("division by zero")
-    return a / b
-
-
 _FUNCTIONS: dict[str, _Function] = {
-    "sqrt": _Function(math.sqrt, np.sqrt, lambda x: (0.5 / np.sqrt(x),)),
-    "exp": _Function(math.exp, np.exp, lambda x: (np.exp(x),)),
-    "log": _Function(math.log, np.log, lambda x: (1.0 / np.asarray(x, dtype=float),)),
-    "abs": _Function(abs, np.abs, lambda x: (np.sign(x),)),
-    "sin": _Function(math.sin, np.sin, lambda x: (np.cos(x),), "takes"),
-    "cos": _Function(math.cos, np.cos, lambda x: (-np.sin(x),), "takes"),
-    "tan": _Function(math.tan, np.tan, lambda x: (1.0 + np.tan(x) ** 2,), "takes"),
-    "asin": _Function(math.asin, np.arcsin, lambda x: (1.0 / np.sqrt((1.0 - x) * (1.0 + x)),), "gives"),
-    "acos": _Function(math.acos, np.arccos, lambda x: (-1.0 / np.sqrt((1.0 - x) * (1.0 + x)),), "gives"),
-    "atan": _Function(math.atan, np.arctan, lambda x: (1.0 / (1.0 + np.square(x)),), "gives"),
+    "sqrt": _Function(np.sqrt, lambda x: (0.5 / np.sqrt(x),)),
+    "exp": _Function(np.exp, lambda x: (np.exp(x),)),
+    "log": _Function(np.log, lambda x: (1.0 / np.asarray(x, dtype=float),)),
+    "abs": _Function(np.abs, lambda x: (np.sign(x),)),
+    "sin": _Function(np.sin, lambda x: (np.cos(x),), "takes"),
+    "cos": _Function(np.cos, lambda x: (-np.sin(x),), "takes"),
+    "tan": _Function(np.tan, lambda x: (1.0 + np.tan(x) ** 2,), "takes"),
+    "asin": _Function(np.arcsin, lambda x: (1.0 / np.sqrt((1.0 - x) * (1.0 + x)),), "gives"),
+    "acos": _Function(np.arccos, lambda x: (-1.0 / np.sqrt((1.0 - x) * (1.0 + x)),), "gives"),
+    "atan": _Function(np.arctan, lambda x: (1.0 / (1.0 + np.square(x)),), "gives"),
     "atan2": _Function(
-        math.atan2,
         np.arctan2,
         lambda y, x: (x / (np.square(x) + np.square(y)), -y / (np.square(x) + np.square(y))),
         "gives",
     ),
-    "hypot": _Function(math.hypot, np.hypot, lambda x, y: (x / np.hypot(x, y), y / np.hypot(x, y))),
-    "min": _Function(min, np.minimum, lambda x, y: (np.where(x <= y, 1.0, 0.0), np.where(x <= y, 0.0, 1.0))),
-    "max": _Function(max, np.maximum, lambda x, y: (np.where(x >= y, 1.0, 0.0), np.where(x >= y, 0.0, 1.0))),
-    "+": _Function(lambda x, y: x + y, np.add, lambda x, y: (1.0, 1.0)),
-    "-": _Function(lambda x, y: x - y, np.subtract, lambda x, y: (1.0, -1.0)),
-    "*": _Function(lambda x, y: x * y, np.multiply, lambda x, y: (y, x)),
-    "/": _Function(_divide, np.true_divide, lambda x, y: (np.true_divide(1.0, y), -np.true_divide(x, np.square(y)))),
+    "hypot": _Function(np.hypot, lambda x, y: (x / np.hypot(x, y), y / np.hypot(x, y))),
+    "min": _Function(np.minimum, lambda x, y: (np.where(x <= y, 1.0, 0.0), np.where(x <= y, 0.0, 1.0))),
+    "max": _Function(np.maximum, lambda x, y: (np.where(x >= y, 1.0, 0.0), np.where(x >= y, 0.0, 1.0))),
+    "+": _Function(np.add, lambda x, y: (1.0, 1.0)),
+    "-": _Function(np.subtract, lambda x, y: (1.0, -1.0)),
+    "*": _Function(np.multiply, lambda x, y: (y, x)),
+    "/": _Function(np.true_divide, lambda x, y: (np.true_divide(1.0, y), -np.true_divide(x, np.square(y)))),
     "**": _Function(
-        math.pow,
         np.float_power,
         lambda x, y: (y * np.float_power(x, np.subtract(y, 1.0)), np.float_power(x, y) * np.log(x)),
     ),
-    "negate": _Function(lambda x: -x, np.negative, lambda x: (-1.0,)),
+    "negate": _Function(np.negative, lambda x: (-1.0,)),
 }
-_ARITY = {"atan2": 2, "hypot": 2}
 _BINDING = {"+": 10, "-": 10, "*": 20, "/": 20, "**": 40}
+_OF_TWO = frozenset(("atan2", "hypot", "min", "max", *_BINDING))
 _UNARY_BINDING = 30
 
 FUNCTIONS = frozenset(name for name in _FUNCTIONS if name.isalnum() and name != "negate")
@@ -96,24 +86,12 @@ _Step = tuple[Literal["constant", "name", "call"], float | str]
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed expression.
-
-    Parameters
-    ----------
-    text : str
-        As the study gives it.
-    program : tuple of steps
-        Postfix: push a constant, push a named value, or apply a function to the topmost values.
-    angle_unit : float
-        Radians in one of the units that trigonometry takes and gives.
-    names : frozenset of str
-        Variables, dotted ones (``B.x``) included.
-    """
+    """A parsed expression."""
 
     text: str
-    program: tuple[_Step, ...]
-    angle_unit: float
-    names: frozenset[str]
+    program: tuple[_Step, ...]  # postfix: push a constant or a variable's value, or apply a function to the topmost
+    angle_unit: float  # radians in one of the units that trigonometry takes and gives
+    names: frozenset[str]  # variables, dotted ones (``B.x``) included
 
     @classmethod
     def parse(cls, text: str, angle_unit: float = 1.0) -> Expression:
@@ -135,7 +113,8 @@ class Expression:
         nan or inf there.
         """
         result: Number = self._run(float, lambda name: self._variable(env, name), self._apply)
-        if type(result) is float and not math.isfinite(result) and not _has_nan(env, self.names):
+        # Where a variable is nan its own mistake has been reported.
+        if type(result) is float and not math.isfinite(result) and not any(np.isnan(env[n]).any() for n in self.names):
             raise ExpressionError(f"{self.text!r} has no finite value")
         return result
 
@@ -144,7 +123,7 @@ class Expression:
         _, partials = self._run(
             lambda value: (value, {}), lambda name: (self._variable(env, name), {name: 1.0}), self._differentiate
         )
-        return {name: _plain(value) for name, value in partials.items()}
+        return {name: np.asarray(value, dtype=float)[()] for name, value in partials.items()}
 
     def is_linear(self) -> bool:
         """Whether the derivatives are the same everywhere, as the form shows."""
@@ -184,18 +163,17 @@ class Expression:
     def _apply(self, name: str, arguments: list[Any]) -> Number:
         function = _FUNCTIONS[name]
         inner, outer = self._angle_factors(function)
+        result: Number = function.value(*(argument * inner for argument in arguments)) * outer
         if not all(type(argument) is float for argument in arguments):
-            result: Floats = function.array(*(argument * inner for argument in arguments)) * outer
             return result
-        try:
-            return float(function.scalar(*(argument * inner for argument in arguments)) * outer)
-        except ExpressionError as error:
-            raise ExpressionError(f"{error} in {self.text!r}") from None
-        except OverflowError:
-            raise ExpressionError(f"{self.text!r} is too large a number") from None
-        except ValueError:
+        if not np.isfinite(result) and not np.isnan(arguments).any():
+            if name == "/" and arguments[1] == 0:
+                raise ExpressionError(f"division by zero in {self.text!r}")
+            if np.isposinf(result):
+                raise ExpressionError(f"{self.text!r} is too large a number")
             shown = ", ".join(f"{argument:g}" for argument in arguments)
-            raise ExpressionError(f"{name}({shown}) in {self.text!r} is not a number") from None
+            raise ExpressionError(f"{name}({shown}) in {self.text!r} is not a number")
+        return float(result)
 
     def _differentiate(self, name: str, arguments: list[tuple[Any, dict[str, Any]]]) -> tuple[Any, dict[str, Any]]:
         function = _FUNCTIONS[name]
@@ -205,7 +183,7 @@ class Expression:
         for (_, seeds), partial in zip(arguments, function.partials(*values), strict=True):
             for variable, seed in seeds.items():
                 total[variable] = total.get(variable, 0.0) + seed * partial * inner * outer
-        return function.array(*values) * outer, total
+        return function.value(*values) * outer, total
 
     def _angle_factors(self, function: _Function) -> tuple[float, float]:
         inner = self.angle_unit if function.angles == "takes" else 1.0
@@ -213,21 +191,9 @@ class Expression:
         return inner, outer
 
 
-def _plain(value: Any) -> Number:
-    array = np.asarray(value, dtype=float)
-    return float(array) if array.ndim == 0 else array
-
-
 def arity(name: str) -> int:
     """Number of arguments that a function or operator takes."""
-    if name in ("min", "max") or name in _BINDING:
-        return 2
-    return _ARITY.get(name, 1)
-
-
-def _has_nan(env: Mapping[str, ArrayLike], names: frozenset[str]) -> bool:
-    """Whether the value is lost already in a variable, whose own mistake has been told."""
-    return any(bool(np.isnan(np.asarray(env[name], dtype=float)).any()) for name in names)
+    return 2 if name in _OF_TWO else 1
 
 
 class _Parser:
@@ -241,17 +207,17 @@ class _Parser:
         self.position = 0
 
     def parse(self) -> tuple[_Step, ...]:
-        if not self.tokens:
+        if len(self.tokens) == 1:
             raise ExpressionError("an empty text where a number is expected")
         self._operand_chain(0)
-        if self.position < len(self.tokens):
+        if self._peek()[0] != "end":
             raise self._unexpected()
         return tuple(self.program)
 
     @staticmethod
     def _tokenize(text: str) -> list[tuple[str, str]]:
-        if len(text) > MAX_LENGTH:
-            raise ExpressionError(f"an expression longer than {MAX_LENGTH} characters")
+        if len(text) > MAX_TEXT:
+            raise ExpressionError(f"an expression longer than {MAX_TEXT} characters")
         tokens: list[tuple[str, str]] = []
         position, end = 0, len(text.rstrip())
         while position < end:
@@ -262,10 +228,10 @@ class _Parser:
                 raise ExpressionError(f"{rest[0]!r} has no meaning in the expression {_short(text)!r}{hint}")
             tokens.append((str(match.lastgroup), match.group(str(match.lastgroup))))
             position = match.end()
-        return tokens
+        return [*tokens, ("end", "")]
 
     def _peek(self) -> tuple[str, str]:
-        return self.tokens[self.position] if self.position < len(self.tokens) else ("end", "")
+        return self.tokens[self.position]
 
     def _take(self, operator: str) -> bool:
         if self._peek() == ("operator", operator):
@@ -281,8 +247,8 @@ class _Parser:
 
     def _operand_chain(self, binding: int) -> None:
         self.depth += 1
-        if self.depth > MAX_DEPTH:
-            raise ExpressionError(f"an expression nested deeper than {MAX_DEPTH} levels")
+        if self.depth > MAX_NESTING:
+            raise ExpressionError(f"an expression nested deeper than {MAX_NESTING} levels")
         self._operand()
         while True:
             kind, token = self._peek()
@@ -341,8 +307,7 @@ class _Parser:
 
     def _close(self) -> None:
         if not self._take(")"):
-            kind, _ = self._peek()
-            if kind == "end":
+            if self._peek()[0] == "end":
                 raise ExpressionError(f"a parenthesis is not closed in the expression {_short(self.text)!r}")
             raise self._unexpected()
 

@@ -35,5 +35,5 @@ def index(name: str) -> Any:
 
 
 def needed_section(name: str) -> str | None:
-    """The section of the study that an index needs beside the workspace; None where none, or no index has the name."""
+    """The section of the study that an index needs besides the workspace; None where none, or no index has the name."""
     return (index(name).section or None) if name in INDEX_NAMES else None

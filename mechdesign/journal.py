@@ -22,12 +22,13 @@ from mechdesign.files import replace
 from mechdesign.numerics.arrays import Floats
 
 NAME = "unfinished.npz"
-# Seconds between two versions of the file, and how much longer than its writing they are apart at least.
-_INTERVAL, _SHARE = 30.0, 20.0
+# Seconds between two versions of the file, and how many times as long as its writing took they are at least.
+_INTERVAL = 30.0
+_MIN_RATIO = 20.0
 
 
 def digest(columns: Sequence[Floats]) -> bytes:
-    """What a batch is known by: its designs, bit by bit."""
+    """The key of a batch: a digest of its designs, bit by bit."""
     found = hashlib.blake2b(digest_size=16)
     for column in columns:
         found.update(np.ascontiguousarray(column).tobytes())
@@ -35,16 +36,10 @@ def digest(columns: Sequence[Floats]) -> bytes:
 
 
 class Journal:
-    """Finished batches in a file.
+    """Finished batches in a file, written whole or not at all by `save` and every half minute.
 
-    Parameters
-    ----------
-    path : Path
-        The file; written whole or not at all, by `save` and every half minute.
-    origin : mapping
-        What decides the results: study, overrides, seed, versions. A file of another origin is not used.
-    resume : bool
-        Whether to use what the file holds; `usable` tells whether there is any.
+    `origin` is what decides the results: study, overrides, seed, versions. To resume, a file of the same origin is
+    used; `usable` says whether there is one.
     """
 
     def __init__(self, path: Path, origin: Mapping[str, Any], *, resume: bool = False) -> None:
@@ -115,7 +110,7 @@ class Journal:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         replace(self.path, [stream.getvalue()])
         self._written = time.monotonic()
-        self._patience = max(_INTERVAL, _SHARE * (self._written - begun))
+        self._patience = max(_INTERVAL, _MIN_RATIO * (self._written - begun))
 
     def discard(self) -> None:
         """Remove the file: the computation is finished, or begins anew."""

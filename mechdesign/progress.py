@@ -1,10 +1,10 @@
-"""Progress of a long computation, told to whoever wants to know."""
+"""Progress of a long computation, as numerics report it."""
 
 from __future__ import annotations
 
 
 class Progress:
-    """Receives how far a computation is; numerics call it and never ask who listens. This one listens to nothing."""
+    """Receives how far a computation is; this one ignores it."""
 
     def start(self, total: int, what: str) -> None:
         """Begin a stage of `total` steps named `what`; ends the stage before it."""

@@ -12,24 +12,12 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One column of a table.
+    """One column of a table."""
 
-    Parameters
-    ----------
-    name : str
-        Header in the CSV file, fixed by the study format.
-    values : ndarray, shape (rows,)
-        Floats, integers, booleans (written as 1 and 0) or strings.
-    unit : str
-        Unit as the study declares it; empty for pure numbers and text.
-    meaning : str
-        One line for the manifest.
-    """
-
-    name: str
-    values: NDArray[Any]
-    unit: str = ""
-    meaning: str = ""
+    name: str  # header in the CSV file, fixed by the study format
+    values: NDArray[Any]  # floats, integers, booleans (written as 1 and 0) or strings, one a row
+    unit: str = ""  # as the study declares it; empty for pure numbers and text
+    meaning: str = ""  # one line for the manifest
 
     @property
     def numeric(self) -> bool:
@@ -72,6 +60,13 @@ class Table:
     def __len__(self) -> int:
         return len(self.columns[0].values) if self.columns else 0
 
+    def where(self, **values: object) -> NDArray[np.bool_]:
+        """Which rows have these values in columns of these names, as a mask."""
+        found = np.ones(len(self), dtype=bool)
+        for name, value in values.items():
+            found &= self[name] == value
+        return found
+
     def take(self, rows: NDArray[Any]) -> Table:
         """The table of some rows, by a mask or by their numbers."""
         columns = tuple(replace(column, values=np.asarray(column.values)[rows]) for column in self.columns)
@@ -91,36 +86,16 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Answer of one command.
+    """Answer of one command."""
 
-    Parameters
-    ----------
-    command : str
-        Its name in `mechdesign.commands.COMMANDS`.
-    tables : mapping of str to Table
-        Named as their files; the first is the main table.
-    warnings : sequence of str
-        What the user must know: poses that failed, near singularities, shared parameters.
-    counts : mapping of str to int
-        Poses, samples, designs, and how many of them were invalid.
-    failed : str
-        Message where a pose that a person asked for could not be assembled (exit code 3); tables are whole.
-    files : mapping of str to str
-        Texts to be written beside the tables, by the names of their files.
-    interrupted : str
-        How far it came, where it is the finished part of an interrupted computation.
-    drawn : mapping of str to object
-        What pictures show beside the tables: solved poses, springs; by names that the command's pictures know.
-    """
-
-    command: str
-    tables: Mapping[str, Table]
-    warnings: Sequence[str] = ()
-    counts: Mapping[str, int] = field(default_factory=dict)
-    failed: str = ""
-    files: Mapping[str, str] = field(default_factory=dict)
-    interrupted: str = ""
-    drawn: Mapping[str, Any] = field(default_factory=dict)
+    command: str  # its name in `mechdesign.commands.COMMANDS`
+    tables: Mapping[str, Table]  # named as their files; the first is the main table
+    warnings: Sequence[str] = ()  # what the user must know: poses that failed, near singularities, shared parameters
+    counts: Mapping[str, int] = field(default_factory=dict)  # poses, samples, designs; how many of them were invalid
+    failed: str = ""  # why a pose that a person asked for could not be assembled (exit code 3); tables are whole
+    files: Mapping[str, str] = field(default_factory=dict)  # texts to be written with the tables, by their file names
+    interrupted: str = ""  # how far it came, where it is the finished part of an interrupted computation
+    drawn: Mapping[str, Any] = field(default_factory=dict)  # what pictures show besides: solved poses, springs; by name
 
     @property
     def main(self) -> Table:

@@ -27,23 +27,13 @@ class UnknownColumnError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """A column and the rows of its table that count.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (rows,)
-        All rows; absolute values where these are judged.
-    counts : ndarray of bool, shape (rows,)
-        Which of them count.
-    missing : str
-        Where none counts because the table never has what was asked for: what it has instead.
-    """
+    """A column and the rows of its table that count."""
 
     table: Table
     column: str
-    values: Floats
-    counts: Flags
-    missing: str = ""
+    values: Floats  # all rows; absolute values where these are judged
+    counts: Flags  # which rows count
+    missing: str = ""  # where none counts because the table never has what was asked for: what it has instead
 
 
 def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:
@@ -86,7 +76,7 @@ def _one_unit(table: Table, column: str, counts: Flags) -> None:
         return
     named = [each for each in table.columns if not each.numeric and each.name != "unit"]
     pairs = {each.name: dict.fromkeys(zip(each.values[counts].tolist(), units.tolist(), strict=True)) for each in named}
-    # The words that tell the rows of one unit from those of another.
+    # The column of words that distinguishes the rows of one unit from those of another.
     telling = [name for name, found in pairs.items() if len({word for word, _ in found}) == len(found)]
     words = telling[0] if telling else named[0].name
     rows = [f"{word} ({unit or 'no unit'})" for word, unit in pairs[words]]

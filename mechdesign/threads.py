@@ -37,7 +37,6 @@ def one_thread() -> Iterator[None]:
 
 
 def _limit() -> None:
-    # Here, for a command's help needs neither.
     from threadpoolctl import threadpool_limits
 
     _outside.callback(_restore, {name: os.environ.get(name) for name in _VARIABLES})

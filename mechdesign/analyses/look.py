@@ -11,7 +11,8 @@ from mechdesign.study import Study
 from mechdesign.study.schema.reliability import Precision
 
 # Enough designs that one of them may well be feasible.
-DESIGNS, SAMPLES = 10, 2
+DESIGNS = 10
+SAMPLES = 2
 LOOSE = Precision.model_construct(relative=100.0, half_width=None)
 # Commands whose answer costs much more than a look at it.
 LONG = ("optimize", "reliability")

@@ -1,10 +1,10 @@
-"""The poses of a question, solved, and angles without jumps along their motion, however coarse its steps are."""
+"""The poses of a question, solved, with angles that do not jump along their motion, and those that a picture shows."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value, wrap
+from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
+from mechdesign.mechanism.mechanism import drawn
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.variant import drawn
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.parallel import map_chunks
 from mechdesign.results import Column
@@ -26,32 +27,26 @@ from mechdesign.study.poses import PoseGroup, Poses, default, expand
 from mechdesign.study.schema.poses import PoseSection
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
-CHUNK = 65536
+POSES_AT_ONCE = 65536
 # An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
 ON_THE_CUT = 1e-9
 # What an angle may turn between neighbouring poses so that the way round is certain.
-SURE = np.pi / 2
+SURE_TURN = np.pi / 2
 # What is given moves at most this far between poses before any angle is looked at: an angle, and a length as a part of
 # the mechanism's size. A link could turn nearly round within one longer step and seem to stand still.
-STEP = np.pi / 4
-PART = 0.25
+MAX_TURN_STEP = np.pi / 4
+MAX_LENGTH_STEP = 0.25
 # Poses between two of the motion, at most: more than these only a jump needs, and it has no way round.
-MOST = 4096
+MAX_PARTS = 4096
+# Poses of a motion that a picture can show.
+MAX_SHOWN_POSES = 2001
 # Solves poses with given values near rows of a study's, both of one shape.
 Solve = Callable[[Sequence[Floats], Ints], Configuration]
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedPoses:
-    """Poses that give the same coordinates, solved for the nominal dimensions.
-
-    Parameters
-    ----------
-    rows : ndarray of int
-        Place of each pose in the study's order.
-    given : tuple of str
-        The coordinates given.
-    """
+    """Poses that give the same coordinates, solved: their rows in the study's order, and the names given."""
 
     rows: Ints
     given: tuple[str, ...]
@@ -95,7 +90,7 @@ def in_study_units(study: Study, coordinate: Coordinate, value: Value) -> Value:
 def solve_poses(
     study: Study, poses: Poses, wanted: Sequence[Coordinate] = (), jobs: int | None = 1
 ) -> Iterator[SolvedPoses]:  # fmt: skip
-    """Solve each group of poses with the plan of its coordinates, at most `CHUNK` poses at a time.
+    """Solve each group of poses with the plan of its coordinates, at most `POSES_AT_ONCE` poses at a time.
 
     What a pose gives keeps its turns. Drives that are found lie within their limits. Where the poses are those of a
     motion or a grid, the other angles of the wanted coordinates and of the study's limits, in expressions too, are
@@ -119,7 +114,7 @@ def _solve_group(
     coordinates = plan.structure.given
     given = [np.asarray(radians(study, c, v), dtype=float) for c, v in zip(coordinates, group.columns(), strict=True)]
     solve = partial(_solve, mechanism, plan, poses)
-    pieces = [slice(begin, begin + CHUNK) for begin in range(0, len(group.rows), CHUNK)]
+    pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
 
     def at(piece: slice) -> Configuration:
         return solve([v[piece] for v in given], group.rows[piece])
@@ -136,8 +131,8 @@ def _solve_group(
         near = {angle.name: row for angle, row in zip(angles, values, strict=True)}
         near |= {name: _begun(study, poses, name, near[name]) for name in mechanism.drives if name in near}
     for piece, configuration in zip(pieces, only or map_chunks(at, pieces, jobs), strict=True):
-        told = {**configuration.near, **{name: values[piece] for name, values in near.items()}}
-        configuration = replace(configuration, near=told, counted=configuration.counted | near.keys())
+        followed = {**configuration.near, **{name: values[piece] for name, values in near.items()}}
+        configuration = replace(configuration, near=followed, counted=configuration.counted | near.keys())
         plan.judge(configuration)
         yield SolvedPoses(group.rows[piece], group.names, configuration)
 
@@ -149,7 +144,7 @@ def _solve(mechanism: Mechanism, plan: Plan, poses: Poses, given: Sequence[Float
 
 
 def _followed(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) -> list[Coordinate]:
-    """Angles whose turns only the motion tells: not those given, nor drives whose limits leave them one turn."""
+    """Angles whose turns only the motion gives: not those given, nor drives whose limits leave them one turn."""
     settled = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
     settled -= {coordinate.name for coordinate in mechanism.counting}
     found = angles_of([*wanted, *mechanism.counting])
@@ -224,13 +219,13 @@ def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tupl
     return [f"{told}; the first: {named[0]}"], ""
 
 
-def pose_in_words(study: Study, poses: Poses, row: int) -> str:
+def pose_in_words(study: Study, poses: Poses, row: int, digits: int = 6) -> str:
     """``theta1 = 30 deg, theta2 = 60 deg`` for the pose of a row."""
     parts = []
     for name, values in poses.values.items():
         if np.isfinite(values[row]):
             unit = study.units.label(study.mechanism.quantity(name))
-            parts.append(f"{name} = {values[row]:g} {unit}".rstrip())
+            parts.append(f"{name} = {values[row] + 0.0:.{digits}g} {unit}".rstrip())
     return ", ".join(parts)
 
 
@@ -272,11 +267,13 @@ def continuous(
     seen = values if len(known) == values.shape[1] else values[:, known]
     starts = known // line != np.append(-1, known[:-1]) // line
     rises = np.diff(seen, axis=1)
-    far = ~starts[1:] & (np.abs(rises) >= SURE).any(axis=0)
+    far = ~starts[1:] & (np.abs(rises) >= SURE_TURN).any(axis=0)
     parts = _parts(plan, given, known)
     at = np.flatnonzero(far | (parts > 1) & ~starts[1:])
     moved = wrap(rises[:, at])
-    coarse = np.flatnonzero((known[at + 1] == known[at] + 1) & ((parts[at] > 1) | (np.abs(moved) >= SURE).any(axis=0)))
+    coarse = np.flatnonzero(
+        (known[at + 1] == known[at] + 1) & ((parts[at] > 1) | (np.abs(moved) >= SURE_TURN).any(axis=0))
+    )
     if len(coarse):
         begins = known[at[coarse]]
         moved[:, coarse] = _on_the_way(angles, given, begins, begins + 1, parts[at[coarse]], solve)
@@ -299,14 +296,14 @@ def _parts(plan: Plan, given: Sequence[Floats], known: Ints) -> Ints:
     """In how many parts (a power of two) each step is made, so that what is given moves little in each."""
     longest = np.ones(len(known) - 1)
     for coordinate, values in zip(plan.structure.given, given, strict=True):
-        step = {"angle": STEP, "length": PART * plan.core.size}.get(coordinate.quantity)
+        step = {"angle": MAX_TURN_STEP, "length": MAX_LENGTH_STEP * plan.core.size}.get(coordinate.quantity)
         if step:
             longest = np.maximum(longest, np.abs(np.diff(values[known])) / step)
     parts = np.ones(len(longest), dtype=np.intp)
     # A step that is just one part must not become two by rounding.
     long = np.flatnonzero(longest > 1 + 1e-9)
     powers = np.ceil(np.log2(longest[long]) - 1e-9)
-    parts[long] = 2 ** np.clip(powers, 0, math.log2(MOST)).astype(np.intp)
+    parts[long] = 2 ** np.clip(powers, 0, math.log2(MAX_PARTS)).astype(np.intp)
     return parts
 
 
@@ -322,18 +319,18 @@ def _on_the_way(
         count = int(number[pending].min())
         at = pending[number[pending] == count]
         left = [pending[number[pending] > count]]
-        for first in range(0, len(at), max(1, CHUNK // (count + 1))):
-            pairs = at[first : first + max(1, CHUNK // (count + 1))]
+        for first in range(0, len(at), max(1, POSES_AT_ONCE // (count + 1))):
+            pairs = at[first : first + max(1, POSES_AT_ONCE // (count + 1))]
             way = np.linspace(0.0, 1.0, count + 1)
             between = [v[begins[pairs], None] * (1 - way) + v[ends[pairs], None] * way for v in given]
             configuration = solve(between, begins[pairs, None])
             turned = np.stack([np.broadcast_to(configuration.value(c), configuration.shape) for c in angles])
             steps = wrap(np.diff(turned, axis=-1))
             closed = np.isfinite(steps).all(axis=(0, 2))
-            sure = (np.abs(steps) < SURE).all(axis=(0, 2))
+            sure = (np.abs(steps) < SURE_TURN).all(axis=(0, 2))
             straight = wrap(turned[..., -1] - turned[..., 0])
             found[:, pairs] = np.where(closed, steps.sum(axis=-1), straight)
-            finer = pairs[closed & ~sure & (count < MOST)]
+            finer = pairs[closed & ~sure & (count < MAX_PARTS)]
             number[finer] = 2 * count
             left.append(finer)
         pending = np.concatenate(left)
@@ -349,3 +346,59 @@ def _across(values: Floats, grid: Sequence[int]) -> Floats:
                 jump = (block - before)[np.isfinite(block - before)][:1]
                 block -= TURN * np.round(jump / TURN).sum()
     return values
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """Poses of a study's kinematics in their order: those that give the same coordinates as the first.
+
+    `rows` are those of the study's poses: all of them, or evenly spread where there are more than can be shown.
+    """
+
+    study: Study
+    poses: Poses
+    rows: Ints
+    configuration: Configuration
+
+
+@dataclass(eq=False)
+class Keeper:
+    """Keeps what pictures show of the poses that an analysis solves, chunk by chunk."""
+
+    study: Study
+    poses: Poses
+    _parts: list[Configuration] = field(default_factory=list)
+
+    def keep(self, solved: SolvedPoses) -> None:
+        """Take over the shown ones of some solved poses."""
+        index = np.flatnonzero(np.isin(solved.rows, _rows(self.poses, MAX_SHOWN_POSES)))
+        if len(index):
+            self._parts.append(solved.configuration.take(index))
+
+    @property
+    def shown(self) -> Shown:
+        """All that was kept."""
+        rows, whole = _rows(self.poses, MAX_SHOWN_POSES), self._parts[0]
+        if len(self._parts) > 1:
+            whole = joined(self._parts, rows.shape, whole.take(0).vectors, {})
+        return Shown(self.study, self.poses, rows, whole)
+
+
+def solve_shown(study: Study, most: int = MAX_SHOWN_POSES) -> Shown:
+    """Solve what a picture shows of a motion that no analysis was asked for.
+
+    Raises
+    ------
+    MechdesignError
+        Where the coordinates given do not determine the mechanism.
+    """
+    poses = study_poses(study, "kinematics")
+    rows, names = _rows(poses, most), poses.groups[0].names
+    plan = study.mechanism.plan(names)
+    given = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]
+    return Shown(study, poses, rows, plan.solve(given))
+
+
+def _rows(poses: Poses, most: int) -> Ints:
+    rows = poses.groups[0].rows
+    return rows[np.unique(np.linspace(0, len(rows) - 1, most).round().astype(np.intp))]

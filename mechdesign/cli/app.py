@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from inspect import Parameter, Signature
@@ -11,10 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
-from mechdesign.cli import batch
 from mechdesign.cli import options as given
-from mechdesign.cli.execution import BUILT_IN, ask
-from mechdesign.cli.options import Options
+from mechdesign.cli.options import BUILT_IN, Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Interrupted, explain
 
@@ -65,11 +63,15 @@ def _start(
     """Options before the command."""
 
 
-def _add(name: str, run: Callable[[Any, Options], int], takes: Sequence[Parameter], short: str, told: str) -> None:
-    """Add a command: what it runs with its study or studies and its options, these, and its help."""
+def _add(name: str, takes: Sequence[Parameter], short: str, told: str) -> None:
+    """Add a command: its arguments and options, and its help; what it runs is imported when it is called."""
 
     def command(**said: Any) -> None:
         with _guard():
+            from mechdesign.cli import batch
+            from mechdesign.cli.execution import ask
+
+            run = {"run": batch.run, "check": batch.check}.get(name) or partial(ask, name)
             raise typer.Exit(run(said.pop("study"), Options(**said)))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
@@ -78,10 +80,9 @@ def _add(name: str, run: Callable[[Any, Options], int], takes: Sequence[Paramete
 
 for _name, _asked in COMMANDS.items():
     _takes = (*given.COMMON, *given.OWN.get(_name, ()))
-    _add(_name, partial(ask, _name), _takes, _asked.question, f"{_asked.question} {_asked.answer}")
+    _add(_name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
 _add(
     "run",
-    batch.run,
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.ANIMATE, given.JUNIT, given.FAIL_FAST, given.RESUME,
     ),
@@ -90,7 +91,6 @@ _add(
 )  # fmt: skip
 _add(
     "check",
-    batch.check,
     (given.STUDIES, given.OUT_DRAWINGS, given.OVERRIDES, given.QUIET, given.NO_PLOTS),
     "Validate only: joints, mobility, plan of solution.",
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",

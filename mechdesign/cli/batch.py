@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import Outcome, answer, claim, folder, load_study, tell
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Interrupted, StudyError, explain
+from mechdesign.mechanism.describe import describe
+from mechdesign.report.requirements import command_of, foresee
+from mechdesign.report.writer import write_file, write_sketch
+from mechdesign.results import Column, Table
+from mechdesign.study import Study
+from mechdesign.study.schema.reliability import in_words
 from mechdesign.threads import one_thread
-
-if TYPE_CHECKING:
-    from mechdesign.results import Table
-    from mechdesign.study import Study
 
 _OUTCOMES = {
     0: "done",
@@ -29,8 +33,6 @@ _OUTCOMES = {
 
 def questions(study: Study) -> tuple[str, ...]:
     """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing."""
-    from mechdesign.report.requirements import command_of
-
     judged = {command_of(requirement) for requirement in study.requirements}
     asked = [command for command in COMMANDS if command in study.questions or command in judged]
     return tuple(asked) or ("kinematics",)
@@ -41,7 +43,7 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
     """Answer every question of the studies; returns the exit code, the highest of them all.
 
     A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
-    summary and the JUnit file then tell what was finished.
+    summary and the JUnit file then show what was finished.
     """
     answers: list[Outcome] = []
     try:
@@ -54,20 +56,13 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
         answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
     terminal.show(_summary(answers), as_json=options.json)
     if options.junit is not None:
-        from mechdesign.cli.junit import to_xml
-        from mechdesign.report.writer import write_file
-
-        write_file(options.junit, to_xml(answers).encode())
+        write_file(options.junit, _junit(answers).encode())
     return max(given.exit_code for given in answers)
 
 
 @one_thread()
 def check(paths: Sequence[Path] | None, options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
-    from mechdesign.mechanism.describe import describe
-    from mechdesign.report.requirements import foresee
-    from mechdesign.study.schema.reliability import in_words
-
     worst = 0
     owners: dict[str, Path | None] = {}
     asked: Sequence[Path | None] = paths or [None]
@@ -82,8 +77,6 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 terminal.say(f"warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS)
             if not options.no_plots:
-                from mechdesign.report.writer import write_sketch
-
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
                 terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
@@ -128,10 +121,6 @@ def _failure(label: str, command: str, directory: Path, error: Exception) -> Out
 
 
 def _summary(answers: Sequence[Outcome]) -> Table:
-    import numpy as np
-
-    from mechdesign.results import Column, Table
-
     def met(given: Outcome) -> str:
         return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
 
@@ -150,3 +139,33 @@ def _summary(answers: Sequence[Outcome]) -> Table:
         for name, (kind, tell_of) in told.items()
     )
     return Table("summary", tuple(columns), meaning="what became of each question")
+
+
+def _junit(answers: Sequence[Outcome]) -> str:
+    """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
+
+    A requirement that is not met is a failure; whatever kept a command from its result is an error.
+    """
+    from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
+
+    report = JUnitXml("mechdesign")
+    for study, group in groupby(answers, key=lambda given: given.study):
+        suite, name = TestSuite(study or "mechdesign"), f"mechdesign.{study}".rstrip(".")
+        for given in group:
+            case = TestCase(given.command or "run", classname=name, time=round(given.seconds, 3))
+            if given.exit_code > 1:
+                words = given.failed.splitlines()[0] if given.failed else "failed"
+                error = Error(words, type_=f"exit code {given.exit_code}")
+                error.text = given.failed
+                case.result = [error]
+            suite.add_testcase(case)
+            for verdict in given.verdicts:
+                case = TestCase(f"{given.command}: {verdict.requirement}", classname=name, time=0)
+                if not verdict.met:
+                    case.result = [Failure(str(verdict), type_="requirement")]
+                suite.add_testcase(case)
+        report.add_testsuite(suite)
+    report.update_statistics()  # type: ignore[no-untyped-call]
+    text = report.tostring()  # type: ignore[no-untyped-call]
+    body = text.decode() if isinstance(text, bytes) else str(text)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'

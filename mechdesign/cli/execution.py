@@ -6,34 +6,26 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mechdesign
+from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
-from mechdesign.cli.options import Options
+from mechdesign.cli.options import BUILT_IN, Options
 from mechdesign.errors import Interrupted, StudyError
+from mechdesign.journal import NAME, Journal
+from mechdesign.report import manifest, requirements, writer
+from mechdesign.report.manifest import Extras
+from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.tables import from_csv
+from mechdesign.results import Result, Table
+from mechdesign.study import Study, load, template_path
 from mechdesign.threads import one_thread
-
-if TYPE_CHECKING:
-    from mechdesign.journal import Journal
-    from mechdesign.report.manifest import Extras
-    from mechdesign.report.requirements import Verdict
-    from mechdesign.results import Result, Table
-    from mechdesign.study import Study
-
-BUILT_IN = "two_link_arm"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one command gave.
-
-    Parameters
-    ----------
-    exit_code : int
-        0, 1 (a requirement is not met) or 3 (a pose that was asked for cannot be assembled).
-    rows : int
-        Rows of the main table.
-    """
+    """The outcome of one command; `rows` are those of the main table."""
 
     study: str
     command: str
@@ -56,8 +48,6 @@ def load_study(path: Path | None, options: Options) -> Study:
     StudyError
         Every mistake of the study or the overrides.
     """
-    from mechdesign.study import load, template_path
-
     if path is None:
         here = Path("study.yaml")
         path = here if here.exists() else template_path(BUILT_IN)
@@ -94,10 +84,6 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     MechdesignError
         Whatever the analysis, the requirements or the files run into.
     """
-    import mechdesign
-    from mechdesign.analyses.look import LONG
-    from mechdesign.report import manifest, requirements, writer
-
     begun = time.perf_counter()
     writer.check_writable(directory)
     asked = manifest.Extras(not options.no_plots, options.animate and command == "kinematics", options.all_modes)
@@ -136,9 +122,6 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
 
 def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
     """The answer that an earlier run left whole in the directory, if this run would give the same."""
-    from mechdesign.report import manifest
-    from mechdesign.report.requirements import Verdict, command_of
-
     content = manifest.is_current(directory, study, command, asked)
     if content is None:
         return None
@@ -156,14 +139,12 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
 
 
 def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
+    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met."""
     return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
 
 
 def _main_table(directory: Path) -> Table:
     """The main table of the results that are in a folder."""
-    from mechdesign.report import manifest
-    from mechdesign.report.tables import from_csv
-
     content = manifest.read(directory)
     assert content is not None
     file, about = next(iter(content["tables"].items()))
@@ -175,9 +156,6 @@ def _judged_and_written(
     directory: Path, study: Study, result: Result, asked: Extras
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
-    from mechdesign.analyses.look import LONG
-    from mechdesign.report import requirements, writer
-
     try:
         verdicts = requirements.judge(
             result, study.requirements, problem=study.problem, freedom=study.mechanism.mobility
@@ -192,9 +170,6 @@ def _judged_and_written(
 
 def _journal(study: Study, directory: Path, options: Options) -> Journal:
     """Where finished designs are kept, with those of an earlier run if this one is to go on from there."""
-    from mechdesign.journal import NAME, Journal
-    from mechdesign.report import manifest
-
     journal = Journal(directory / NAME, manifest.computed_from(study, "optimize"), resume=options.resume)
     if options.resume and not journal.usable:
         there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"

@@ -11,6 +11,8 @@ import typer
 
 from mechdesign.errors import StudyError
 
+# Template of the study that is taken where there is none.
+BUILT_IN = "two_link_arm"
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
@@ -82,12 +84,7 @@ OWN = {"kinematics": (ANIMATE, ALL_MODES), "optimize": (RESUME_DESIGNS,)}
 
 @dataclass(frozen=True)
 class Options:
-    """What the options of a command say.
-
-    Parameters
-    ----------
-    out : Path or None
-        Folder for the results; None is ``results/<study>/<command>``.
+    """Values of the options of a command.
 
     Raises
     ------

@@ -9,12 +9,12 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from mechdesign.progress import Progress
+from mechdesign.report.tables import cells, to_csv, to_json
+from mechdesign.results import Table
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Shown
     from rich.progress import TaskID
-
-    from mechdesign.results import Table
 
 _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
@@ -38,15 +38,7 @@ def emit(text: str) -> None:
 
 
 def show(table: Table, *, as_json: bool, rest: str = "") -> None:
-    """A table to stdout: JSON if asked, else for people on a terminal and CSV in a pipe.
-
-    Parameters
-    ----------
-    rest : str
-        Where the rows and columns are that a terminal has no room for.
-    """
-    from mechdesign.report.tables import to_csv, to_json
-
+    """A table to stdout: JSON if asked, else CSV in a pipe; on a terminal what fits, and where the `rest` is."""
     if as_json:
         emit(to_json(table))
     elif sys.stdout.isatty():
@@ -59,8 +51,6 @@ def _show_to_people(table: Table, rest: str) -> None:
     from rich.console import Console
     from rich.table import Table as Grid
     from rich.text import Text
-
-    from mechdesign.report.tables import cells
 
     console = Console()
     columns = [column[:_ROWS] for column in cells(table, _DIGITS)]
@@ -110,10 +100,8 @@ class Bar(Progress):
     def start(self, total: int, what: str) -> None:
         """Begin a stage."""
         self._total, self._done, self._what = total, 0, what
-        if self._bar is not None:
-            if self._task is not None:
-                self._bar.remove_task(self._task)
-            self._task = self._bar.add_task(what, total=total)
+        if self._bar is not None and self._task is not None:
+            self._bar.reset(self._task, total=total, description=what)
 
     def update(self, n: int) -> None:
         """`n` more steps are done."""

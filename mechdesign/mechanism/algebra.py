@@ -1,4 +1,4 @@
-"""Plane vectors as complex numbers: the few products that the kernels share."""
+"""Plane vectors as complex numbers: products, rotations and angles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Value = Any
 
 TURN = 2 * np.pi
 
-# Decorator: what is not a number at a singularity or in a pose that fails is told by its value, not by warnings.
+# Decorator: at a singularity or in a pose that fails the value is nan or infinite, without NumPy's warnings.
 quiet = np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
 
@@ -80,7 +80,7 @@ def angle_of(z: Value) -> Floats:
 
 def wrap(angle: Value) -> Value:
     """Angle brought into (-pi, pi]."""
-    return np.pi - np.mod(np.pi - angle, 2 * np.pi)
+    return np.pi - np.mod(np.pi - angle, TURN)
 
 
 def nearest(angle: Value, near: Value) -> Value:

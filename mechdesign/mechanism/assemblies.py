@@ -14,29 +14,22 @@ from mechdesign.mechanism.algebra import Value, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.sketch import deciding_joints
+from mechdesign.mechanism.sketch import SKETCH, deciding_joints
 
-# Bound of the assemblies that are listed and followed.
-MOST = 256
-# Starts of Newton's method from which the assemblies of a group without a closed form are found, and its steps.
-STARTS = 512
-STEPS = 40
+# Assemblies that are listed and followed at most.
+MAX_ASSEMBLIES = 256
+# The assemblies of a group without a closed form are found by Newton's method from so many starts, in so many steps.
+SEARCH_STARTS = 512
+SEARCH_STEPS = 40
 # Solutions nearer than this (radians, or parts of the mechanism's size) are the same.
-SAME = 1e-6
+SAME_ASSEMBLY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """One assembly mode.
+    """One assembly mode: a mechanism whose plan keeps it, and whether it is the sketch's.
 
-    Parameters
-    ----------
-    label : str
-        The joint that decides of each group with its mode, ``B+ F-``; a number for groups without a closed form.
-    mechanism : Mechanism
-        The same mechanism, whose plan for the given coordinates keeps this assembly.
-    drawn : bool
-        Whether it is the sketch's.
+    The label names the deciding joint of each group and its side (``B+ F-``); others are numbered.
     """
 
     label: str
@@ -58,8 +51,10 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
     """
     plan = mechanism.plan(given)
     choosing = [index for index, mode in enumerate(plan.modes) if mode]
-    if 2 ** len(choosing) > MOST:
-        raise MechanismError(f"{len(choosing)} joints choose the assembly: more than {MOST} modes", "mechanism.sketch")
+    if 2 ** len(choosing) > MAX_ASSEMBLIES:
+        raise MechanismError(
+            f"{len(choosing)} joints choose the assembly: more than {MAX_ASSEMBLIES} modes", "mechanism.sketch"
+        )
     found: list[Assembly] = []
     for signs in product((1, -1), repeat=len(choosing)):
         modes = list(plan.modes)
@@ -76,8 +71,8 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
         for number, configuration in enumerate(_solutions(plan, modes, drawn), 1):
             label = " ".join([*names, f"#{number}"])
             found.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
-            if len(found) > MOST:
-                raise MechanismError(f"more than {MOST} assembly modes", "mechanism.sketch")
+            if len(found) > MAX_ASSEMBLIES:
+                raise MechanismError(f"more than {MAX_ASSEMBLIES} assembly modes", SKETCH)
     return tuple(found)
 
 
@@ -107,15 +102,17 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
     size = plan.core.size
     guess: list[Value] = []
     for group in (plan.structure.groups[index] for index in plan.structure.unknowns):
-        guess += [random.uniform(-np.pi, np.pi, STARTS) for _ in group.angles]
-        guess += [random.uniform(-2 * size, 2 * size, STARTS) for _ in (*group.slides, *group.bases, *group.bases)]
-    state = plan.run(given, vectors, guess, modes, STEPS)
-    every = plan.configuration(state, (STARTS,), {}, vectors, state.solved((STARTS,)), limits=False)
+        guess += [random.uniform(-np.pi, np.pi, SEARCH_STARTS) for _ in group.angles]
+        guess += [
+            random.uniform(-2 * size, 2 * size, SEARCH_STARTS) for _ in (*group.slides, *group.bases, *group.bases)
+        ]
+    state = plan.run(given, vectors, guess, modes, SEARCH_STEPS)
+    every = plan.configuration(state, (SEARCH_STARTS,), {}, vectors, state.solved((SEARCH_STARTS,)), limits=False)
     good = every.valid
     for slide in plan.core.graph.telescopic:
         # A leg without length has no direction: whatever its angle, it is no assembly.
         with np.errstate(invalid="ignore"):
-            good = good & (np.asarray(every.slides[slide]) > SAME * size)
+            good = good & (np.asarray(every.slides[slide]) > SAME_ASSEMBLY * size)
     found = [sketch] if drawn else []
     for lane in np.flatnonzero(good):
         one = every.take(int(lane))
@@ -127,4 +124,4 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
 def _same(one: Configuration, other: Configuration, size: float) -> bool:
     turns = [wrap(np.angle(a) - np.angle(b)) for a, b in zip(one.rotations, other.rotations, strict=True)]
     shifts = [(a - b) / size for a, b in zip(one.slides, other.slides, strict=True)]
-    return bool(np.all(np.abs([*turns, *shifts]) < SAME))
+    return bool(np.all(np.abs([*turns, *shifts]) < SAME_ASSEMBLY))

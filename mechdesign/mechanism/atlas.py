@@ -1,6 +1,6 @@
 """Solved poses all over a region of the plane, from which others are continued where there is no closed form.
 
-From the sketch every pose would be a long way off, and what cannot be reached would be tried again and again.
+From the sketch every pose would be a long way, and places out of reach would be tried again and again.
 """
 
 from __future__ import annotations
@@ -23,41 +23,36 @@ SPACING = 0.03
 # Beyond this many spacings from the nearest solved pose nothing is inside.
 REACH = 1.6
 # Most poses of a design.
-MOST_POSES = 20_000
+MAX_POSES = 20_000
 # Poses outside the study's limits are passed through over this many spacings: there may be another piece beyond.
 LIMIT_GAP = 15
-# Step of differences, as a part of the mechanism's size.
-DIFFERENCE = 1e-6
+# Step of finite differences, as a part of the mechanism's size.
+DIFFERENCE_STEP = 1e-6
 # Steps in which dimensions are changed.
 STAGES = 8
-# Every so many-th pose of the nominal mechanism is brought to other dimensions, where the poses of those grow from.
-COARSE = 3
-# Poses of all designs that are kept for the next question.
+# Of the nominal poses, those at every so many-th place of the lattice are brought to other dimensions.
+SEED_EVERY = 3
+# Poses of all designs that are kept for later calls.
 KEPT_POSES = 500_000
-# Corrections of Newton's method from what the slopes lead to expect, and single ones beside a fold.
+# Newton's corrections of a pose predicted by slopes.
 CORRECTIONS = 5
+# Newton's corrections near a fold, made one at a time.
 SINGLE_CORRECTIONS = 30
-# A correction that leaves less of the determinant than this is towards a fold (at the fold itself: a half).
+# A correction that leaves less of the determinant than this leads towards a fold (at the fold itself: a half).
 NEAR_FOLD = 0.8
+# Steps to the neighbours of a place of the lattice.
+NEIGHBOURS = np.array([1, 1j, -1, -1j])
+
 # Dimensions of each pose that differ from the nominal ones.
 Sizes = Mapping[str, Floats]
-SIDES = np.array([1, 1j, -1, -1j])
 
 
 @dataclass(frozen=True, eq=False)
 class _Poses:
     """Solved poses of one design on a lattice.
 
-    Parameters
-    ----------
-    tree : cKDTree
-        Places of the point.
-    lattice : ndarray of complex, shape (poses,)
-        The same in spacings from the sketch's.
-    table : ndarray, shape (unknowns, poses)
-        Unknowns of the groups without a closed form.
-    slopes : ndarray, shape (2, unknowns, poses)
-        Their derivatives by the point's x and y.
+    Places of the point as a tree, and in spacings from the sketch's; a table of the unknowns of the groups without a
+    closed form, shape (unknowns, poses), and their slopes by the point's x and y, shape (2, unknowns, poses).
     """
 
     tree: cKDTree
@@ -68,16 +63,10 @@ class _Poses:
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Poses of a mechanism all over its region, for the nominal dimensions and for others as they are asked for.
+    """Poses of a mechanism all over its region, for the nominal dimensions, and for others when they are needed.
 
-    Parameters
-    ----------
-    held : tuple of float
-        Values of the plan's coordinates after the point's x and y.
-    signs : ndarray, shape (groups, 1)
-        Sign of the determinant of each group without a closed form: others are other assemblies.
-    origin : complex
-        The point's place in the sketch.
+    `held` are the values of the plan's coordinates after the point's x and y, `signs` those of the determinants of the
+    groups without a closed form, shape (groups, 1) (others are other assemblies), `origin` the point in the sketch.
     """
 
     plan: Plan
@@ -116,15 +105,15 @@ class Atlas:
     def solve(self, z: Complexes, places: Mapping[str, Value], *, beyond: bool = False) -> tuple[Configuration, Floats]:
         """The mechanism with its point at `z`, and how far it is from where two of its assemblies meet (a fold).
 
-        What does not depend on a leg that cannot reach stays finite, as where all groups have a closed form. Where the
-        nearest solved pose is far and a leg does not reach either, the place on the way from there is told.
+        Links that do not depend on a leg out of reach stay finite, as where all groups have a closed form. Where the
+        nearest solved pose is far and a leg does not reach either, the pose is that of a place on the way from there.
 
         Parameters
         ----------
         places : mapping of str to array_like
             Dimensions that differ from the nominal ones; they broadcast against `z`.
         beyond : bool
-            Whether beyond a fold the pose at the fold is told, and beyond a leg's reach that with the leg stretched.
+            Whether beyond a fold the pose is that at the fold, and beyond a leg's reach that with the leg stretched.
 
         Returns
         -------
@@ -156,14 +145,10 @@ class Atlas:
     ) -> tuple[State, Floats]:
         """The mechanism near known poses, and its distances from a fold (see `solve`).
 
-        Parameters
-        ----------
-        table, ahead : ndarray, shape (unknowns, poses)
-            Of the known poses, and what they are expected to change.
-        within : ndarray of complex
-            Places that are told instead of `z` where a pose is not solved at once.
+        `table` has the unknowns of the known poses, `ahead` the change expected from there. Where a pose is not solved
+        at once, that with the point at `within` is found instead of `z`.
         """
-        # Beside a fold the unknowns change too fast for their slopes to tell.
+        # Near a fold the unknowns change too fast for a prediction by their slopes.
         scale = scale_of(self.plan.structure, self.plan.core.size, table)
         guess = table + np.where((np.abs(ahead) <= MAX_CHANGE * scale).all(axis=0), ahead, 0.0)
         state = self._run(z, sizes, guess, CORRECTIONS, beyond)
@@ -198,7 +183,7 @@ class Atlas:
             beyond = crossed.any(axis=0)
             solved = ~beyond & state.solved(left.shape)
             found[:, left[solved]], fold_distance[left[solved]] = new[:, solved], np.prod(now**2, axis=0)[solved]
-            # Of what lies beyond, the pose at the fold is told.
+            # Beyond the fold: the pose at the fold.
             share = np.where(crossed & led, before / (before - now), 1.0).min(axis=0)
             found[:, left[beyond]] = (last + share * (guess - last))[:, beyond]
             squared = np.where(crossed & led, squares, now**2)
@@ -246,7 +231,7 @@ class Atlas:
     def _designs(self, sizes: Sizes, count: int) -> list[_Poses]:
         """Poses of several designs: some of the nominal ones are brought to their dimensions and grow from there."""
         nominal = self.known[b""]
-        coarse = np.flatnonzero((nominal.lattice.real % COARSE == 0) & (nominal.lattice.imag % COARSE == 0))
+        coarse = np.flatnonzero((nominal.lattice.real % SEED_EVERY == 0) & (nominal.lattice.imag % SEED_EVERY == 0))
         design, seed = np.repeat(np.arange(count), len(coarse)), np.tile(coarse, count)
         table, lattice = nominal.table[:, seed], nominal.lattice[seed]
         for stage in range(1, STAGES + 1):
@@ -273,17 +258,17 @@ class Atlas:
             own = {name: value[design] for name, value in sizes.items()}
             state, fold_distance = self._solved(z, own, table, 0.0, z)
             table, reached = table_of(state.unknowns, z.shape), fold_distance > 0
-            # Poses just outside, where a leg does not reach, tell how far outside it is; but nothing grows from them.
+            # Poses just outside, where a leg does not reach, are kept, but nothing grows from them.
             outside = np.where(self._within(state, own, z.shape), 0, outside + 1)
             closed = np.flatnonzero(reached & ~self._open(state, z.shape) & (outside < LIMIT_GAP))
             layers.append((design[reached], lattice[reached], table[:, reached]))
             fresh: dict[tuple[int, complex], int] = {}
-            steps = (lattice[closed, None] + SIDES).ravel().tolist()
-            parents = np.repeat(closed, len(SIDES)).tolist()
+            steps = (lattice[closed, None] + NEIGHBOURS).ravel().tolist()
+            parents = np.repeat(closed, len(NEIGHBOURS)).tolist()
             for k, owner, step in zip(parents, design[parents].tolist(), steps, strict=True):
                 if (owner, step) not in seen:
                     fresh.setdefault((owner, step), k)
-            if len(seen) + len(fresh) > MOST_POSES * count:
+            if len(seen) + len(fresh) > MAX_POSES * count:
                 break
             seen.update(fresh)
             parent = np.array(list(fresh.values()), dtype=np.intp)
@@ -302,7 +287,7 @@ class Atlas:
 
     def _slopes(self, lattice: Complexes, sizes: Sizes, table: Floats) -> Floats:
         """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
-        h = DIFFERENCE * self.plan.core.size
+        h = DIFFERENCE_STEP * self.plan.core.size
         z = self.origin + self.spacing * lattice
         beside = [table_of(self._run(z + step, sizes, table, 1).unknowns, z.shape) for step in (h, 1j * h)]
         slopes = (np.stack(beside) - table) / h

@@ -13,12 +13,12 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Floats
-from mechdesign.numerics.minima import lowest
+from mechdesign.numerics.roots import lowest
 
 # A closure that falls below this part of its largest value touches zero: it is a difference of squared lengths.
 TOUCHING = 1e-10
-# Closures are looked at this often in a turn of the drive, or in the mechanism's size of a slide's travel.
-SAMPLES = 720
+# Values of the coordinate at which closures are looked at, in a turn, or in a travel of the mechanism's size.
+SAMPLES_PER_TURN = 720
 
 
 def closing_groups(groups: Sequence[Group]) -> list[int]:
@@ -30,18 +30,9 @@ def closing_groups(groups: Sequence[Group]) -> list[int]:
 class ChangePoints:
     """Assembly modes along one given coordinate: as drawn at the sketch, changed at every change point between.
 
-    The points are searched once for each range of the coordinate that is asked for, and kept.
-
-    Parameters
-    ----------
-    modes : sequence of int
-        Assembly mode of each group as drawn.
-    sketch : float
-        Value of the coordinate in the sketch (radians or length).
-    period : float
-        A turn, or for a length the mechanism's size.
-    closures : callable
-        Closures of the first groups at values of the coordinate, for so many modes.
+    `sketch` is the coordinate's value there (radians or length), `period` a turn, or for a length the mechanism's size;
+    `closures` gives those of the first groups at values of the coordinate, for the modes of these groups. A range of
+    the coordinate is searched once.
     """
 
     def __init__(
@@ -72,13 +63,13 @@ class ChangePoints:
         # At least a turn to each side at once, so that few calls search at all.
         low = min(begin, low, self.sketch - self._period)
         high = max(end, high, self.sketch + self._period)
-        count = int(np.ceil((high - low) / self._period * SAMPLES)) + 1
+        count = int(np.ceil((high - low) / self._period * SAMPLES_PER_TURN)) + 1
         samples = np.linspace(low, high, count)
-        # Modes of a group decide where those behind it have their change points.
+        # The modes of a group decide where the groups after it have their change points.
         self._places = [np.empty(0) for _ in self._modes]
         for index, (group, mode) in enumerate(zip(self._groups, self._modes, strict=True)):
             if group.form == "newton":
-                # Its assembly is followed by continuity; what is solved behind it stays as drawn.
+                # Its assembly is followed by continuity; groups solved after it stay as drawn.
                 break
             if mode:
                 self._places[index] = self._search(index, samples)

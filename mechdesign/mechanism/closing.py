@@ -17,27 +17,27 @@ from mechdesign.mechanism.diagnosis import motions_in_words, over_constrained, o
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import CLOSED
-from mechdesign.mechanism.sketch import KEY
+from mechdesign.mechanism.sketch import SKETCH
 from mechdesign.mechanism.solve import loop_vectors
 from mechdesign.mechanism.state import State
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Complexes, Floats
 
-# Poses of a sweep for the range in which a mechanism closes, and halvings of its ends.
-SWEEP, HALVINGS = 721, 40
-# What mends most groups that do not close.
-LENGTHS = "check the lengths"
+# Poses of a sweep for the range in which a mechanism closes.
+SWEEP_POSES = 721
+# Halvings of a step of that sweep that find an end of the range.
+END_HALVINGS = 40
+# Advice for most groups that do not close.
+CHECK_LENGTHS = "check the lengths"
 
 
 def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
-    """Why a mechanism's sketch cannot be assembled at its own drive values, and what would mend it.
+    """Why a sketch cannot be assembled at its own drive values, and what would mend it.
 
     Parameters
     ----------
-    plan : Plan
-        That of the drives.
-    state : State
-        What it found.
+    plan, state : Plan, State
+        The plan of the drives and the state that it ended in.
     given : sequence of (Coordinate, float)
         The drives and their values (radians or lengths).
     """
@@ -61,7 +61,7 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
             if found:
                 mend = f"{found}; draw it there, or {mend}"
                 break
-    return MechanismError(f"{start}: {where}; {mend}", KEY)
+    return MechanismError(f"{start}: {where}; {mend}", SKETCH)
 
 
 def check_regular(core: Core, plan: Plan, configuration: Configuration) -> None:
@@ -91,7 +91,9 @@ def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> Mechanis
         return over_constrained(core.description, equations, middle, len(drives), real, len(drives))
     free = motions_in_words(equations, equations.jacobian(x, drives))
     if free:
-        return MechanismError(f"the sketch is at a singular position: with its drives held, {free}; draw another", KEY)
+        return MechanismError(
+            f"the sketch is at a singular position: with its drives held, {free}; draw another", SKETCH
+        )
     nodes, _, slides = equations.unpack(x)
     if not plan.iterative or any(slides[slide] <= 0 for slide in graph.telescopic):
         return None
@@ -101,30 +103,24 @@ def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> Mechanis
         for point, place in zip(graph.nodes, places, strict=True)
         if ":" not in point and (GROUND, point) not in graph.points
     ]
-    return MechanismError(f"{start} from where it is drawn; it closes at {{{', '.join(moving)}}}", KEY)
+    return MechanismError(f"{start} from where it is drawn; it closes at {{{', '.join(moving)}}}", SKETCH)
 
 
 def open_group(state: State, gaps: Complexes) -> tuple[str, str]:
-    """What the first group that does not close lacks, in a designer's words, and what would mend it.
-
-    Parameters
-    ----------
-    gaps : complex array, shape (edges,)
-        What the edges miss at best.
-    """
+    """Why the first group that is open does not close, and what would mend it; `gaps` is what each edge misses."""
     converged = iter(state.converged)
     for group in state.structure.groups:
         if group.form == "newton":
             if not np.all(next(converged)):
-                return _newton(state, group, gaps), LENGTHS
+                return _newton(state, group, gaps), CHECK_LENGTHS
             continue
         unknown = [state.rotations[root] for root in group.angles] + [state.slides[slide] for slide in group.slides]
         if not all(value is not None and np.isfinite(value) for value in unknown):
             return _dyad(state, group)
     for slide in sorted(state.graph.telescopic):
         if not float(np.real(state.slides[slide])) > 0:
-            return f"leg '{state.graph.slides[slide]}' has no positive length", LENGTHS
-    return "a given coordinate cannot have its value", LENGTHS
+            return f"leg '{state.graph.slides[slide]}' has no positive length", CHECK_LENGTHS
+    return "a given coordinate cannot have its value", CHECK_LENGTHS
 
 
 def _dyad(state: State, group: Group) -> tuple[str, str]:
@@ -157,20 +153,20 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
         at = f" at {points(inner)}" if len(inner) == 1 else ""
         apart = f"{points(outer)} are {gap:.5g} apart" if len(outer) == 2 else f"they have to span {gap:.5g}"
         limit = f"reach only {long + short:.5g}" if gap > long else f"span no less than {long - short:.5g}"
-        return f"links {one} and {two} cannot meet{at}: {apart}, the links {limit}", LENGTHS
+        return f"links {one} and {two} cannot meet{at}: {apart}, the links {limit}", CHECK_LENGTHS
     (root,), (slide,), (name,) = group.angles, group.slides, slides
     if group.form == "angle and fixed slide":
         on_line = {n for k in group.edges if edges[k].slide == slide for n in (edges[k].tail, edges[k].head)}
         pins = [node for node in ends[root] if node not in on_line] or ends[root]
         off = abs(cross(directions[slide], known))
         line = f"the line of '{name}' passes {points(pins[:1])} at a distance of {off:.5g}"
-        return f"link {links[root]} is too short to reach its slide: {line}", LENGTHS
+        return f"link {links[root]} is too short to reach its slide: {line}", CHECK_LENGTHS
     off = abs(cross(directions[slide], vectors[root]))
     joints = points(dict.fromkeys((group.loops[0].start, group.loops[0].end)))
     apart = f"its joints{f' {joints}' if joints else ''} are {gap:.5g} apart"
     return (
         f"slide '{name}' cannot close: {apart}, nearer than the {off:.5g} that its links hold them off the line",
-        LENGTHS,
+        CHECK_LENGTHS,
     )
 
 
@@ -197,13 +193,13 @@ def closing_range(valid: Callable[[Floats], Value], coordinate: Coordinate, size
         Radians in one of the study's units of angle.
     """
     angle = coordinate.quantity == "angle"
-    values = np.linspace(0.0, 2 * np.pi, SWEEP) if angle else np.linspace(-4 * size, 4 * size, SWEEP)
+    values = np.linspace(0.0, 2 * np.pi, SWEEP_POSES) if angle else np.linspace(-4 * size, 4 * size, SWEEP_POSES)
     closed = np.asarray(valid(values), dtype=bool)
     if not closed.any():
         return ""
     changes = np.flatnonzero(closed[1:] != closed[:-1])
     a, b, at_a = values[changes], values[changes + 1], closed[changes]
-    for _ in range(HALVINGS):
+    for _ in range(END_HALVINGS):
         middle = (a + b) / 2
         same = np.asarray(valid(middle), dtype=bool) == at_a
         a, b = np.where(same, middle, a), np.where(same, b, middle)

@@ -39,19 +39,17 @@ class Configuration:
 
     Parameters
     ----------
-    nodes : sequence of complex arrays
-        Position of each node, nan where the pose cannot be assembled.
-    rotations : sequence of complex arrays
-        Unit rotation exp(i theta) of each angle class.
-    slides : sequence of arrays
-        Displacement of each slide.
+    nodes, rotations, slides : sequences of arrays
+        Position of each node and unit rotation exp(i theta) of each angle class (complex), displacement of each slide;
+        nan where the pose cannot be assembled.
     closures : sequence of arrays
         Positive inside the range in which each group closes, zero at its limits.
     reason : int8 array of `shape`
         See `Reason`.
+    places : mapping of str to arrays
+        Dimensions that differ from the nominal ones.
     near : mapping of str to arrays
-        Values that angles are told within half a turn of, by name, where a motion, a given value or a nominal pose
-        says more than a rotation; the others are told in (-pi, pi].
+        By name, values within half a turn of which angles are reported; angles not named are in (-pi, pi].
     counted : frozenset of str
         Those of them whose turns count: given, or followed along a motion.
     """
@@ -145,7 +143,7 @@ class Configuration:
 
 
 def hide(value: Value, lost: Flags) -> Value:
-    """nan for poses that cannot be assembled; what is the same for every pose (the ground) is left alone."""
+    """nan for poses that cannot be assembled; a value that is the same for every pose (the ground) stays one."""
     value = np.asarray(value)
     if value.ndim == 0 and not lost.all():
         value = np.broadcast_to(value, lost.shape)
@@ -158,7 +156,7 @@ def hide(value: Value, lost: Flags) -> Value:
 def joined(
     parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
 ) -> Configuration:
-    """Flat batches of one mechanism put together to one of a shape; its angles are told in (-pi, pi]."""
+    """Flat batches of one mechanism put together to one of a shape; its angles are in (-pi, pi]."""
     count, end, whole = int(np.prod(shape, dtype=np.int64)), 0, list[Any]()
     reason = np.empty(count, dtype=np.int8)
     for part in parts:

@@ -1,8 +1,8 @@
 """Groups without a closed form: from a solved pose to another along a straight line in the given coordinates.
 
-Every step solves all groups by Newton's method from what the last steps lead to expect. It is accepted if the method
+Every step solves all groups by Newton's method from an extrapolation of the last. It is accepted if the method
 converged, the unknowns moved little, and no determinant of a group changed its sign (a singularity lies between the
-assemblies); otherwise it is halved, pose by pose. What is not reached is another assembly, or none.
+assemblies); otherwise it is halved, pose by pose. A pose that is not reached is in another assembly, or does not exist.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, wrap
-from mechdesign.mechanism.state import STEPS, State
+from mechdesign.mechanism.state import NEWTON_STEPS, State
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Largest change of an unknown in one step: radians, or parts of the mechanism's size.
 MAX_CHANGE = 0.35
-# Steps are planned a little shorter, so that few are refused.
+# Change that steps are planned for, a little less so that few are refused.
 PLANNED = 0.8 * MAX_CHANGE
 SMALLEST_STEP = 2e-4
 MAX_ROUNDS = 400
-# Part of the path over which the first direction is taken.
-BEGINNING = 1e-6
+# Step that gives the first direction, as a part of the path.
+FIRST_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def angle_rows(structure: Structure) -> Flags:
 
 
 def scale_of(structure: Structure, size: float, table: Floats) -> Floats:
-    """What changes are measured by: radians, and the mechanism's size or a length beyond it."""
+    """Units of changes: a radian, and the mechanism's size or a length beyond it."""
     return np.where(angle_rows(structure), 1.0, np.maximum(size, np.abs(table)))
 
 
@@ -74,11 +74,8 @@ def follow(
 ) -> tuple[Floats, Flags]:  # fmt: skip
     """Continue `count` poses from `start`; returns the table of their unknowns and which poses were reached.
 
-    Parameters
-    ----------
-    given, places : values at the end of the path, scalars or arrays of shape (count,)
-    nominal : nominal value of every place
-    size : a length of the mechanism, against which slides are judged
+    `given` and `places` are the values at the end of the path, scalars or arrays of shape (count,); changes of slides
+    are judged as parts of `size`, a length of the mechanism.
     """
     angles = angle_rows(structure)
     ends = list(zip(start.given, given, strict=True))
@@ -88,7 +85,7 @@ def follow(
     }
     signs = [np.broadcast_to(sign, (count,)) for sign in start.signs]
 
-    def solve(lanes: Ints, at: Value, guess: Floats, steps: int = STEPS) -> tuple[Floats, State]:
+    def solve(lanes: Ints, at: Value, guess: Floats, steps: int = NEWTON_STEPS) -> tuple[Floats, State]:
         """Unknowns and state of some poses at parts `at` of their paths."""
 
         def between(begin: Value, end: Value) -> Value:
@@ -114,8 +111,8 @@ def follow(
     table = table_of(start.unknowns, (count,)).copy()
     moving = np.arange(count)
     # One step of Newton's method at the very beginning gives the direction in which the unknowns set out.
-    first, _ = solve(moving, BEGINNING, table, 1)
-    slope = change(first, table) / BEGINNING
+    first, _ = solve(moving, FIRST_STEP, table, 1)
+    slope = change(first, table) / FIRST_STEP
     slope = np.where(np.isfinite(slope).all(axis=0), slope, 0.0)
     done = np.zeros(count)
     step = planned(slope, table)

@@ -17,13 +17,10 @@ Kind = Literal["x", "y", "angle", "slide", "distance", "expression"]
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A scalar function of the configuration.
+    """A scalar function of the configuration, by kind.
 
-    Parameters
-    ----------
-    kind : str
-        ``x``, ``y`` of a node; ``angle`` from the x axis of body `reference` to that of `body`; ``slide``
-        displacement (a telescopic leg's is its length); ``distance`` of two nodes; ``expression`` of coordinates.
+    ``x``, ``y`` of a node; ``angle`` from the x axis of body `reference` to that of `body`; ``slide`` displacement (a
+    telescopic leg's is its length); ``distance`` of nodes `node` and `other`; ``expression`` of coordinates `parts`.
     """
 
     name: str

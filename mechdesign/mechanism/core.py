@@ -59,7 +59,7 @@ class Bound:
                 half = (high - low) / 2
                 away = value - (low + half)
                 whole = half >= np.pi
-                # A drive is told within its limits, if it can be, or as it is given.
+                # A drive's angle is given, or already in the turn of its limits.
                 margin = half - np.abs(away if self.drive else np.where(whole, away, wrap(away)))
                 if self.coordinate.name not in configuration.counted:
                     # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
@@ -74,7 +74,7 @@ class Bound:
 
     @property
     def of_angle(self) -> bool:
-        """Whether it is that of an angle between two ends."""
+        """Whether it bounds an angle on both sides."""
         return self.coordinate.quantity == "angle" and self.minimum is not None and self.maximum is not None
 
     def counts(self, places: Mapping[str, Value]) -> bool:
@@ -128,7 +128,7 @@ class Core:
         return names.resolve(name, self.description, self.graph)
 
     def margins(self, configuration: Configuration) -> list[tuple[str, Value]]:
-        """Named margins of all limits: positive inside ."""
+        """Named margins of all limits: positive inside."""
         places = {**self.nominal, **configuration.places}
         return [margin for bound in self.bounds for margin in bound.margins(configuration, places)]
 
@@ -139,7 +139,7 @@ class Core:
         for bound in self.bounds:
             if bound.drive and bound.of_angle:
                 low, high = bound.ends(sizes)
-                # Between limits a turn apart or more every angle has a turn: it is told in the one nearest to zero.
+                # Between limits a turn apart or more, the turn nearest to zero.
                 middle, room = (low + high) / 2, np.maximum((high - low) / 2 - np.pi, 0.0)
                 near[bound.coordinate.name] = np.clip(0.0, middle - room, middle + room)
         return near

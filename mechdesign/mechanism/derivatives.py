@@ -22,21 +22,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, cross, norm2, plus, quiet, times
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.newton import solve_linear
-from mechdesign.mechanism.outputs import Rates
+from mechdesign.mechanism.outputs import Rates, first
+from mechdesign.mechanism.solve import solve_linear
 from mechdesign.mechanism.state import State, columns, scalars
 from mechdesign.mechanism.structure import Group, Structure
+from mechdesign.numerics.arrays import Floats
 
 # Below this regularity a pose is at a singularity: at a dead centre the angle between links is known to the root of
 # rounding only, and rounding shows in all rates.
 STALLED = 1e-6
+
+Entries = Sequence[Sequence[Value]]
 
 
 class Linearization(State):
@@ -81,17 +87,7 @@ class Linearization(State):
     def _solve(
         self, given: Sequence[Value], rest: Sequence[Value], offsets: Mapping[str, Value] | None = None
     ) -> Rates:
-        """Derivatives of everything.
-
-        Parameters
-        ----------
-        given : sequence of Value
-            Derivative of each drive.
-        rest : sequence of Value
-            Per edge, the part of its derivative without the highest derivatives of angle and slide.
-        offsets : mapping, optional
-            Derivative of each body's constant angle within its class.
-        """
+        """Derivatives of all positions from those of the drives, the `rest` of each edge's, and of body offsets."""
         structure, offsets = self.structure, offsets or {}
         angles: list[Any] = []
         for tie in structure.ties:
@@ -226,7 +222,7 @@ class Linearization(State):
             (lead([w[k] for w, _ in each]), lead([d[k] for _, d in each])) for k in range(len(self.structure.edges))
         ]
         offsets = {
-            body: lead([self.geometry.offset_derivative(body, place, sizes) for place in places])
+            body: lead([self.geometry.angle_derivative(turns, place, sizes) for place in places])
             for body, (_, turns) in self.geometry.graph.bodies.items()
             if turns
         }
@@ -267,3 +263,90 @@ def regularity(linearization: Linearization) -> Value:
         sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(len(lines[0]))]
         found = np.minimum(found, np.abs(determinant) / np.sqrt(math.prod(sizes)))
     return found
+
+
+def mixes(rows: Sequence[Coordinate], columns: Sequence[Coordinate]) -> bool:
+    """Whether a Jacobian's rows, or its columns, have different units, so that its norm means nothing."""
+    return len({c.quantity for c in rows}) > 1 or len({c.quantity for c in columns}) > 1
+
+
+@dataclass(frozen=True, eq=False)
+class Jacobian:
+    """Derivatives of coordinates (rows) by the drives (columns), broadcasting to the batch's shape, and their scalars.
+
+    `entries` are per radian; `homogeneous` has angles as arcs of a characteristic length, or is `entries` without one.
+    """
+
+    entries: Entries
+    homogeneous: Entries
+    shape: tuple[int, ...]
+
+    @staticmethod
+    @quiet
+    def of(linear: Linearization, rows: Sequence[Coordinate], length: float | None = None) -> Jacobian:
+        """The Jacobian at configurations; with `length`, the arc of one radian, angles count as lengths."""
+        drives = linear.structure.given
+        columns = [linear.velocity([float(j == k) for j in range(len(drives))]) for k in range(len(drives))]
+        entries = [[first(linear.configuration, row, rates) for rates in columns] for row in rows]
+        if length is None:
+            return Jacobian(entries, entries, linear.configuration.shape)
+        up, down = ([length if c.quantity == "angle" else 1.0 for c in side] for side in (rows, drives))
+        arcs = [[entry * (u / d) for entry, d in zip(line, down, strict=True)]
+                for line, u in zip(entries, up, strict=True)]  # fmt: skip
+        return Jacobian(entries, arcs, linear.configuration.shape)
+
+    @cached_property
+    def matrix(self) -> Floats:
+        """The entries as an array of shape (..., rows, drives)."""
+        return _matrix(self.entries, self.shape)
+
+    @cached_property
+    @quiet
+    def determinant(self) -> Value:
+        """Determinant of a square Jacobian per radian; nan where an entry is nan."""
+        return self._determinant(self.entries)
+
+    def _determinant(self, entries: Entries) -> Value:
+        if len(entries) == 1:
+            return entries[0][0]
+        if len(entries) == 2:
+            (a, b), (c, d) = entries
+            return a * d - b * c
+        matrix = _matrix(entries, self.shape)
+        finite = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
+        return np.where(finite, np.linalg.det(np.where(finite[..., None, None], matrix, 0.0)), np.nan)
+
+    @cached_property
+    @quiet
+    def inverse_condition(self) -> Value:
+        """Smallest over largest singular value, 0 at a singularity; nan where an entry is."""
+        if len(self.homogeneous) == 2:
+            # ||J||_F^2 / |det J| is s = sigma_max/sigma_min and its inverse added [S1, eq. 8], 2 at isotropy.
+            (a, b), (c, d) = self.homogeneous
+            size = self.determinant if self.homogeneous is self.entries else self._determinant(self.homogeneous)
+            twice = (a * a + b * b + c * c + d * d) / np.abs(size)
+            # (s - 2)(s + 2) rather than s^2 - 4 keeps the digits near isotropy; rounding may leave s just below 2.
+            return 2 / (twice + np.sqrt(np.maximum(twice - 2, 0) * (twice + 2)))
+        least, largest = self.singular_values
+        return np.where(largest > 0, least / largest, 0.0 * largest)
+
+    @cached_property
+    @quiet
+    def singular_values(self) -> tuple[Value, Value]:
+        """Smallest and largest singular value; nan where an entry is."""
+        if len(self.homogeneous) == 1:
+            return np.abs(self.homogeneous[0][0]), np.abs(self.homogeneous[0][0])
+        if len(self.homogeneous) == 2:
+            (a, b), (c, d) = self.homogeneous
+            size = np.abs(a * d - b * c)
+            square = a * a + b * b + c * c + d * d
+            largest = 0.5 * (np.sqrt(square + 2 * size) + np.sqrt(np.maximum(square - 2 * size, 0.0)))
+            return size / largest, largest
+        matrix = _matrix(self.homogeneous, self.shape)
+        finite = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
+        values = np.linalg.svd(np.where(finite[..., None, None], matrix, 0.0), compute_uv=False)
+        return np.where(finite, values[..., -1], np.nan), np.where(finite, values[..., 0], np.nan)
+
+
+def _matrix(entries: Entries, shape: tuple[int, ...]) -> Floats:
+    return np.stack([np.stack([np.broadcast_to(e, shape) for e in row], axis=-1) for row in entries], axis=-2)

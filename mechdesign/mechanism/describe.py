@@ -16,12 +16,12 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import deciding_joints
 from mechdesign.mechanism.structure import Group, Structure
 
-# What stands for everything that is placed before a group.
+# Stands for all bodies that are placed before a group.
 BASE = ""
 
 
 @dataclass(frozen=True)
-class Chain:
+class GroupChain:
     """The bodies that a group places, and its joints in order: their letters (R, P), pins and slides."""
 
     links: tuple[str, ...]
@@ -48,7 +48,7 @@ def groups_in_words(mechanism: Mechanism) -> list[str]:
 
 
 def describe(mechanism: Mechanism) -> str:
-    """Links, joints, mobility, the order of solution, assembly modes, measures, limits, and what is odd."""
+    """Links, joints, mobility, the order of solution, assembly modes, measures, limits, and a warning if singular."""
     description, graph = mechanism.description, mechanism.graph
     loops = len(graph.edges) - len(graph.nodes) + 1
     lines = [
@@ -110,7 +110,7 @@ def assemblies_in_words(mechanism: Mechanism) -> list[str]:
 
 
 def placed_before(graph: Graph, structure: Structure) -> list[set[str]]:
-    """Bodies that lie fast before each group is solved, and last those that do in the end."""
+    """Bodies whose places are known before each group is solved, and last those known in the end."""
     roots, nodes = {0}, {0} | {node for node, _, _ in structure.known_nodes}
     found = []
     for group in structure.groups:
@@ -129,10 +129,12 @@ def _lying(graph: Graph, structure: Structure, roots: set[int], nodes: set[int])
     } | {GROUND}
 
 
-def chain_of(description: Description, graph: Graph, structure: Structure, group: Group, placed: set[str]) -> Chain:
+def chain_of(
+    description: Description, graph: Graph, structure: Structure, group: Group, placed: set[str]
+) -> GroupChain:
     """Walk round a group's only loop."""
     (loop,) = group.loops
-    # Round the loop: bodies (str) and between them joints (letter, name); what is placed already is the base.
+    # Round the loop: bodies (str) and between them joints (letter, name); bodies placed already are the base.
     walk: list[str | tuple[str, str]] = []
     node = loop.start
 
@@ -163,7 +165,7 @@ def chain_of(description: Description, graph: Graph, structure: Structure, group
     if walk and walk[-1] != BASE:
         walk.append(("R", graph.nodes[loop.end]))
     if [step[0] for step in walk if isinstance(step, tuple)] in (["P", "R", "R"], ["P", "P", "R"]):
-        # Told from the pin on, as textbooks do.
+        # Read from the pin on, as textbooks do.
         walk.reverse()
     joints = [step for step in walk if isinstance(step, tuple)]
     links = [step.removesuffix(":rod") for step in walk if isinstance(step, str) and step != BASE]
@@ -177,7 +179,7 @@ def chain_of(description: Description, graph: Graph, structure: Structure, group
             joints.insert(0, ("R", outer[1]))
             if outer[2] == joints[2][1]:
                 joints[1:] = joints[:0:-1]
-    return Chain(
+    return GroupChain(
         tuple(link for link in dict.fromkeys(links) if not link.startswith("pin in ")),
         letters,
         tuple(dict.fromkeys(name for letter, name in joints if letter == "R" and ":" not in name)),
@@ -242,7 +244,7 @@ def _displacement(graph: Graph, slide: int) -> str:
     return f"{graph.slides[slide]}.{'length' if slide in graph.telescopic else 'slide'}"
 
 
-def _side(graph: Graph, group: Group, mode: int, chain: Chain) -> str:
+def _side(graph: Graph, group: Group, mode: int, chain: GroupChain) -> str:
     if mode == 0:
         return ""
     if group.form == "two angles" and len(chain.pins) == 3:

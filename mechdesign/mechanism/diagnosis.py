@@ -16,15 +16,17 @@ from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Floats
 
 DRIVES = "mechanism.drives"
-# A message names so many joints and links, and so many motions; nobody reads more.
-MANY, FEW = 12, 4
+# Joints and links that a message names at most.
+MAX_NAMED = 12
+# Motions that a message names at most.
+MAX_MOTIONS = 4
 
 
 def listed(names: Iterable[str], last: str = "and") -> str:
     """Names in quotes as a phrase; of very many only the first."""
     quoted = [f"'{name}'" for name in dict.fromkeys(names)]
-    if len(quoted) > MANY:
-        quoted = [*quoted[:MANY], f"{len(quoted) - MANY} more"]
+    if len(quoted) > MAX_NAMED:
+        quoted = [*quoted[:MAX_NAMED], f"{len(quoted) - MAX_NAMED} more"]
     return f" {last} ".join(part for part in (", ".join(quoted[:-1]), quoted[-1] if quoted else "") if part)
 
 
@@ -64,8 +66,8 @@ def wrong_count(
         if real > max(count, 0):
             return over_constrained(description, equations, x, count, real, given)
     found = joints_in_words(description, equations.graph)
-    more = f"; and {len(found) - MANY} more" if len(found) > MANY else ""
-    joints = f". Joints found: {'; '.join(found[:MANY]) or 'none'}{more}"
+    more = f"; and {len(found) - MAX_NAMED} more" if len(found) > MAX_NAMED else ""
+    joints = f". Joints found: {'; '.join(found[:MAX_NAMED]) or 'none'}{more}"
     # From here on special dimensions are not at fault: those of the sketch might only feign motions (a dead centre).
     jacobian = equations.generic(drives)
     if given < count:
@@ -104,7 +106,11 @@ def _too_free(equations: Equations, jacobian: Floats, drives: Sequence[str], mis
     free = [_motion(graph, motion) for motion in _motions(equations, jacobian)]
     add = f"add {missing} drive{'s' if missing > 1 else ''}"
     examples = list(dict.fromkeys(drive for _, _, drive in free if drive))
-    hint = f", for example {', '.join(examples[:FEW])}{' ...' if len(examples) > FEW else ''}" if examples else ""
+    hint = (
+        f", for example {', '.join(examples[:MAX_MOTIONS])}{' ...' if len(examples) > MAX_MOTIONS else ''}"
+        if examples
+        else ""
+    )
     if not drives:
         return f"{add}{hint}"
     idle = f"as nothing drives or holds {'it' if len(free) == 1 else 'them'}"
@@ -176,7 +182,7 @@ def over_constrained(
 def undetermined(
     description: Description, equations: Equations, sketch: Sketch, given: Sequence[Coordinate], reason: str
 ) -> MechanismError:
-    """Which links given coordinates fix twice and which they leave free; `reason` where that cannot be told."""
+    """Which links given coordinates fix twice and which they leave free; otherwise the `reason` that is known."""
     graph = equations.graph
     still = _still(description, graph, given)
     if still is not None:
@@ -259,7 +265,9 @@ def _motions(equations: Equations, jacobian: Floats) -> list[Floats]:
 def motions_in_words(equations: Equations, jacobian: Floats) -> str:
     """What can still move under the rows of a Jacobian; empty where nothing can."""
     told = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
-    return "; ".join(told[:FEW]) + (f"; and {len(told) - FEW} more motions" if len(told) > FEW else "")
+    return "; ".join(told[:MAX_MOTIONS]) + (
+        f"; and {len(told) - MAX_MOTIONS} more motions" if len(told) > MAX_MOTIONS else ""
+    )
 
 
 def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:

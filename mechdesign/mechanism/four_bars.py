@@ -29,20 +29,12 @@ from mechdesign.mechanism.outputs import Rates
 Kind = Literal["four-bar", "slider-crank", "inverted slider-crank"]
 
 # Sums of lengths within this part of each other are equal.
-EQUAL = 1e-9
+EQUAL_LENGTHS = 1e-9
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A revolute joint at a node, or a slide along an edge of the graph.
-
-    Parameters
-    ----------
-    node : int
-        -1 for a slide.
-    edge : int
-        -1 for a revolute joint.
-    """
+    """A revolute joint at a node (`edge` -1), or a slide along an edge of the graph (`node` -1)."""
 
     name: str
     node: int = -1
@@ -92,7 +84,7 @@ class FourBar:
         """
         (_, left), (_, right) = self._compared()
         size = sum(length for length in (*self.lengths, self.offset) if not math.isnan(length))
-        return right - left if abs(right - left) > EQUAL * size else 0.0
+        return right - left if abs(right - left) > EQUAL_LENGTHS * size else 0.0
 
     def _compared(self) -> tuple[tuple[str, float], tuple[str, float]]:
         """The lengths that decide, by name: a link turns fully where the first is below the second."""
@@ -130,7 +122,6 @@ class FourBar:
         """The comparison of lengths behind the type, in words."""
         left, right = self._compared()
         sign = "=" if self.type == "change point" else "<" if self.excess > 0 else ">"
-        # Rounding is no length.
         return f"{left[0]} {left[1]:.6g} {sign} {right[0]} {left[1] if sign == '=' else right[1]:.6g}"
 
     @property
@@ -192,7 +183,7 @@ def four_bars(mechanism: Mechanism) -> tuple[FourBar, ...]:
         if key not in found:
             found[key] = bodies.four_bar(links, joints)
     size = mechanism.size
-    whole = [loop for loop in found.values() if not any(length <= EQUAL * size for length in loop.lengths)]
+    whole = [loop for loop in found.values() if not any(length <= EQUAL_LENGTHS * size for length in loop.lengths)]
     return tuple(sorted(whole, key=lambda loop: bodies.ground not in loop.links))
 
 
@@ -263,7 +254,7 @@ class _Bodies:
             return math.nan
         span = pose.nodes[joints[(k + 1) % 4].node] - pose.nodes[joints[k - 1].node]
         offset = abs(float(cross(np.asarray(_along(pose, joints[k])), np.asarray(span))))
-        return offset if offset > EQUAL * self.mechanism.size else 0.0
+        return offset if offset > EQUAL_LENGTHS * self.mechanism.size else 0.0
 
     def _frame(self, links: Sequence[str]) -> int:
         """Which link of a ring is fixed: the ground, else what a drive is measured from, else the first named."""

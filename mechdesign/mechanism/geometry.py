@@ -134,7 +134,7 @@ class Geometry:
         return Vectors(w, d, offsets)
 
     def angle_derivative(self, turns: Sequence[Turn], place: str, values: Mapping[str, Value]) -> Value:
-        """Derivative of a sum of turns with respect to a place."""
+        """Derivative of a sum of turns (radians) with respect to a place."""
         total: Value = 0.0
         for turn in turns:
             if turn.towards is None:
@@ -152,20 +152,8 @@ class Geometry:
         dx, dy = offset_names(body.removesuffix(":rod"), point)
         return complex((x == place) + (dx == place), (y == place) + (dy == place))
 
-    def offset_derivative(self, body: str, place: str, values: Mapping[str, Value]) -> Value:
-        """Derivative of a body's angle within its class (radians per unit of the place)."""
-        return self.angle_derivative(self.graph.bodies[body][1], place, values)
-
     def derivatives(self, place: str, values: Mapping[str, Value], vectors: Vectors) -> tuple[list[Value], list[Value]]:
-        """Derivatives of all edges' w and d with respect to one place.
-
-        Parameters
-        ----------
-        values : mapping of str to Value
-            Dimensions that differ from the nominal ones.
-        vectors : Vectors
-            The edges for these dimensions.
-        """
+        """Derivatives of all edges' w and d with respect to one place, at dimensions `values` with edges `vectors`."""
         w_z: list[Value] = []
         d_z: list[Value] = []
         for k, edge in enumerate(self.graph.edges):
@@ -175,7 +163,8 @@ class Geometry:
                 continue
             total: Value = 0j
             for sign, body, point in edge.locals:
-                turned = 1j * self.offset_derivative(body, place, values) * self.local(body, point, values)
+                turn = self.angle_derivative(self.graph.bodies[body][1], place, values)
+                turned = 1j * turn * self.local(body, point, values)
                 total = total + sign * (self.local_derivative(body, point, place) + turned) * vectors.offsets[body]
             w_z.append(total)
             d_z.append(1j * self.angle_derivative(edge.turns, place, values) * vectors.d[k])

@@ -53,18 +53,16 @@ class Edge:
 class Graph:
     """Nodes, edges, angle classes and slides of a mechanism.
 
+    Node 0 is the origin of the ground, at 0; class 0 is the ground's.
+
     Parameters
     ----------
-    nodes : tuple of str
-        Point names; node 0 is the origin of the ground, known at 0.
     bodies : mapping of str to (int, tuple of Turn)
-        Body name to its angle class and its constant offset within the class. Class 0 is the ground's.
+        Angle class of each body, and its constant offset within the class.
     points : mapping of (str, str) to (Term, Term)
-        Local coordinates of a point of a body.
-    slides : tuple of str
-        Names of the joints and telescopic legs whose displacement is a coordinate.
-    telescopic : frozenset of int
-        Those of the legs.
+        By body and point, the point's coordinates in the body's frame.
+    slides, telescopic : tuple of str, frozenset of int
+        Names of the joints and telescopic legs whose displacement is a coordinate; which of them are legs.
     ties : tuple of (str, str, tuple of Turn)
         Pairs of bodies that turn together, and the turns from the first's x axis to the second's.
     """

@@ -1,19 +1,27 @@
-"""What ends the motion or the region of a mechanism: functions that are positive within it, zero where it ends."""
+"""What ends the motion or the region of a mechanism: margins, positive within and zero where it ends, and folds."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross
+from mechdesign.mechanism.algebra import Value, cross, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
+from mechdesign.mechanism.solve import equations, run, set_unknowns
+from mechdesign.mechanism.state import State, Unknowns, start_state
 from mechdesign.numerics.arrays import Flags, Floats
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
+# Largest errors at a fold: of its equations (parts of the mechanism's size) and of the determinant (parts of that at
+# the last pose).
+FOLD_SOLVED = 1e-9
+# How far from the last pose a fold may lie along the coordinate (radians, or parts of the size).
+FOLD_REACH = 0.1
 
 
 @dataclass(frozen=True)
@@ -25,15 +33,13 @@ class Cause:
     kind : str
         ``dead centre``: a group of links is stretched or folded. ``singularity``: links that are solved together turn
         back, or the motion goes to infinity. ``leg at zero length``. ``limit``: one that the study states.
-    name : str
-        The links of the group and how they lie, the leg, or the limit.
-    joint : str
-        The joints of the group, the leg, or the limit.
+    name, joint : str
+        The links of the group and how they lie, and its joints; for others the leg or the limit.
     group : int
         Index of the group among the plan's, -1 for legs and stated limits.
     role : str
-        ``closure``; ``across`` (its sign alone tells: the motion goes to infinity where it changes); ``reached`` (1 or
-        -1: a group without a closed form); ``leg``; ``limit``.
+        Which margin it has: ``closure`` of a group; ``across``, of two slides (the motion goes to infinity where the
+        sign changes); ``reached``, 1 or -1, of a group without a closed form; ``leg``; ``limit``.
     """
 
     kind: str
@@ -73,11 +79,9 @@ class SweepMargins:
     Parameters
     ----------
     given : mapping of str to ndarray, shape (poses,)
-        The coordinates that the poses give (radians, lengths); but the swept one they are held at their first value.
-    swept : str
-        The one that moves.
+        The coordinates that the poses give (radians, lengths); all but `swept` are held at their first value.
     near : mapping of str to ndarray, shape (poses,)
-        Angles at the poses (radians), without jumps: elsewhere they are told on this branch.
+        Angles at the poses (radians), without jumps: between the poses angles continue them.
     counted : bool
         Whether limits count the turns of angles that are swept or followed.
     """
@@ -130,7 +134,7 @@ class SweepMargins:
     def look(self, place: Floats, start: Configuration | None = None) -> tuple[Floats, Flags]:
         """Margins at values of the swept coordinate, shape (margins, n), and whether the mechanism is valid there.
 
-        nan, and not valid, where the pose to start from is none.
+        nan, and not valid, where the pose to start from is not valid.
         """
         if start is None or start.valid.all():
             pose = self.solve(place, start, limits=False)
@@ -184,3 +188,76 @@ class SweepMargins:
             if structure.edges[k].slide in group.slides
         )
         return cross(np.asarray(one), np.asarray(two))
+
+
+def turning_point(
+    plan: Plan, given: Sequence[float], k: int, near: Configuration
+) -> tuple[float, Configuration, int] | None:
+    """Value of given coordinate `k` at which the motion ends at a fold of a group without a closed form.
+
+    There the determinant of the group's equations F(y, s) = 0 vanishes. F = 0 and det(dF/dy) = 0 together are regular
+    there, so that the fold can be solved for to the last digit, where a search for the last pose that converges cannot.
+
+    Parameters
+    ----------
+    given : sequence of float
+        Values of the plan's coordinates at `near` (radians and lengths).
+    near : Configuration
+        A single valid pose shortly before the end.
+
+    Returns
+    -------
+    (float, Configuration, int) or None
+        The value, the pose there, and the index of the group in the plan; None where no fold is near.
+    """
+    guess = plan.unknowns(near, given)
+    reach = FOLD_REACH * (1.0 if plan.structure.given[k].quantity == "angle" else plan.core.size)
+    folds = [(index, _fold(plan, given, k, near, guess, index)) for index in plan.structure.unknowns]
+    found = [(abs(fold[0] - given[k]), index, fold) for index, fold in folds if fold is not None]
+    distance, index, (value, state) = min(found, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
+    if state is None or distance > reach:
+        return None
+    return value, plan.configuration(state, (), near.places, near.vectors, None, limits=False), index
+
+
+@quiet
+def _fold(
+    plan: Plan, given: Sequence[float], k: int, near: Configuration, guess: Unknowns, index: int
+) -> tuple[float, State] | None:
+    """The coordinate's value at a fold of group `index`, and the state there."""
+    from scipy.optimize import root
+
+    group, size = plan.structure.groups[index], plan.core.size
+    own = np.array(guess[plan.structure.unknowns[index]], dtype=float)
+    weights = np.where(np.arange(len(own)) < len(group.angles), 1.0, size)
+
+    def at(value: float) -> list[Value]:
+        return [np.asarray(value if j == k else v) for j, v in enumerate(given)]
+
+    def state_at(unknowns: Floats) -> State:
+        """Everything up to the group, with its unknowns and the coordinate in their own scales."""
+        values = at(unknowns[-1])
+        state = start_state(plan.core.graph, plan.structure, near.vectors, values)
+        state.size = size
+        run(state, plan.modes_at(values)[:index], guess)
+        set_unknowns(state, group, unknowns[:-1] * weights)
+        return state
+
+    def system(unknowns: Floats) -> tuple[Floats, float]:
+        """Errors of the group's equations and their determinant, lengths in parts of the mechanism's size."""
+        rows, right = equations(state_at(unknowns), group)
+        matrix = np.array(rows, dtype=float) * weights / size
+        return np.array(right, dtype=float) / size, float(np.linalg.det(matrix))
+
+    def residual(unknowns: Floats) -> Floats:
+        errors, determinant = system(unknowns)
+        return np.append(errors, determinant / unit)
+
+    begin = np.append(own / weights, given[k])
+    unit = abs(system(begin)[1]) or 1.0
+    answer: Any = root(residual, begin, method="hybr", options={"xtol": 1e-14, "factor": 0.1})
+    if not np.abs(residual(answer.x)).max() < FOLD_SOLVED:
+        return None
+    value, state = float(answer.x[-1]), state_at(answer.x)
+    state.place(group)
+    return value, run(state, plan.modes_at(at(value)), guess, begin=index + 1)

@@ -1,8 +1,9 @@
-"""The compiled mechanism: plans for any given coordinates, and the batch solution of each."""
+"""The compiled mechanism: plans for any given coordinates, and variants with other dimensions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,21 +11,23 @@ from numpy.typing import ArrayLike
 from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import closing, diagnosis
 from mechdesign.mechanism import coordinates as names
-from mechdesign.mechanism.algebra import rotation
+from mechdesign.mechanism.algebra import Value, rotation
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
-from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.jacobians import Jacobian
+from mechdesign.mechanism.derivatives import Jacobian, Linearization
+from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import check_independent
-from mechdesign.mechanism.sketch import assembly_modes, drawn_value, unknowns_as_drawn
+from mechdesign.mechanism.sketch import SKETCH, assembly_modes, drawn_value, unknowns_as_drawn
 from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Flags, Floats
 
 # Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).
 TIE_ROUNDING = 1e-9
+# Where other dimensions cannot be assembled at the drawn drive values, so many others are tried.
+TRIED_POSES = 512
 
 
 class Mechanism(Core):
@@ -129,7 +132,7 @@ class Mechanism(Core):
             if value is None and (coordinate.kind == "slide" and coordinate.slide in self.graph.telescopic):
                 raise MechanismError(
                     f"the ends of leg '{self.graph.slides[coordinate.slide]}' are needed; add them to the sketch",
-                    "mechanism.sketch",
+                    SKETCH,
                 )
             given.append(0.0 if value is None else value)
         guess = unknowns_as_drawn(self.graph, self.geometry, plan.structure, self.sketch) if plan.iterative else None
@@ -198,3 +201,72 @@ class Pose:
         if coordinate.quantity == "angle":
             value = value / self.mechanism.description.angle_unit
         return np.broadcast_to(value, self.configuration.shape)[()]
+
+
+class Variant(Mechanism):
+    """A mechanism with other dimensions than its original: nothing of its topology is compiled again.
+
+    The assembly modes stay those of the original; groups without a closed form start from its sketch, brought to the
+    new dimensions by continuation at the same values of the drives.
+
+    Raises
+    ------
+    MechanismError
+        If the angles of slides and clamps in a closed chain contradict each other.
+    AssemblyError
+        If a group without a closed form has no assembly to start from.
+    """
+
+    def __init__(self, original: Mechanism, description: Description) -> None:
+        self.original = original
+        self.description = description
+        self.graph = original.graph
+        self.geometry = Geometry(self.graph, description.places)
+        self.nominal = {name: place.nominal for name, place in description.places.items()}
+        self._plans = {}
+        self._check_ties()
+        self.sketch = original.sketch
+        self.drives = original.drives
+        self.bounds = original.bounds
+        self.forward = self.plan(self.drives)
+        self.sketch_configuration = self._assemble_sketch()
+
+    def plan(self, given: Sequence[str]) -> Plan:
+        """Plan for given coordinates, in the assembly of the original's; see `Mechanism.plan`."""
+        key = tuple(given)
+        if key not in self._plans:
+            drawn = self.original.plan(key)
+            self._plans[key] = Plan(self, drawn.structure, drawn.modes)
+        return self._plans[key]
+
+    def _assemble_sketch(self) -> Configuration:
+        before = self.original.nominal
+        changed = {name: value for name, value in self.nominal.items() if value != before[name]}
+        found = drawn(self.original, changed)
+        if not found.valid:
+            if self.forward.iterative:
+                raise AssemblyError("the sketch cannot be assembled with these dimensions")
+            found = elsewhere(self.original, changed)
+        return replace(found, places={})
+
+
+def elsewhere(mechanism: Mechanism, changed: Mapping[str, Value]) -> Configuration:
+    """A pose with other dimensions and the drives near to where they were drawn; the sketch where none closes."""
+    sketch, random = mechanism.sketch_configuration, np.random.default_rng(0)
+    given = []
+    away = np.zeros(TRIED_POSES)
+    for coordinate in mechanism.forward.structure.given:
+        part = random.uniform(-1, 1, TRIED_POSES)
+        away += part**2
+        given.append(sketch.value(coordinate) + part * (np.pi if coordinate.quantity == "angle" else mechanism.size))
+    poses = mechanism.forward.solve(given, changed, limits=False)
+    if not poses.valid.any():
+        return sketch
+    return poses.take(int(np.argmin(np.where(poses.valid, away, np.inf))))
+
+
+def drawn(mechanism: Mechanism, places: Mapping[str, Value]) -> Configuration:
+    """The assembled sketch with other dimensions, the drives where they were drawn."""
+    sketch = mechanism.sketch_configuration
+    given = [sketch.value(coordinate) for coordinate in mechanism.forward.structure.given]
+    return mechanism.forward.solve(given, places, limits=False)

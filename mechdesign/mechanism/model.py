@@ -28,17 +28,10 @@ class Place:
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid link, or a telescopic leg (two bodies and a slide).
+    """A rigid link, or a telescopic leg (two bodies and a slide), whose length is a coordinate.
 
-    Parameters
-    ----------
-    points : mapping
-        Point name to its coordinates (x, y) in the link's frame. A binary link has its first end at (0, 0) and its
-        second at (length, 0). The second end of a telescopic leg is not among them.
-    ends : (str, str) or None
-        The two ends of a binary or telescopic link, in the order from, to; the x axis runs from -> to.
-    telescopic : bool
-        The length is a coordinate.
+    `points` has the coordinates (x, y) of each in the link's frame. The x axis of a binary or telescopic link runs from
+    its first end, at (0, 0), to its second, at (length, 0), which for a telescopic leg is not among the points.
     """
 
     name: str
@@ -125,15 +118,9 @@ class Limit:
 class Description:
     """All that the study says about the mechanism, resolved to names and numbers.
 
-    Parameters
-    ----------
-    sketch : mapping of str to complex
-        Rough positions of points in the world.
-    branch : str
-        What happens where two assemblies meet: ``side`` keeps each joint on its side, ``follow`` goes on smoothly.
-    angle_unit : float
-        Radians in one of the study's units of angle; only the public door `Mechanism.solve` and measure expressions
-        use it.
+    `sketch` has rough positions of points in the world. Where two assemblies meet, `branch` ``side`` keeps each joint
+    on its side and ``follow`` goes on smoothly. `angle_unit` is the study's unit of angle in radians, for measure
+    expressions, messages and `Mechanism.solve`.
     """
 
     places: Mapping[str, Place]

@@ -14,7 +14,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 
 # Step of the central difference of an expression's exact gradient, relative to its arguments' scale.
-STEP = 1e-6
+GRADIENT_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,7 @@ def _directional(coordinate: Coordinate, values: dict[str, Value], direction: li
     largest = reduce(np.maximum, [np.abs(v) for v in direction], 0.0)
     scale = reduce(np.maximum, [np.abs(v) for v in values.values()], 1.0)
     # A pose that does not move takes any step: both sides are the same.
-    step = STEP * scale / np.where(largest > 0, largest, 1.0)
+    step = GRADIENT_STEP * scale / np.where(largest > 0, largest, 1.0)
     sides = [
         _gradient(
             coordinate, {p.name: values[p.name] + h * v for p, v in zip(coordinate.parts, direction, strict=True)}

@@ -16,31 +16,26 @@ from mechdesign.mechanism.continuation import Start, follow
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.solve import run
-from mechdesign.mechanism.state import CONVERGED, STEPS, State, Unknowns, start_state
+from mechdesign.mechanism.state import CONVERGED, NEWTON_STEPS, State, Unknowns, start_state
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.parallel import keep_freed_memory, map_chunks, worker_count
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14
-# On the way to a pose corrections this small will do (radians, or parts of the mechanism's size).
-NEAR = 1e-3
-# Poses of a chunk: the fastest of 4,096 to 262,144, measured. Closed forms are some fifty short operations; threads
-# hand the interpreter's lock over at each and gain only on longer arrays.
+# Between the start and a pose, corrections this small are enough (radians, or parts of the mechanism's size).
+PATH_PRECISION = 1e-3
+# Poses of a chunk: the fastest of 4,096 to 262,144, measured.
 CHUNK = 32768
-MANY = 131072
+# The same on several threads, which gain on longer arrays only: each operation hands the interpreter's lock over.
+THREAD_CHUNK = 131072
 
 
 class Plan:
     """How to find the whole mechanism from given coordinates; made by `Mechanism.plan`.
 
-    Parameters
-    ----------
-    modes : sequence of int
-        Assembly mode of each group as drawn; 0 for groups that have none.
-    follows : bool
-        Whether motions may pass change points where the study lets them. They do so from the assembled sketch, so not
-        while there is none.
+    `modes` has the assembly mode of each group as drawn (0 where it has none). Motions pass change points only if the
+    study lets them and `follows`: they start from the assembled sketch, so not before there is one.
     """
 
     def __init__(self, core: Core, structure: Structure, modes: Sequence[int], *, follows: bool = True) -> None:
@@ -58,11 +53,10 @@ class Plan:
         (coordinate,) = self.structure.given
         period = 2 * np.pi if coordinate.quantity == "angle" else max(self.core.size, 1e-300)
         sketch = float(self.core.sketch_configuration.value(coordinate))
-        return ChangePoints(self.structure.groups, self.modes, sketch, period, self._closures)
-
-    def _closures(self, values: Value, modes: Sequence[Value]) -> list[Value]:
-        """Closures of the first groups, in the order of solution, at values of the one given coordinate."""
-        return self.run([values], self.core.geometry.nominal, None, modes).closures
+        return ChangePoints(
+            self.structure.groups, self.modes, sketch, period,
+            lambda values, modes: self.run([values], self.core.geometry.nominal, None, modes).closures,
+        )  # fmt: skip
 
     def modes_at(self, given: Sequence[Value]) -> Sequence[Value]:
         """Assembly mode of each group at given values: as drawn, or changed at change points that are followed."""
@@ -75,7 +69,7 @@ class Plan:
         vectors: Vectors,
         guess: Unknowns | None,
         modes: Sequence[Value] | None = None,
-        steps: int = STEPS,
+        steps: int = NEWTON_STEPS,
         enough: float = CONVERGED,
         *,
         beyond: bool = False,
@@ -161,7 +155,7 @@ class Plan:
             self.change_points.cover(values[0])
         given, places = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
         count = int(np.prod(shape, dtype=np.int64))
-        length = CHUNK if self.iterative or worker_count(jobs) == 1 else MANY
+        length = CHUNK if self.iterative or worker_count(jobs) == 1 else THREAD_CHUNK
         starts: Ints | None = None
         if start is not None and start.shape:
             starts = _flat(np.arange(start.reason.size).reshape(start.shape), shape)
@@ -202,7 +196,7 @@ class Plan:
         return self.configuration(state, shape, dims, vectors, reached, limits, values)
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
-        """What angles are told near where no motion says more: those given as given, drives within their limits."""
+        """Values within half a turn of which angles are reported: given ones as given, drives within their limits."""
         near = self.core.turns(dims)
         return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
 
@@ -211,7 +205,7 @@ class Plan:
         return self.core.drawn_angles()
 
     def near_sketch(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
-        """What angles are told near where no motion says more, the others near those of the sketch."""
+        """The same, the other angles near those of the sketch."""
         return self._drawn_angles | self.turns(given, dims)
 
     @cached_property
@@ -237,7 +231,7 @@ class Plan:
             return follow(
                 self.structure,
                 lambda at, sizes, guess, steps: self.run(
-                    at, geometry.vectors(sizes), guess, self.modes_at(at), steps, NEAR
+                    at, geometry.vectors(sizes), guess, self.modes_at(at), steps, PATH_PRECISION
                 ),
                 begin.map(some),
                 [some(v) for v in given],
@@ -249,7 +243,7 @@ class Plan:
 
         given = [_flat(v, shape) for v in values]
         found, reached = solve(given, None)
-        # The way as it was given comes first; but a pose is the same whatever turn its angles are told in.
+        # First the given turns; but where they are not reached, the pose is the same with its angles in other turns.
         turned = [
             nearest(v, at) if c.quantity == "angle" else v
             for c, v, at in zip(self.structure.given, given, begin.given, strict=True)
@@ -319,6 +313,6 @@ class Plan:
 
 
 def _flat(value: Value, shape: tuple[int, ...]) -> Value:
-    """A flat batch; what is the same for every pose stays a single number."""
+    """A flat batch; a value that is the same for every pose stays a single number."""
     value = np.asarray(value)
     return value if value.ndim == 0 else np.broadcast_to(value, shape).reshape(-1)

@@ -27,13 +27,15 @@ from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # Singular values below this fraction of the largest are zeros, of columns scaled to length 1.
 RANK = 1e-7
-# What closes to this fraction of the mechanism's size is assembled.
+# Gaps below this fraction of the mechanism's size are closed.
 CLOSED = 1e-9
-# A step along the null space (radians, or fractions of the size), and the part of it by which a real motion is told.
-STEP, KEPT = 0.05, 0.3
-# Directions and starts that are tried: deterministic, and enough that chance leaves none out.
-TRIES = 6
-# Draws of the dimensions of which one has to be regular: of a train of 200 four-bars one in three is.
+# Step along the null space (radians, or fractions of the size).
+NULL_SPACE_STEP = 0.05
+# A motion that goes on for at least this part of a step is a finite one.
+REAL_MOTION = 0.3
+# Directions and starts that are tried, drawn from fixed seeds.
+ATTEMPTS = 6
+# Random dimensions that are tried until one is regular: of a train of 200 four-bars one in three is.
 DRAWS = 50
 
 
@@ -80,7 +82,7 @@ class Equations:
         return nodes, np.concatenate([[0.0], x[: self.angles]]), x[self.angles : self.inner]
 
     def from_sketch(self, sketch: Sketch, spread: float = 0.0, seed: int = 0) -> Floats:
-        """Unknowns as drawn; what is not drawn is put anywhere, and everything is moved by up to `spread`."""
+        """Unknowns as drawn, those not drawn at random, all moved at random by up to `spread`."""
         rng = np.random.default_rng(seed)
         drawn = np.array([np.nan if node is None else node for node in sketch.nodes], dtype=complex)
         known = np.isfinite(drawn)
@@ -121,7 +123,7 @@ class Equations:
         Of several draws one of the largest rank: chance can only lower it. Not finite where no draw is, as a held
         expression may be defined for few values only.
         """
-        draws = [self.drawn(held, seed) for seed in range(TRIES)]
+        draws = [self.drawn(held, seed) for seed in range(ATTEMPTS)]
         finite = [jacobian for jacobian in draws if np.isfinite(jacobian).all()]
         return min(finite, key=lambda jacobian: null_space(jacobian).shape[1], default=draws[0])
 
@@ -198,7 +200,7 @@ class Equations:
 
     def assemble(self, sketch: Sketch) -> Floats | None:
         """An assembled configuration near the sketch; None where there is none."""
-        for attempt in range(TRIES):
+        for attempt in range(ATTEMPTS):
             x, gap = self.solve(self.from_sketch(sketch, 0.1 * attempt, attempt))
             if gap < CLOSED:
                 return x
@@ -212,9 +214,9 @@ class Equations:
             return ordinary, x
         best = (0, x)
         rng = np.random.default_rng(2)
-        for _ in range(TRIES):
+        for _ in range(ATTEMPTS):
             step = motions @ rng.uniform(-1, 1, motions.shape[1])
-            step *= STEP / np.abs(step).max()
+            step *= NULL_SPACE_STEP / np.abs(step).max()
             y, gap = self.solve(x, step=step)
             if gap < CLOSED:
                 best = max(best, (self._realised(y, ordinary), y), key=lambda found: found[0])
@@ -227,11 +229,11 @@ class Equations:
             return ordinary
         kept = np.zeros((motions.shape[1], motions.shape[1]))
         for k, motion in enumerate(motions.T):
-            step = motion * (STEP / np.abs(motion).max())
+            step = motion * (NULL_SPACE_STEP / np.abs(motion).max())
             y, gap = self.solve(x, step=step)
             if gap < CLOSED:
                 kept[:, k] = motions.T @ (y - x) / np.linalg.norm(step)
-        return int((np.linalg.svd(kept, compute_uv=False) > KEPT).sum())
+        return int((np.linalg.svd(kept, compute_uv=False) > REAL_MOTION).sum())
 
     def without(self, jacobian: Floats, edges: Collection[int], classes: Collection[int]) -> tuple[int, int]:
         """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place.
@@ -283,10 +285,9 @@ def separated(basis: Floats, pivots: int) -> list[Floats]:
 def check_independent(equations: Equations, structure: Structure) -> None:
     """Check a mechanism with groups without a closed form for equations that depend on each other.
 
-    A perfect matching of equations and unknowns is necessary, but not enough: in two dimensions a part may be joined
-    within itself too often while another floats, and every count still fits. So the rank of the equations is taken for
-    dimensions drawn at random. Chance, or a long train, can make a draw singular, but never singular equations regular:
-    one regular draw tells.
+    A perfect matching of equations and unknowns is necessary, but not enough: a part may be joined within itself too
+    often while another floats. So the rank of the equations is taken for random dimensions. Chance can make a draw
+    singular, but never singular equations regular: one regular draw is proof.
 
     Raises
     ------
@@ -298,7 +299,7 @@ def check_independent(equations: Equations, structure: Structure) -> None:
     singular = False
     for seed in range(DRAWS):
         draw = equations.drawn(structure.given, seed)
-        # A given expression may have no value at what is drawn, which says nothing.
+        # A given expression may have no value at random dimensions; such a draw does not count.
         if np.isfinite(draw).all():
             singular = null_space(draw).shape[1] > 0
             if not singular:

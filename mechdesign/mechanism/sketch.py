@@ -17,7 +17,7 @@ from mechdesign.mechanism.structure import Group, Structure
 
 # A joint this near to its dividing line, as a fraction of the distances around it, chooses no side.
 UNDECIDED = 0.01
-KEY = "mechanism.sketch"
+SKETCH = "mechanism.sketch"
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,8 @@ def _mode(graph: Graph, geometry: Geometry, structure: Structure, group: Group, 
     if abs(side) <= UNDECIDED * size:
         names = " or ".join(f"'{name}'" for name in deciding_joints(graph, group))
         raise MechanismError(
-            f"{names} lies within 1 % of {line} that divides the two assemblies; draw it clearly on one side", KEY
+            f"{names} lies within 1 % of {line} that divides the two assemblies; draw it clearly on one side",
+            SKETCH,
         )
     return 1 if side > 0 else -1
 
@@ -143,7 +144,9 @@ def _mode(graph: Graph, geometry: Geometry, structure: Structure, group: Group, 
 def _drawn(graph: Graph, sketch: Sketch, node: int) -> complex:
     place = sketch.nodes[node]
     if place is None:
-        raise MechanismError(f"point '{graph.nodes[node]}' is needed to choose the assembly; add it to the sketch", KEY)
+        raise MechanismError(
+            f"point '{graph.nodes[node]}' is needed to choose the assembly; add it to the sketch", SKETCH
+        )
     return place
 
 
@@ -181,12 +184,12 @@ def unknowns_as_drawn(graph: Graph, geometry: Geometry, structure: Structure, sk
                 names = [body for body, (frame, _) in graph.bodies.items() if frame == root]
                 raise MechanismError(
                     f"the points of link '{names[0] if names else '?'}' are needed as a start; add them to the sketch",
-                    KEY,
+                    SKETCH,
                 )
             found.append(float(np.angle(turn)))
         for slide in group.slides:
             value = drawn_value(graph, geometry, sketch, Coordinate("", "slide", "length", slide=slide))
             if value is None:
-                raise MechanismError(f"the ends of '{graph.slides[slide]}' are needed as a start", KEY)
+                raise MechanismError(f"the ends of '{graph.slides[slide]}' are needed as a start", SKETCH)
             found.append(value)
     return found

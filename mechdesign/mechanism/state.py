@@ -16,33 +16,19 @@ from mechdesign.numerics.arrays import Flags, Floats
 
 # The unknowns of all groups without a closed form, one after another (see `Structure.unknowns`).
 Unknowns = Sequence[Value] | Floats
-STEPS = 10
-# After a correction this small (radians, or parts of the mechanism's size) a further one would be below rounding:
-# Newton's method converges quadratically.
+NEWTON_STEPS = 10
+# After a correction this small (radians, or parts of the mechanism's size) another one would be below rounding.
 CONVERGED = 1e-8
 
 
 @dataclass
 class State:
-    """Positions found so far; `None` where nothing is known yet.
+    """Positions found so far (`None` where not known yet), for given coordinates `given`.
 
-    Parameters
-    ----------
-    given : sequence of Value
-        Values of the given coordinates.
-    size : float
-        A length of the mechanism, by which Newton's corrections of slides are measured.
-    steps : int
-        Newton's corrections at most; with none a guess is taken as it is, and counts as not converged.
-    enough : float
-        Correction after which a pose has converged.
-    beyond : bool
-        Whether groups with a closed form are told beyond their reach (see `mechdesign.mechanism.solve`).
-    closures : list
-        Of the groups with a closed form: positive where they close (see `mechdesign.mechanism.solve`).
-    unknowns, converged, determinants
-        Of the others, in their order: what was found, whether each pose converged, and the determinant of
-        the group's equations.
+    Groups with a closed form leave their `closures`, with `beyond` also stretched or folded (see
+    `mechdesign.mechanism.solve`). The others are solved by at most `steps` of Newton's corrections, until one is below
+    `enough` (radians, or parts of the length `size`), and leave their unknowns, which poses converged, and the
+    determinant of their equations.
     """
 
     graph: Graph
@@ -55,7 +41,7 @@ class State:
     slides: list[Any]
     given: Sequence[Value] = ()
     size: float = 1.0
-    steps: int = STEPS
+    steps: int = NEWTON_STEPS
     enough: float = CONVERGED
     beyond: bool = False
     closures: list[Value] = field(default_factory=list)

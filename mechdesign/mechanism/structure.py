@@ -31,6 +31,10 @@ class Tie:
     given: tuple[tuple[int, int], ...] = ()
     offsets: tuple[tuple[int, str], ...] = ()
 
+    def reversed(self, frame: int) -> Tie:
+        """How the root turns with class `frame`, whose tie this is."""
+        return Tie(frame, tuple((-s, k) for s, k in self.given), tuple((-s, body) for s, body in self.offsets))
+
 
 @dataclass(frozen=True)
 class Loop:
@@ -43,20 +47,11 @@ class Loop:
 
 @dataclass(frozen=True)
 class Group:
-    """Unknowns that are solved together.
+    """Unknowns that are solved together: angles of classes (roots of ties), slides, and places of `bases`.
 
-    Parameters
-    ----------
-    angles, slides : tuple of int
-        Unknown angle classes (roots of ties) and slides.
-    loops : tuple of Loop
-        Closures between nodes known before.
-    tree : tuple of (int, int)
-        Edges, each with its sign, that place the group's nodes in order once angles and slides are known.
-    conditions : tuple of int
-        Scalar equations: which given coordinates the group's unknowns must meet beside its loops.
-    bases : tuple of int
-        Nodes whose place is unknown too: each begins the tree of a part that only scalar equations hold.
+    Their equations are `loops` between nodes known before and `conditions`, the given coordinates that they determine
+    besides. The edges of `tree`, each with its sign, then place the group's nodes in order; each base begins the tree
+    of a part that only conditions hold.
     """
 
     form: Form
@@ -118,17 +113,11 @@ class _Ties:
         if a.root == b.root:
             raise Undetermined("the given angles contradict each other: two of them fix the same angle")
         if a.root == 0:
-            # The ground stays the root: turn the relation round.
-            back = Tie(
-                frame,
-                tuple((-s, k) for s, k in step.given),
-                tuple((-s, body) for s, body in step.offsets),
-            )
-            self.join(reference, frame, back)
+            # The ground stays the root.
+            self.join(reference, frame, step.reversed(frame))
             return
-        undo_given = tuple((-s, k) for s, k in a.given)
-        undo_offsets = tuple((-s, body) for s, body in a.offsets)
-        self.parent[a.root] = Tie(b.root, b.given + step.given + undo_given, b.offsets + step.offsets + undo_offsets)
+        back = a.reversed(frame)
+        self.parent[a.root] = Tie(b.root, b.given + step.given + back.given, b.offsets + step.offsets + back.offsets)
 
 
 def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:

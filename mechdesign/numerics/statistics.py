@@ -9,7 +9,7 @@ from mechdesign.numerics.arrays import Floats
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 # Standard deviations beyond which the normal density is zero in double precision.
-FAR = 40.0
+MAX_DEVIATION = 40.0
 # Width of an integration panel, in the inverse hyperbolic tangent of the correlation.
 _PANEL = 2.0
 
@@ -42,13 +42,14 @@ def rectangle_failure(low: Floats, high: Floats, rho: Floats) -> Floats:
 
         P(X > h) P(Y > k) + 1/(2 pi) integral exp(-(h^2 + k^2 - 2 h k r) / (2 (1 - r^2))) / cosh w dw
     """
-    low, high, rho = np.clip(low, -FAR, FAR), np.clip(high, -FAR, FAR), np.clip(np.nan_to_num(rho), -1.0, 1.0)
+    low, high = np.clip((low, high), -MAX_DEVIATION, MAX_DEVIATION)
+    rho = np.clip(np.nan_to_num(rho), -1.0, 1.0)
     # Along axes turned towards each corner, which changes the sign of the correlation of two of them.
     h = np.stack([high[0], -low[0], high[0], -low[0]])
     k = np.stack([high[1], -low[1], -low[1], high[1]])
     sign = np.multiply.outer([1.0, 1.0, -1.0, -1.0], np.sign(rho))
     with np.errstate(divide="ignore"):
-        reach = np.minimum(np.arctanh(np.abs(rho)), FAR)
+        reach = np.minimum(np.arctanh(np.abs(rho)), MAX_DEVIATION)
     integral, panels = np.zeros(h.shape), np.ceil(reach / _PANEL)
     for count in np.unique(panels[panels > 0]).astype(int).tolist():
         own = panels == count

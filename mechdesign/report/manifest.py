@@ -9,14 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import plain
 from mechdesign.results import Result
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 NAME = "manifest.json"
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "pydantic", "pint", "pyyaml", "pymoo")

@@ -4,39 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.results import Result, Table
 from mechdesign.rows import UnknownColumnError, choose
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
-    from mechdesign.study.schema.optimize import Condition
+from mechdesign.study import Study
+from mechdesign.study.schema.optimize import Condition
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of one requirement.
+    """What became of one requirement."""
 
-    Parameters
-    ----------
-    requirement : str
-        The requirement in words.
-    met : bool
-        Whether the worst row meets it.
-    worst : float
-        The value of the worst row; nan where a row has none or no row was found.
-    place : str
-        The pose or row where it is worst.
-    """
-
-    requirement: str
-    met: bool
-    worst: float
-    place: str = ""
+    requirement: str  # in words
+    met: bool  # whether the worst row meets it
+    worst: float  # the value of the worst row; nan where a row has none or no row was found
+    place: str = ""  # the pose or row where it is worst
 
     def __str__(self) -> str:
         place = f" at {self.place}" if self.place else ""
@@ -69,7 +54,7 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
             # Of so few designs some rows may be missing that all of them have.
             judge(look(study, command), study.requirements, problem=study.problem, whole=command != "optimize")
         except AssemblyError:
-            # The answer itself will tell.
+            # Its own computation reports it.
             continue
         except StudyError as error:
             problems += error.problems

@@ -53,13 +53,7 @@ def csv_blocks(table: Table) -> Iterator[str]:
 
 
 def from_csv(text: str, name: str, columns: Sequence[Mapping[str, str]], meaning: str = "") -> Table:
-    """The table that `to_csv` wrote, to its digits.
-
-    Parameters
-    ----------
-    columns : sequence of mapping
-        ``name``, ``unit`` and ``meaning`` of each, as the manifest has them.
-    """
+    """The table that `to_csv` wrote, to its digits; `name`, `unit` and `meaning` of the columns are the manifest's."""
     _, *rows = csv.reader(io.StringIO(text))
     texts = zip(*rows, strict=True) if rows else [()] * len(columns)
     return Table(

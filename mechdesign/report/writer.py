@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError, explain
 from mechdesign.files import replace
@@ -17,9 +16,7 @@ from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import Result
-
-if TYPE_CHECKING:
-    from mechdesign.study import Study
+from mechdesign.study import Study
 
 MECHANISM = "mechanism.png"
 ANIMATION = "motion.gif"
@@ -46,7 +43,7 @@ def check_writable(directory: Path) -> None:
 
 
 def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Extras) -> tuple[str, ...]:
-    """Write a result into a directory and return what is to be told of its pictures: those that could not be drawn.
+    """Write a result into a directory and return a warning for each picture that could not be drawn.
 
     Each file appears whole or not at all. The tables come first, with a manifest that vouches for them alone: whatever
     becomes of the pictures, they are there. Of an interrupted computation no pictures are drawn. Files of an older
@@ -118,15 +115,7 @@ def write_sketch(directory: Path, study: Study) -> str:
 
 
 def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """Pictures of a result: those of its command, the mechanism, and the motion as a GIF if it is one.
-
-    Returns
-    -------
-    pictures : dict of str to bytes
-        By the names of their files.
-    warnings : tuple of str
-        Those that could not be drawn, and why.
-    """
+    """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings."""
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
     from mechdesign.report.figures.rendering import Drawing, Gallery, render
@@ -140,7 +129,7 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[di
         }
         drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study, result))
         if animate:
-            from mechdesign.report.figures.kinematics.animation import animation
+            from mechdesign.report.figures.animation import animation
 
             drawings[ANIMATION] = lambda: animation(result)
         drawn, failed = render(drawings)

@@ -18,21 +18,20 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, Problem, StudyError
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
-from mechdesign.mechanism.variant import Variant
-from mechdesign.study import overrides, poses
+from mechdesign.study import poses
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
-from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.study.schema.study_file import StudyFile
+from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text.document import Document, KeyPath, leaves, plain, read
@@ -44,45 +43,15 @@ from mechdesign.threads import one_thread
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A validated study.
+    """A validated study; sections are None where it does not ask."""
 
-    Parameters
-    ----------
-    name : str
-        Its name, by default that of its file.
-    path : Path or None
-        Its file.
-    text_sha256 : str
-        SHA-256 of the file as it was read.
-    seed : int
-        Seed of random numbers.
-    overrides : tuple of str
-        As given to `load`.
-    units : Units
-        What bare numbers mean.
-    resolved : dict
-        The study as plain data, overrides applied.
-    mechanism : Mechanism
-        The compiled mechanism.
-    parameters : Parameters
-        Parameters and the places of the geometry that depend on them.
-    kinematics, workspace, optimize, reliability, stiffness : section or None
-        The questions; None where the study does not ask.
-    requirements : tuple of Condition
-        The gate.
-    targets : mapping of str to Target
-        What outputs should be, by the coordinate or point.
-    warnings : tuple of Problem
-        What is likely a mistake, such as a parameter that nothing uses.
-    """
-
-    name: str
+    name: str  # by default that of its file
     path: pathlib.Path | None
-    text_sha256: str
+    text_sha256: str  # of the file as it was read
     seed: int
     overrides: tuple[str, ...]
     units: Units
-    resolved: dict[str, Any]
+    resolved: dict[str, Any]  # the study as plain data, overrides applied
     mechanism: Mechanism
     parameters: Parameters
     kinematics: KinematicsSection | None
@@ -91,8 +60,8 @@ class Study:
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
     requirements: tuple[Condition, ...]
-    targets: Mapping[str, Target]
-    warnings: tuple[Problem, ...] = ()
+    targets: Mapping[str, Target]  # by the coordinate or point
+    warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -121,23 +90,14 @@ class Study:
         if hashlib.sha256(content).hexdigest() != self.text_sha256:
             return Problem(message, ".".join(map(str, keys)), str(self.path or ""))
         document = read(content, str(self.path))
-        overrides.apply(document, self.overrides)
+        override(document, self.overrides)
         reporter = Reporter(document)
         reporter.report(keys, message)
         return reporter.problems[-1]
 
 
 def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:
-    """Load a study.
-
-    Parameters
-    ----------
-    path : str or Path
-        The study file.
-    overrides : sequence of str
-        ``a.b.c=value``, applied before validation.
-    seed : int, optional
-        In place of the study's own.
+    """Load a study file; overrides ``a.b.c=value`` apply before validation, a seed replaces the study's own.
 
     Raises
     ------
@@ -160,7 +120,7 @@ def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), 
     document = read(content, str(path))
     if isinstance(changes, str):
         changes = (changes,)
-    overrides.apply(document, changes)
+    override(document, changes)
     return load_document(document, path, hashlib.sha256(content).hexdigest(), tuple(changes), seed)
 
 
@@ -174,10 +134,7 @@ def load_document(
 ) -> Study:
     """Load a study from the data of a file, overrides applied; see `load`.
 
-    Parameters
-    ----------
-    original : Mechanism, optional
-        Of a study that differs in numbers alone: its assembly is taken, where else the sketch would choose one.
+    The assembly is that of the `original`, a study that differs in numbers alone, where else the sketch would choose.
     """
     reporter = Reporter(document)
     data = _sections(document, reporter)
@@ -231,7 +188,7 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
 def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
     """Units and parameters, which all other numbers are read with."""
     units = Units()
-    # A wrong unit is told with the mistakes of the other sections.
+    # A wrong unit is reported with the mistakes of the other sections.
     with contextlib.suppress(ValidationError):
         units = Units(**UnitsSection.model_validate(data.get("units") or {}).model_dump())
     mechanism = data.get("mechanism")
@@ -278,7 +235,7 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
             parts[key] = _adapter(key).validate_python(raw, context=context)
         except ValidationError as error:
             reporter.report_validation(error, StudyFile, (key,))
-            # Names are checked all the same where the mistakes told so far are in numbers and keys alone.
+            # Names are checked all the same where the mistakes so far are in numbers and keys alone.
             with contextlib.suppress(ValidationError):
                 parts[key] = _adapter(key).validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts

@@ -21,21 +21,11 @@ MAX_POSES = 10_000_000
 
 @dataclass(frozen=True, eq=False)
 class PoseGroup:
-    """Poses that give the same coordinates.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Coordinates given, as many as the mobility.
-    values : mapping of str to ndarray, shape (n,)
-        In the study's units.
-    rows : ndarray of int, shape (n,)
-        Place of each pose in the study's order.
-    """
+    """Poses that give the same coordinates, as many as the mobility."""
 
     names: tuple[str, ...]
-    values: Mapping[str, Floats]
-    rows: Ints
+    values: Mapping[str, Floats]  # in the study's units, shape (n,)
+    rows: Ints  # place of each pose in the study's order, shape (n,)
 
     def columns(self) -> list[Floats]:
         """Values in the order of the names."""
@@ -44,42 +34,25 @@ class PoseGroup:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """All poses of a question; of several designs, one design's after the other's.
+    """All poses of a question; of several designs, one design's after the other's."""
 
-    Parameters
-    ----------
-    groups : tuple of PoseGroup
-        One, unless listed poses give different coordinates.
-    count : int
-        Number of poses over all groups.
-    listed : bool
-        Whether a person listed these very poses, so that one that fails is an error.
-    grid : tuple of int
-        Number of values along each swept coordinate; the last varies fastest. One number for lists and paths.
-    designs : int
-        Each has as many poses.
-    places, parameters : mapping of str to ndarray, shape (count,)
-        Where designs differ from the study's own: dimensions (lengths, radians), and parameters in the study's units.
-    motion : bool
-        Whether one design passes them one after the other: a sweep along one coordinate, or a path.
-    closed : bool
-        Whether the motion goes on from the last pose to the first.
-    slopes, bends : mapping of str to ndarray, shape (count,)
-        Along the path of a point, first and second derivative of every coordinate given by the path's length, in the
-        study's units; nan where the path has no direction.
-    """
-
-    groups: tuple[PoseGroup, ...]
-    count: int
-    listed: bool
-    grid: tuple[int, ...]
-    designs: int = 1
+    groups: tuple[PoseGroup, ...]  # one, unless listed poses give different coordinates
+    count: int  # number of poses over all groups
+    listed: bool  # whether a person listed these very poses, so that one that fails is an error
+    grid: tuple[int, ...]  # number of values of each swept coordinate, the last fastest; one number for lists and paths
+    designs: int = 1  # each has as many poses
+    # Where designs differ from the study's own, shape (count,): dimensions (lengths, radians), and parameters in the
+    # study's units.
     places: Mapping[str, Floats] = field(default_factory=dict)
     parameters: Mapping[str, Floats] = field(default_factory=dict)
-    motion: bool = False
-    closed: bool = False
+    motion: bool = False  # whether one design passes them one after the other: a sweep of one coordinate, or a path
+    closed: bool = False  # whether the motion goes on from the last pose to the first
+    # Along the path of a point, shape (count,): first and second derivative of every coordinate given by the path's
+    # length, in the study's units; nan where the path has no direction.
     slopes: Mapping[str, Floats] = field(default_factory=dict)
     bends: Mapping[str, Floats] = field(default_factory=dict)
+    # Of a grid of rays: those of each patch of the workspace, which turn on from one to the next.
+    patches: tuple[slice, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -184,10 +157,10 @@ def _path(path: Mapping[str, paths.PathSection], folder: Path) -> Poses:
     if not path:
         raise StudyError("an empty path")
     columns: dict[str, Floats] = {}
-    found: dict[str, paths.Course] = {}
+    found: dict[str, paths.PointPath] = {}
     for name, given in path.items():
         course = paths.course(name, given, folder)
-        if isinstance(course, paths.Course):
+        if isinstance(course, paths.PointPath):
             found[name] = course
             columns[f"{name}.x"], columns[f"{name}.y"] = course.places.real, course.places.imag
         else:
@@ -208,7 +181,7 @@ def _path(path: Mapping[str, paths.PathSection], folder: Path) -> Poses:
     ((owner, along),) = moving
     slopes: dict[str, Floats] = {}
     for name, column in values.items():
-        # What is listed beside the point's path changes evenly between the places.
+        # What is listed along with the point's path changes evenly between the places.
         with np.errstate(divide="ignore", invalid="ignore"):
             steps = np.where(np.diff(column) == 0, 0.0, np.diff(column) / np.diff(along.way))
         slopes[name] = np.append(steps, steps[-1:])

@@ -22,8 +22,8 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError
 from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Fixed
-from mechdesign.mechanism.variant import Variant
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document
@@ -47,10 +47,12 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
     StudyError
         If a name is neither a parameter nor a place, or the values make no mechanism.
     MechanismError, AssemblyError
-        See `mechdesign.mechanism.variant.Variant`.
+        See `mechdesign.mechanism.mechanism.Variant`.
     """
     file, path = str(study.path or ""), study.path or pathlib.Path()
-    check_names(study, changed)
+    unknown = [name for name in changed if name not in study.parameters.known()]
+    if unknown:
+        raise StudyError([Problem("is neither a parameter nor a dimension", name, file) for name in unknown])
     values = {name: np.asarray(value, dtype=float) for name, value in changed.items()}
     parameters, places = study.parameters.values(values), study.parameters.places(values)
     (wrong,) = faults(study, parameters, places, 1)
@@ -76,22 +78,6 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
             old.measured.difference(changed),
         ),
     )
-
-
-def check_names(study: Study, names: Collection[str]) -> None:
-    """Check that names are parameters or places.
-
-    Raises
-    ------
-    StudyError
-        With every name that is neither.
-    """
-    known = {*study.parameters.known()}
-    wrong = [
-        Problem("is neither a parameter nor a dimension", n, str(study.path or "")) for n in names if n not in known
-    ]
-    if wrong:
-        raise StudyError(wrong)
 
 
 def faults(study: Study, parameters: Mapping[str, Number], places: Mapping[str, Number], count: int) -> list[str]:
@@ -120,28 +106,12 @@ def faults(study: Study, parameters: Mapping[str, Number], places: Mapping[str, 
     return [str(reason) for reason in found]
 
 
-def moved(study: Study, names: Collection[str]) -> set[str]:
-    """Those of the names that are parameters, and the parameters that follow from them."""
-    found = {name for name in names if name in study.parameters.nominal}
-    for name, formula in study.parameters.formulas.items():
-        if name not in names and formula.names & found:
-            found.add(name)
-    return found
-
-
-def places_of(study: Study, names: Collection[str]) -> set[str]:
-    """Places that are among the names, or depend on one of them."""
-    parameters = moved(study, names)
-    followers = {place for place, formula in study.parameters.dependent.items() if formula.names & parameters}
-    return {*followers, *(name for name in names if name in study.parameters.factors)}
-
-
 def follows(study: Study, names: Collection[str], sections: Collection[str] = SECTIONS) -> bool:
     """Whether more than numbers of the geometry depends on parameters or places: numbers of sections, or the sketch's.
 
     A name in any text of a section counts: that it never misses matters more than that it is sometimes wrong.
     """
-    parameters = moved(study, names)
+    parameters = study.parameters.moved(names)
     mechanism = study.resolved["mechanism"]
     # An expression of a target is evaluated with the parameters at hand; the numbers of a list are not.
     read = [study.resolved.get(name) for name in sections]
@@ -150,7 +120,9 @@ def follows(study: Study, names: Collection[str], sections: Collection[str] = SE
         return True
     if not study.parameters.measured:
         return False
-    return _mentions(mechanism.get("sketch"), parameters) or not _drawing(study).isdisjoint(places_of(study, names))
+    return _mentions(mechanism.get("sketch"), parameters) or not _drawing(study).isdisjoint(
+        study.parameters.moved_places(names)
+    )
 
 
 def _drawing(study: Study) -> set[str]:
@@ -220,16 +192,10 @@ def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[An
 
 
 def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, dict[str, str]]:
-    """A study's text where it says other values, and the files it needs beside it, by their names.
+    """The text of a study with other values, headed by a comment, and the files that it reads, by their names.
 
-    Overrides are part of the new text, as is the seed. Comments are kept where no more than single values change.
-
-    Parameters
-    ----------
-    data : dict
-        The study as plain data, `Study.resolved` with other values; its names of files are brought up to date.
-    heading : str
-        What the first line says, as a comment.
+    Overrides are part of the new text, as is the seed. Comments are kept where no more than single values change. The
+    names of files in `data`, which is `Study.resolved` with other values, are brought up to date.
     """
     files: dict[str, str] = {}
     for keys, file, content in study.inputs():

@@ -16,7 +16,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.plan import MANY
+from mechdesign.mechanism.plan import THREAD_CHUNK
 from mechdesign.parallel import map_chunks
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -58,12 +58,12 @@ def test_velocities_and_accelerations_a_second(benchmark: Any) -> None:
     theta = angles()
 
     def chunk(begin: int) -> None:
-        linear = mechanism.linearize(mechanism.forward.solve([theta[begin : begin + MANY]]))
+        linear = mechanism.linearize(mechanism.forward.solve([theta[begin : begin + THREAD_CHUNK]]))
         velocity = linear.velocity([1.0])
         linear.acceleration(velocity, [0.0])
 
     def whole() -> None:
-        for _ in map_chunks(chunk, range(0, POSES, MANY), 2):
+        for _ in map_chunks(chunk, range(0, POSES, THREAD_CHUNK), 2):
             pass
 
     benchmark.pedantic(whole, rounds=7, warmup_rounds=1)

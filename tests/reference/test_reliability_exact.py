@@ -13,7 +13,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE
+from mechdesign.analyses.reliability.engine.problem import CONFIDENCE
 from mechdesign.analyses.reliability.methods.auto import PILOT
 from mechdesign.results import Result, Table
 

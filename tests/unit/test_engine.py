@@ -9,8 +9,7 @@ from helpers.limit_states import Case, quasi_monte_carlo
 from scipy.special import ndtr
 
 from mechdesign.analyses.reliability.engine.design_points import find
-from mechdesign.analyses.reliability.engine.intervals import WIDTH, Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
+from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, Precision, Problem
 from mechdesign.analyses.reliability.methods.form import form
 from mechdesign.analyses.reliability.methods.importance_sampling import importance_sampling
 

@@ -8,8 +8,16 @@ from helpers import limit_states
 from helpers.limit_states import Case, quasi_monte_carlo
 
 from mechdesign.analyses.reliability.engine.design_points import find
-from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE, WIDTH, Precision, binomial, weighted
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
+from mechdesign.analyses.reliability.engine.problem import (
+    CONFIDENCE,
+    WIDTH,
+    Estimate,
+    Precision,
+    Problem,
+    binomial,
+    failed,
+    weighted,
+)
 from mechdesign.analyses.reliability.methods.auto import climb, rungs
 from mechdesign.analyses.reliability.methods.importance_sampling import importance_sampling
 

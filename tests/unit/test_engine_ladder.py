@@ -7,8 +7,7 @@ import pytest
 from helpers import limit_states
 from helpers.limit_states import Case
 
-from mechdesign.analyses.reliability.engine.intervals import WIDTH, Precision, binomial
-from mechdesign.analyses.reliability.engine.problem import Estimate, failed
+from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, Precision, binomial, failed
 from mechdesign.analyses.reliability.methods.auto import FEW, PILOT, climb, disagree, rungs
 
 Said = tuple[Estimate, str, dict[str, Estimate]]

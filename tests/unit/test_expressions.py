@@ -93,7 +93,7 @@ def test_derivatives_agree_with_differences(text, x, y):
         ("1/0", "division by zero"),
         ("sqrt(-1)", "not a number"),
         ("10**400", "too large"),
-        ("1e308*10", "no finite value"),
+        ("1e308*10", "too large"),
         ("(" * 60 + "1" + ")" * 60, "nested deeper"),
         ("1" + "+1" * 600, "longer than"),
         ("-" * 900 + "1", "nested deeper"),

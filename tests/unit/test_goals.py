@@ -373,7 +373,7 @@ def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
     goals = [goal("kinematics.extremes.C.y.range"), goal("kinematics.C.x")]
     designs = around(study, ["crank.length", "coupler.C.x"], 9, 0.1)
     whole = Evaluator(study, goals)(designs)
-    monkeypatch.setattr(evaluation, "BLOCK", 150)
+    monkeypatch.setattr(evaluation, "POSES_AT_ONCE", 150)
     parts = Evaluator(study, goals)(designs)
     assert parts.table.tobytes() == whole.table.tobytes()
 

@@ -6,11 +6,10 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.kinematics import figures
-from mechdesign.report.figures.kinematics.animation import in_order
-from mechdesign.report.figures.kinematics.curves import curves_figure
+from mechdesign.report.figures.animation import in_order
+from mechdesign.report.figures.kinematics import curves_figure, figures
 from mechdesign.report.figures.mechanism import sketch_figure
-from mechdesign.report.figures.sweep import Sweep, ranks
+from mechdesign.report.figures.scene import Sweep, ranks
 
 FOUR_BAR = """
 mechanism:

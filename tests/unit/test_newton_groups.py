@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 import mechdesign
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.derivatives import regularity
-from mechdesign.mechanism.newton import solve_linear
+from mechdesign.mechanism.margins import turning_point
 from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.turning import turning_point
+from mechdesign.mechanism.solve import solve_linear
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SIX_BAR = """

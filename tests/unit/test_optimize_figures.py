@@ -11,8 +11,7 @@ from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judge import JudgedDesigns
 from mechdesign.analyses.optimize.tables import Comparison
 from mechdesign.report.figures import style
-from mechdesign.report.figures.optimize import figures
-from mechdesign.report.figures.optimize.many import MOST, convergence, front_figure, parallel_axes
+from mechdesign.report.figures.optimize import MAX_LINES, convergence, figures, front_figure, parallel_axes
 from mechdesign.results import Column, Table
 
 ARM = """
@@ -86,7 +85,7 @@ def test_parallel_axes_of_many_designs_show_some_and_always_the_best() -> None:
     with style.context():
         axes = parallel_axes(designs).axes[0]
     lines = axes.collections[0].get_segments()
-    assert len(lines) == MOST
+    assert len(lines) == MAX_LINES
     cost = designs.values[designs.designs.feasible, 0]
     best = axes.lines[0].get_xydata()
     assert best[3, 1] == 0

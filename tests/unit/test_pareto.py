@@ -8,8 +8,8 @@ from helpers.studies import study_of
 from helpers.syntheses import tray
 
 import mechdesign
-from mechdesign.analyses.optimize.explorer import Explorer, Scores
-from mechdesign.analyses.optimize.pareto import crowding, evolve, front, knee
+from mechdesign.analyses.optimize.explorer import Explorer, Known
+from mechdesign.analyses.optimize.pareto import crowding, evolve_front, front, knee
 from mechdesign.analyses.optimize.search import sample
 
 # x = r1 cos 30 + r2 cos 60 is small and y = r1 sin 30 + r2 sin 60 large: first r2 grows, then r1.
@@ -36,8 +36,12 @@ def zdt1(u):
 
 
 def spread(function, margins=lambda u: np.empty((len(u), 0)), seed=0):
-    explorer = Explorer(lambda u: Scores(function(u), margins(u), np.empty((len(u), 0))), 3, 3000)
-    evolve(explorer, np.ones(2), sample(3, np.random.default_rng(seed), 100, 100), seed)
+    def evaluated(u):
+        values = function(u)
+        return Known(u, values, margins(u), np.empty((len(u), 0)), np.isnan(values).any(axis=1).astype(float))
+
+    explorer = Explorer(evaluated, 3, 3000)
+    evolve_front(explorer, np.ones(2), sample(3, np.random.default_rng(seed), 100, 100), seed)
     return explorer.known
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, owens_t
 
-from mechdesign.analyses.reliability.engine.intervals import binomial
-from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.engine.problem import Estimate, binomial
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.probability import (
     disc_failure,

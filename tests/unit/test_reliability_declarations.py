@@ -12,15 +12,14 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints
-from mechdesign.analyses.reliability.engine.intervals import Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Precision, Problem
 from mechdesign.analyses.reliability.methods import normal
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.errors import StudyError
 from mechdesign.report.figures import style
 from mechdesign.report.figures.reliability import figures
 from mechdesign.report.tables import to_csv
-from mechdesign.study.schema.methods import METHODS, Method, register
+from mechdesign.study.schema.methods import METHODS, Method
 from mechdesign.study.schema.study_file import schema
 
 LEVER = """
@@ -50,7 +49,7 @@ def rung(
 def cautious() -> Iterator[None]:
     method = Method("cautious", "cautious first order", "first-order errors, twice as wide", 2, step=1, module=__name__)
     known = dict(METHODS)
-    register(method)
+    METHODS[method.name] = method
     yield
     METHODS.clear()
     METHODS.update(known)

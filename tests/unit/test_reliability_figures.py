@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from helpers.studies import study_of
@@ -11,7 +13,7 @@ import mechdesign
 from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import number
-from mechdesign.report.figures.planes import Plane
+from mechdesign.report.figures.planes import plane
 from mechdesign.report.figures.reliability import figures
 from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
 from mechdesign.report.figures.reliability.looks import look
@@ -274,25 +276,16 @@ def test_grid_of_drives_has_maps_over_them() -> None:
 
 
 def test_patches_of_a_workspace_are_kept_apart() -> None:
-    def rays(*degrees: float):
-        return np.exp(1j * np.radians(degrees))[:, None] * np.linspace(1, 2, 4)
-
-    z = np.concatenate([rays(0, 10, 20), rays(20, 30), 3 * rays(20, 25, 30), rays(30)])
-    plane = Plane(("x", "y"), z.real, z.imag, True, True)
-    assert list(plane.patches()) == [slice(0, 3), slice(3, 5), slice(5, 8)]
-    assert list(Plane(("x", "y"), z.real, z.imag, True, False).patches()) == [slice(0, 9)]
-
-
-def test_a_ray_that_is_a_point_is_the_tip_of_its_patch() -> None:
-    def tip(degrees: float):
-        return np.full((1, 4), 1.5 * np.exp(1j * np.radians(degrees)))
-
-    def rays(*degrees: float):
-        return np.exp(1j * np.radians(degrees))[:, None] * np.linspace(1, 2, 4)
-
-    z = np.concatenate([tip(0), rays(10, 20), tip(30), tip(15), rays(18, 28), 2 * rays(25, 30), 2 * tip(40)])
-    plane = Plane(("x", "y"), z.real, z.imag, True, True)
-    assert list(plane.patches()) == [slice(0, 4), slice(4, 7), slice(7, 10)]
+    study = mechdesign.load(Path(__file__).parents[2] / "configs/gallery/five_bar_precision_map.yaml")
+    poses = study_poses(study, "reliability")
+    over = plane(study, poses)
+    assert over is not None
+    assert [patch.stop - patch.start for patch in over.patches] == [3, 30, 30, 3]
+    assert (over.patches[0].start, over.patches[-1].stop) == (0, len(over.x))
+    # The ends of the rays of a patch follow one another without jumps.
+    z = over.x + 1j * over.y
+    for patch in over.patches:
+        assert np.abs(np.diff(z[patch], axis=0)).max() < 0.4 * np.ptp(over.x)
 
 
 def test_path_in_the_plane_is_drawn_over_its_poses() -> None:

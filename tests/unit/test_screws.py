@@ -10,9 +10,9 @@ import pytest
 
 from mechdesign.analyses.stiffness.compliance import Held, by_wrenches
 from mechdesign.analyses.stiffness.force_method import Twists, load
-from mechdesign.analyses.stiffness.network import Edge, Network
+from mechdesign.analyses.stiffness.network import Network, NetworkEdge
 from mechdesign.analyses.stiffness.screws import (
-    Chain,
+    LegScrews,
     constraint_compliance,
     equivalent_springs,
     hinge_twist,
@@ -33,13 +33,13 @@ def along(*directions: complex) -> list[np.ndarray]:
     return [slide_twist(np.array([direction / abs(direction)])) for direction in directions]
 
 
-def chain(passive: list[np.ndarray], elastic: list[np.ndarray] = (), compliance: list[float] = ()) -> Chain:
-    return Chain(passive, list(elastic), list(compliance), np.zeros(1, complex), np.zeros(1, complex))
+def chain(passive: list[np.ndarray], elastic: list[np.ndarray] = (), compliance: list[float] = ()) -> LegScrews:
+    return LegScrews(passive, list(elastic), list(compliance), np.zeros(1, complex), np.zeros(1, complex))
 
 
-def by_forces(*chains: Chain, size: int = 3) -> Held:
+def by_forces(*chains: LegScrews, size: int = 3) -> Held:
     """A body at the origin by the force method: every leg is one edge from the ground."""
-    edges = tuple(Edge(GROUND, "body", (), f"leg {k}", "P") for k in range(len(chains)))
+    edges = tuple(NetworkEdge(GROUND, "body", (), f"leg {k}", "P") for k in range(len(chains)))
     loops = tuple(((k, 1), (0, -1)) for k in range(1, len(chains)))
     network = Network(edges, "body", {GROUND: (), "body": ((0, 1),)}, loops, {})
     freedoms = [
@@ -63,7 +63,7 @@ def by_forces(*chains: Chain, size: int = 3) -> Held:
     ).held
 
 
-def by_legs(*chains: Chain, size: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def by_legs(*chains: LegScrews, size: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stiffness, compliance and where they are known, of legs of one rank each in all poses."""
     wrenches = []
     for leg in chains:
@@ -73,7 +73,7 @@ def by_legs(*chains: Chain, size: int = 3) -> tuple[np.ndarray, np.ndarray, np.n
     return by_wrenches(wrenches, blocks, LENGTH, size)
 
 
-def strut(base: complex, tip: complex, stiffness: float = np.inf) -> Chain:
+def strut(base: complex, tip: complex, stiffness: float = np.inf) -> LegScrews:
     """A hinged leg that is elastic (or rigid) along its line only."""
     spring = ([], []) if np.isinf(stiffness) else (along(tip - base), [1 / stiffness])
     return chain(at(base, tip), *spring)
@@ -138,7 +138,7 @@ def test_constraint_space_compliance_does_not_depend_on_the_frame() -> None:
     """Moved and turned with the mechanism, K transforms as a tensor of screws [S4, eqs. 26, 30]."""
     shift, turn = 0.7 - 0.4j, np.exp(0.6j)
 
-    def moved(leg: Chain) -> Chain:
+    def moved(leg: LegScrews) -> LegScrews:
         def carry(twist: np.ndarray) -> np.ndarray:
             if twist[2, 0] == 0:
                 return along(complex(twist[0, 0], twist[1, 0]) * turn)[0]
@@ -218,7 +218,7 @@ def test_under_constrained_with_a_rigid_leg_has_neither_matrix() -> None:
 def test_a_leg_rigid_in_its_links_turns_about_its_motor() -> None:
     """Driven R, passive P: C_c is singular; one spring is rigid through the motor, the other twice the arm away."""
     motor = 2e3
-    leg = Chain(along(1), at(-0.5), [1 / motor], np.array([-0.5 + 0j]), np.zeros(1, complex))
+    leg = LegScrews(along(1), at(-0.5), [1 / motor], np.array([-0.5 + 0j]), np.zeros(1, complex))
     wrenches = reciprocal_wrenches(leg.passive, 1, LENGTH, 1)
     outer, inner = equivalent_springs(wrenches, leg, LENGTH)
     assert outer.place[0] == pytest.approx(0.5)
@@ -229,7 +229,9 @@ def test_a_leg_rigid_in_its_links_turns_about_its_motor() -> None:
 
 def test_two_wrenches_through_a_pin_give_its_principal_springs() -> None:
     pin = 0.3 + 0.2j
-    leg = Chain(at(pin), along(np.exp(0.4j), 1j * np.exp(0.4j)), [1e-4, 1e-3], np.zeros(1, complex), np.array([pin]))
+    leg = LegScrews(
+        at(pin), along(np.exp(0.4j), 1j * np.exp(0.4j)), [1e-4, 1e-3], np.zeros(1, complex), np.array([pin])
+    )
     wrenches = reciprocal_wrenches(leg.passive, 1, LENGTH, 1)
     stiff, soft = equivalent_springs(wrenches, leg, LENGTH)
     assert [stiff.stiffness[0], soft.stiffness[0]] == pytest.approx([1e4, 1e3])
@@ -238,7 +240,7 @@ def test_two_wrenches_through_a_pin_give_its_principal_springs() -> None:
 
 
 def test_two_slides_leave_a_rotational_spring() -> None:
-    leg = Chain(along(1, 1j), at(0.4), [1 / 500.0], np.zeros(1, complex), np.array([0.7 + 0j]))
+    leg = LegScrews(along(1, 1j), at(0.4), [1 / 500.0], np.zeros(1, complex), np.array([0.7 + 0j]))
     (spring,) = equivalent_springs(reciprocal_wrenches(leg.passive, 2, LENGTH, 1), leg, LENGTH)
     assert spring.stiffness[0] == pytest.approx(500.0)
     assert np.isnan(spring.angle[0])
@@ -246,7 +248,7 @@ def test_two_slides_leave_a_rotational_spring() -> None:
 
 
 @pytest.mark.parametrize("legs", [LEGS, [*LEGS[:2], strut(0.2 - 1j, 0.7 + 0.2j)]], ids=["elastic", "one rigid"])
-def test_reciprocal_wrenches_and_force_method_agree(legs: list[Chain]) -> None:
+def test_reciprocal_wrenches_and_force_method_agree(legs: list[LegScrews]) -> None:
     stiffness, compliance, known = by_legs(*legs)
     other = by_forces(*legs)
     assert known.all()
@@ -263,7 +265,7 @@ def test_poses_of_a_batch_do_not_mix(solve: Callable[..., Any]) -> None:
     legs = []
     for base, end in zip(bases, ends, strict=True):
         direction = (end - base) / abs(end - base)
-        legs.append(Chain([hinge_twist(base), hinge_twist(end)], [slide_twist(direction)], [1e-3], base, end))
+        legs.append(LegScrews([hinge_twist(base), hinge_twist(end)], [slide_twist(direction)], [1e-3], base, end))
     both, alone = solve(*legs), solve(*(leg.take(np.array([0])) for leg in legs))
     if isinstance(both, Held):
         assert both.rank.tolist() == [3, 2]

@@ -13,7 +13,7 @@ import mechdesign
 from mechdesign.analyses.optimize.analysis import _doubts
 from mechdesign.analyses.optimize.descent import side_by_side
 from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.explorer import Explorer, Part, Scores, Spent
+from mechdesign.analyses.optimize.explorer import Explorer, Known, Part, Spent
 from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.optimize.search import Ending, search
 from mechdesign.analyses.optimize.variables import from_cube
@@ -51,9 +51,15 @@ def rastrigin(u):
     return (z**2 - 10 * np.cos(2 * np.pi * z) + 10).sum(axis=1)
 
 
+def evaluated(u, values, margins, rows):
+    """Points of which those without a value are all alike."""
+    return Known(u, values, margins, rows, np.isnan(values).any(axis=1).astype(float))
+
+
 def explorer(function, dimensions, margins=None, budget=3000):
     return Explorer(
-        lambda u: Scores(
+        lambda u: evaluated(
+            u,
             function(u).reshape(len(u), -1),
             np.empty((len(u), 0)) if margins is None else margins(u),
             np.empty((len(u), 0)),
@@ -115,7 +121,7 @@ def worst_of(rows, dimensions, margins=None):
     def outcome(u):
         found = rows(u)
         values = np.abs(found).max(axis=1, keepdims=True)
-        return Scores(values, np.empty((len(u), 0)) if margins is None else margins(u), found)
+        return evaluated(u, values, np.empty((len(u), 0)) if margins is None else margins(u), found)
 
     places = slice(0, rows(np.zeros((1, dimensions))).shape[1])
     known = Explorer(outcome, dimensions, 5000, [Part(0, 1.0, True, places)])
@@ -150,7 +156,7 @@ def test_two_worst_rows_weighed_under_a_condition_that_is_one():
     def outcome(u):
         off = u - 0.5
         rows = np.concatenate([off, -off, u], axis=1)
-        return Scores(np.abs(off), 0.4 - u.max(axis=1, keepdims=True), rows)
+        return evaluated(u, np.abs(off), 0.4 - u.max(axis=1, keepdims=True), rows)
 
     parts = [Part(0, 1.0, False, slice(0, 3, 2)), Part(1, 1.0, False, slice(1, 4, 2)),
              Part(2, 1.0, False, slice(4, 6), bound=0.4)]  # fmt: skip
@@ -394,7 +400,7 @@ def test_what_runs_side_by_side_is_asked_for_at_once():
 
 def test_least_squares_that_come_no_further_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every stage of a descent ends when it asks in vain, those of a root mean square too."""
-    monkeypatch.setattr("mechdesign.analyses.optimize.descent.MOST_IN_VAIN", 0)
+    monkeypatch.setattr("mechdesign.analyses.optimize.descent.MAX_IN_VAIN", 0)
     study = study_of(PROBLEMS["height, rms"]().study, "optimize.evaluations=400")
     result = mechdesign.optimize(study, seed=0)
     assert np.isfinite(result.main["score"][0])

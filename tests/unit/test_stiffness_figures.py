@@ -10,9 +10,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import mechanism_figure
-from mechdesign.report.figures.stiffness import figures
-from mechdesign.report.figures.stiffness.deflected import round_down
-from mechdesign.report.figures.stiffness.springs import Coil, quantity
+from mechdesign.report.figures.stiffness import Coil, figures, quantity, round_down
 from mechdesign.results import Result
 
 

@@ -21,8 +21,7 @@ from helpers.stiffness import (
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.stiffness.beams import Beams
-from mechdesign.analyses.stiffness.network import Beam, Guide, Hinge
+from mechdesign.analyses.stiffness.elements import Beam, Beams, Guide, Hinge
 
 CRANK, ROD = Beams("crank", ("O", "A"), False), Beams("rod", ("A", "B"), False)
 

@@ -11,7 +11,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import MechanismError, StudyError
-from mechdesign.mechanism.variant import drawn
+from mechdesign.mechanism.mechanism import drawn
 from mechdesign.study import Study
 from mechdesign.study.variants import variant
 

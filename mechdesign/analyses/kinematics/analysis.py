@@ -22,8 +22,7 @@ from mechdesign.analyses.kinematics.motion import (
     move,
 )
 from mechdesign.analyses.kinematics.peaks import extremes, needed
-from mechdesign.analyses.poses import judge_failures, pose_in_words
-from mechdesign.analyses.shown import Keeper, Shown
+from mechdesign.analyses.poses import Keeper, Shown, judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
@@ -38,9 +37,9 @@ from mechdesign.threads import one_thread
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
-# Assembly modes that a picture has room for.
-MOST_DRAWN = 12
-# What a step of a motion may lead beside its rates, as a part of it.
+# Assembly modes that a picture shows at most.
+MAX_DRAWN_MODES = 12
+# How far a step of a motion may deviate from the direction of its rates, as a part of it.
 ASTRAY = 1e-3
 
 
@@ -118,7 +117,7 @@ def kinematics(
 
 
 def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
-    """The motion of every assembly, the sketch's first; what is to be said of each, how many they are, some to draw."""
+    """The motion of every assembly, the sketch's first; warnings, the number of assemblies, and some to draw."""
     study, poses = question.study, question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
     labels: list[str] = []
@@ -132,7 +131,7 @@ def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table
             keeper = Keeper(other.study, other.poses)
             motion = move(other, also=keeper.keep)
             seen = keeper.shown
-        if seen.configuration.valid.any() and len(pictured) < MOST_DRAWN:
+        if seen.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
             pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = seen
         labels += [assembly.label] * poses.count
         parts.append(motion.columns())
@@ -261,22 +260,20 @@ def _astray(motion: Motion) -> list[str]:
 def _stalled(motion: Motion) -> list[str]:
     study, poses = motion.question.study, motion.question.poses
     stalled = motion.valid & ~motion.smooth & ~(motion.arrays["conditioning"] >= STALLED)
-    warnings = []
-    rows = np.flatnonzero(stalled)
-    if len(rows):
-        lie = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
-        warnings.append(
-            f"{lie} at a dead centre or change point, where the drives do not move the mechanism in one way "
-            f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
-            f"nothing there; the first: {pose_in_words(study, poses, rows[0])}"
-        )
+    texts = {
+        "at a dead centre or change point, where the drives do not move the mechanism in one way (conditioning below "
+        f"{STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean nothing there": stalled
+    }
     if motion.question.of_given:
-        rates = motion.arrays[f"{study.mechanism.drives[0]}_velocity"]
-        rows = np.flatnonzero(motion.valid & ~stalled & np.isnan(rates))
+        lost = np.isnan(motion.arrays[f"{study.mechanism.drives[0]}_velocity"])
+        text = (
+            "where no drive rates give what is asked: the drives cannot move it in every direction; rates are nan there"
+        )
+        texts[text] = motion.valid & ~stalled & lost
+    warnings = []
+    for text, where in texts.items():
+        rows = np.flatnonzero(where)
         if len(rows):
             lie = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
-            warnings.append(
-                f"{lie} where no drive rates give what is asked: the drives cannot move it in every direction; rates "
-                f"are nan there; the first: {pose_in_words(study, poses, rows[0])}"
-            )
+            warnings.append(f"{lie} {text}; the first: {pose_in_words(study, poses, rows[0])}")
     return warnings

@@ -8,49 +8,43 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.kinematics.motion import Motion, as_given, thinned
-from mechdesign.analyses.poses import CHUNK, in_study_units, radians
+from mechdesign.analyses.poses import POSES_AT_ONCE, in_study_units, radians
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins
-from mechdesign.mechanism.turning import turning_point
+from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins, turning_point
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.numerics.minima import lowest
-from mechdesign.numerics.roots import bracketed_roots
+from mechdesign.numerics.roots import bracketed_roots, lowest
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
-# Step, as a part of that between two poses, that tells whether a margin rises or falls at a pose.
-SLOPE = 1e-4
-# Steps that may hold something are divided into so many parts, so often: until what ends the motion is alone in one,
-# and a margin that falls to zero without crossing it is below `TOUCHING`.
-PARTS, ROUNDS = 8, 6
+# Step of the differences that are the slopes of margins, as a part of the step between two poses.
+SLOPE_STEP = 1e-4
+# Steps in which the motion may end are divided into so many parts,
+PARTS = 8
+# so often: until each end is alone in one, and a margin that falls to zero without crossing it is below `TOUCHING`.
+DIVISIONS = 6
 # Halvings of a step that reach the last bit of any drive's value.
 HALVINGS = 45
 # Precision of roots, as a part of a step.
-FINE = 1e-13
+ROOT_PRECISION = 1e-13
 # A limit this near to the first or the last value of the sweep lies at it (as a part of the value, or of 1).
 AT_END = 1e-9
-# Ends within this part of the sweep's size are one; a change point within this part of a step of a pose is at it.
-ONE_END, AT_POSE = 1e-11, 1e-6
-# How far beside a single place, as a part of the step, the motion must go on for it to have no gap there.
-BESIDE = 1e-5
+# Ends within this part of the sweep's size are one.
+SAME_END = 1e-11
+# A change point within this part of a step of a pose is at it.
+CHANGE_AT_POSE = 1e-6
+# The motion has no gap at a single place if it is valid this far to both sides, as a part of the step.
+GAP_PROBE = 1e-5
 # A change point this near to zero, as a part of the sweep, is there.
-SMALL = 1e-7
+CHANGE_AT_ZERO = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """An end of the motion.
+    """An end of the motion: where it is along the sweep in rows, and the pose there (None at infinity).
 
-    Parameters
-    ----------
-    position : float
-        Where it is along the sweep, in rows.
-    place : float
-        Value of the swept coordinate (radians or length): the last at which the mechanism is valid.
-    configuration : Configuration
-        The pose there; None at infinity.
+    `place` is the last value of the swept coordinate (radians or length) at which the mechanism is valid.
     """
 
     position: float
@@ -69,15 +63,10 @@ class ChangePoint:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """Parts of the steps of a sweep: of both ends the place, whether it is valid, the margins and what they rise by.
+    """Parts of the steps of a sweep; `step` is the step of each, shape (n,).
 
-    Parameters
-    ----------
-    step : ndarray of int, shape (n,)
-        The step that each is a part of.
-    x, valid : ndarray, shape (2, n)
-    values, rises : ndarray, shape (margins, 2, n)
-        `rises` are slopes times the length of the part.
+    Of both ends the place, whether it is valid, shape (2, n), the margins, and their slopes times the length of the
+    part, shape (margins, 2, n).
     """
 
     step: Ints
@@ -96,15 +85,10 @@ class _Parts:
 
 
 def boundaries(margins: SweepMargins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint]]:
-    """All ends of the motion in the order of the sweep, and all change points.
+    """All ends of the motion in the order of the sweep, and all change points; `valid` for each pose, shape (poses,).
 
     Between two poses a margin is looked for that changes its sign, or whose slopes at the poses admit that it does so
     twice; a step of the sweep must therefore resolve the motion, but not the gaps in it.
-
-    Parameters
-    ----------
-    valid : bool array, shape (poses,)
-        Whether each pose of the sweep is.
     """
     if len(margins.at) < 2 or not margins.causes:
         return [], []
@@ -137,14 +121,14 @@ class _Search:
 
     def look(self, step: Ints, low: Floats, high: Floats) -> _Parts:
         found = []
-        for first in range(0, len(step), CHUNK):
-            here, x = step[first : first + CHUNK], np.stack([low, high])[:, first : first + CHUNK]
-            ahead = x + SLOPE * (x[1] - x[0])
+        for first in range(0, len(step), POSES_AT_ONCE):
+            here, x = step[first : first + POSES_AT_ONCE], np.stack([low, high])[:, first : first + POSES_AT_ONCE]
+            ahead = x + SLOPE_STEP * (x[1] - x[0])
             start = None if self.start is None else self.start.take(np.tile(here, 4))
             values, valid = self.margins.look(np.concatenate([x, ahead]).ravel(), start)
             values, valid = values.reshape(len(values), 4, -1), valid.reshape(4, -1)
             with np.errstate(invalid="ignore"):
-                rises = (values[:, 2:] - values[:, :2]) / SLOPE
+                rises = (values[:, 2:] - values[:, :2]) / SLOPE_STEP
             found.append(_Parts(here, x, valid[:2], values[:, :2], rises))
         return _Parts.joined(found)
 
@@ -154,7 +138,7 @@ class _Search:
         parts = self.look(step, self.at[step], self.at[step + 1])
         self.scale = np.nanmax(np.where(np.isfinite(parts.values), np.abs(parts.values), 0.0), axis=(1, 2))
         touched = []
-        for _ in range(ROUNDS):
+        for _ in range(DIVISIONS):
             suspect, touching = self._suspects(parts)
             touched.append(parts.take(touching))
             parts = parts.take(suspect)
@@ -170,7 +154,7 @@ class _Search:
         span = float(np.ptp(self.at))
         kept: list[Boundary] = []
         for end in ends:
-            if not kept or abs(end.place - kept[-1].place) > ONE_END * span or end.cause != kept[-1].cause:
+            if not kept or abs(end.place - kept[-1].place) > SAME_END * span or end.cause != kept[-1].cause:
                 kept.append(end)
         return kept, changes
 
@@ -243,7 +227,7 @@ class _Search:
 
         every, none = np.arange(len(step)), np.full(len(step), np.nan)
         a, b = margin(every, low), margin(every, high)
-        place = bracketed_roots(margin, low, a, high, b, none, none, FINE * np.abs(high - low))
+        place = bracketed_roots(margin, low, a, high, b, none, none, ROOT_PRECISION * np.abs(high - low))
         return np.where((a >= 0) != (b >= 0), place, np.nan)
 
     def _turned(self, step: int, place: float, pose: Configuration, cause: Cause) -> Boundary | None:
@@ -282,7 +266,7 @@ class _Search:
 
     def _goes_on(self, step: Ints, place: Floats) -> Flags:
         """Whether the motion has no gap at single places."""
-        side = BESIDE * self.length[step]
+        side = GAP_PROBE * self.length[step]
         return np.asarray(self.solve(step, place - side).valid & self.solve(step, place + side).valid)
 
     def _endless(self, parts: _Parts) -> list[Boundary]:
@@ -312,34 +296,22 @@ class _Search:
             return np.where(np.isnan(values), np.inf, values)
 
         place, value = lowest(closure, low, high)
-        side = BESIDE * self.length[step]
+        side = GAP_PROBE * self.length[step]
         some = (value <= touch[function, 0]) & (closure(place - side) > value) & (closure(place + side) > value)
         found: dict[tuple[int, float], ChangePoint] = {}
         for k in np.flatnonzero(some & self._goes_on(step, place)).tolist():
             beside = self.at[step[k] : step[k] + 2]
-            beside = beside[np.abs(beside - place[k]) <= AT_POSE * self.length[step[k]]]
+            beside = beside[np.abs(beside - place[k]) <= CHANGE_AT_POSE * self.length[step[k]]]
             at = float(np.clip(beside[0], *sorted(self.at[[1, -2]]))) if len(beside) else float(place[k])
-            found.setdefault((int(function[k]), round(at / (AT_POSE * self.length[step[k]]))),
+            found.setdefault((int(function[k]), round(at / (CHANGE_AT_POSE * self.length[step[k]]))),
                              ChangePoint(at, self.margins.causes[function[k]]))  # fmt: skip
         return list(found.values())
 
 
 def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Boundary]]:
-    """Every value of the swept coordinate at which the motion ends, with the pose there, and change points as warnings.
+    """Table of the values of the swept coordinate at which the motion ends, warnings, and these ends.
 
-    `kind` is ``dead centre`` (a group of links is stretched or folded), ``singularity`` (links that are solved
-    together turn back, or the motion goes to infinity), ``leg at zero length`` or ``limit`` (one that the study
-    states); `joint` names the joints of the group, the leg or the limit.
-
-    Parameters
-    ----------
-    swept : str
-        The one coordinate that moves.
-
-    Returns
-    -------
-    (Table, list of str, list of Boundary)
-        The table of limits, what is to be said beside it, and the ends of the motion.
+    `kind` and `joint` are those of `mechdesign.mechanism.margins.Cause`; change points are among the warnings.
     """
     study, outputs = motion.question.study, motion.question.outputs
     (group,) = motion.question.poses.groups
@@ -380,7 +352,7 @@ def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> Floats:
 
 
 def _hidden(swept: str, unit: str, places: Floats, ends: list[Boundary], valid: Flags) -> list[str]:
-    """A warning where the motion ends between neighbouring poses that are both valid: their rows do not tell."""
+    """A warning where the motion ends between neighbouring poses that are both valid: the motion table hides it."""
     hidden = [
         f"{swept} = {place:.6g} {unit}".rstrip()
         for place, end in zip(places.tolist(), ends, strict=True)
@@ -397,7 +369,7 @@ def _warnings(study: Study, margins: SweepMargins, swept: str, changes: list[Cha
     places: dict[str, dict[str, None]] = {}
     for change in sorted(changes, key=lambda change: change.place):
         # The smallest value of a smooth function is found to the root of rounding.
-        at = change.place if abs(change.place) > SMALL * np.ptp(margins.at) else 0.0
+        at = change.place if abs(change.place) > CHANGE_AT_ZERO * np.ptp(margins.at) else 0.0
         place = f"{in_study_units(study, margins.coordinate, at):.6g} {unit}".rstrip()
         places.setdefault(place, {})[change.cause.joint] = None
     return [

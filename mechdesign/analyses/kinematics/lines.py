@@ -1,4 +1,4 @@
-"""A sweep as a line of poses fine enough to tell what happens between them, from limit of motion to limit of motion."""
+"""A sweep as a line of poses so fine that functions are smooth between them, from limit to limit of the motion."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.kinematics.boundaries import Boundary
-from mechdesign.analyses.kinematics.motion import NEAR, Motion, thinned
+from mechdesign.analyses.kinematics.motion import NEAR_SINGULAR, Motion, thinned
 from mechdesign.analyses.kinematics.rates import drive_velocities
-from mechdesign.analyses.poses import CHUNK, dimensions, in_study_units, radians, starts
+from mechdesign.analyses.poses import POSES_AT_ONCE, dimensions, in_study_units, radians, starts
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, quiet, wrap
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -20,13 +20,13 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 
 # How far a link may turn between neighbouring poses (radians), by their places and by its slope at either.
-SURE = 0.3
+MAX_TURN = 0.3
 # How far the rise of a function may be from the mean of its slopes, as a part of its range.
-SMOOTH = 0.02
+MAX_BEND = 0.02
 # Halvings of a step of the sweep, at most: a link that turns faster is taken to jump.
-ROUNDS = 14
-# Where a pose has no slopes (a dead centre, from which functions start as a root does), looks beside it: parts of the
-# step to the next pose.
+MAX_HALVINGS = 14
+# Poses added beside one without slopes (a dead centre, from which functions start as a root does), as parts of the step
+# to the next pose.
 GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
 # A range below this part of a function's size is rounding.
 STILL = 1e-12
@@ -36,18 +36,9 @@ AT_ROW = 1e-9
 
 @dataclass(frozen=True)
 class Function:
-    """A function of the motion.
+    """A function of configurations, and its slope, of configurations and the velocities at unit speed of the sweep.
 
-    Parameters
-    ----------
-    value : callable
-        Of configurations.
-    slope : callable
-        Derivative by the swept coordinate: of configurations and the velocities at its unit speed.
-    size : float
-        What rounding in it is judged by.
-    radian : float or None
-        What a radian is in its unit, where it is an angle.
+    Rounding is judged by `size`; `radian` is a radian in its unit, where it is an angle.
     """
 
     value: Callable[[Configuration], Value]
@@ -77,20 +68,15 @@ class PoseLine:
     Poses are those of the sweep (of a very fine one, some), the limits of motion, and as many between them as the
     turning of the links and the smoothness of the functions need.
 
-    Parameters
-    ----------
-    coordinates : sequence of Coordinate
-    others : mapping of str to Function
-        Further functions, by names that no coordinate has.
-    ends : sequence of Boundary
-        Limits of motion, of a single design.
+    It follows coordinates and `others`, functions by names that no coordinate has; `ends` are limits of motion, known
+    for a single design only.
 
     Attributes
     ----------
     rows : dict of str to int
         Row of each function in `values` and `slopes`.
     row, position, place : ndarray, shape (n,)
-        A pose of the sweep beside each pose, place along the sweep in rows, and swept coordinate (core's units).
+        A row of the sweep beside each pose, position along the sweep in rows, and swept coordinate (core's units).
     values, slopes : ndarray, shape (functions, n)
         In the study's units, angles on the branch of the motion; slopes nan where there are none.
     begin, end : ndarray of int, shape (segments,)
@@ -114,7 +100,7 @@ class PoseLine:
         # Limits that count the turns of angles are judged along the motion; here its ends tell of them.
         self._limits = not study.mechanism.counting
         self.followed = self.plan.change_points is not None
-        self._steady = NEAR if self.followed else STALLED
+        self._steady = NEAR_SINGULAR if self.followed else STALLED
         self.which = group.names.index(swept)
         self.given = [
             np.asarray(radians(study, c, v), dtype=float)
@@ -122,7 +108,7 @@ class PoseLine:
         ]
         self.each = poses.count // poses.designs
         self.torn = np.zeros(poses.designs, dtype=bool)
-        # First the angles by whose values at a pose those beside it are told.
+        # First the angles, which continue from a pose to those beside it.
         self._angles = {name: c for name, c in angles_of(coordinates).items() if name not in group.names}
         functions = {c.name: function_of(study, c) for c in [*self._angles.values(), *coordinates]} | dict(others)
         self.rows = {name: k for k, name in enumerate(functions)}
@@ -159,9 +145,9 @@ class PoseLine:
         return self.values[: len(self._angles), node]
 
     def _in_chunks(self, row: Ints, place: Floats, near: Floats) -> tuple[Floats, Floats, Flags]:
-        if len(row) <= CHUNK:
+        if len(row) <= POSES_AT_ONCE:
             return self._sample(row, place, near)
-        parts = [slice(k, k + CHUNK) for k in range(0, len(row), CHUNK)]
+        parts = [slice(k, k + POSES_AT_ONCE) for k in range(0, len(row), POSES_AT_ONCE)]
         values, slopes, valid = zip(*[self._sample(row[p], place[p], near[:, p]) for p in parts], strict=True)
         return np.concatenate(values, axis=1), np.concatenate(slopes, axis=1), np.concatenate(valid)
 
@@ -271,17 +257,17 @@ class PoseLine:
         sizes = np.array([function.size for function in self._functions])[:, None]
         moves = high - low > STILL * np.maximum(sizes, np.maximum(np.abs(low), np.abs(high)))
         scale = np.where(np.isnan(self._radians)[:, None], np.where(moves, high - low, np.inf), self._radians[:, None])
-        for _ in range(ROUNDS):
+        for _ in range(MAX_HALVINGS):
             length = self.place[self.end] - self.place[self.begin]
             rise = self.values[:, self.end] - self.values[:, self.begin]
             rise[len(self.rows) :] = wrap(rise[len(self.rows) :])
             one, other = self.slopes[:, self.begin] * length, self.slopes[:, self.end] * length
             with np.errstate(invalid="ignore"):
                 steep = np.fmax(np.fmax(np.abs(one), np.abs(other)), np.abs(rise))
-                rough = np.abs(rise - (one + other) / 2) > SMOOTH * scale[:, self.row[self.begin] // self.each]
+                rough = np.abs(rise - (one + other) / 2) > MAX_BEND * scale[:, self.row[self.begin] // self.each]
             # What is this near to a dead centre has been looked at already.
             wide = np.abs(self.position[self.end] - self.position[self.begin]) > GRADED[1]
-            split = np.flatnonzero(((steep[len(self.rows) :] > SURE).any(axis=0) | rough.any(axis=0)) & wide)
+            split = np.flatnonzero(((steep[len(self.rows) :] > MAX_TURN).any(axis=0) | rough.any(axis=0)) & wide)
             if not len(split):
                 return
             self.divide(split, np.array([0.5]))

@@ -17,69 +17,66 @@ from mechdesign.mechanism.outputs import Rates
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 
-# Angles within this of each other are one (radians).
-BEYOND = 1e-12
-# Angles this near to 0 or a right angle are that (radians): there is a corner, found to this.
-SQUARE = 1e-10
-# Sines below these are zero: as the pose at a limit of motion tells, and at another pose.
-IN_LINE, AT_POSE = 1e-6, 1e-12
+# Angles nearer than this are the same (radians).
+SAME_ANGLE = 1e-12
+# Transmission angles this near to 0 or a right angle are that (radians): they have a corner there.
+AT_CORNER = 1e-10
+# Links are in line where the sine of their angle is below this at a limit of motion,
+IN_LINE_AT_LIMIT = 1e-6
+# and at other poses.
+IN_LINE_AT_POSE = 1e-12
 # Toggles this near to each other are one, in rows of the sweep.
-ONE_TOGGLE = 1e-5
-PARTS = ("frame", "input", "coupler", "output")
+SAME_TOGGLE = 1e-5
+ROLES = ("frame", "input", "coupler", "output")
 
 
 def functions(loops: Sequence[FourBar], toggles: bool) -> dict[str, Function]:
-    """What a line must follow: by loop the transmission angle, the square of its sine, and what tells of `toggles`.
+    """Functions of a line for each loop: transmission angle, square of its sine, and for `toggles` sines and cosines.
 
     The square has the same extremes as the angle and is smooth where that is 0 or a right angle.
     """
     found: dict[str, Function] = {}
     for k, loop in enumerate(loops):
-        found |= {f"{name} {k}": function for name, function in _transmission(loop).items()}
+        found[f"square {k}"] = _sine(loop, 3, 2)
+        found[f"angle {k}"] = Function(loop.transmission, lambda configuration, _: np.nan)
         for end in (0, 3) if toggles else ():
-            found |= {f"{name} {k} {end}": function for name, function in _in_line(loop, end).items()}
+            found[f"sine {k} {end}"] = _sine(loop, end, 1)
+            found[f"cosine {k} {end}"] = _cosine(loop, end)
     return found
 
 
-def _transmission(loop: FourBar) -> dict[str, Function]:
+def _sine(loop: FourBar, end: int, power: int) -> Function:
+    """A power of the sine of the angle from the arm of the input (`end` 0) or output (3) to the coupler's action."""
+
     def slope(configuration: Configuration, velocity: Rates) -> Value:
-        sine, cosine = loop.squareness(configuration, 3)
-        return 2 * sine * cosine * loop.turning(configuration, velocity, 3)
+        sine, cosine = loop.squareness(configuration, end)
+        return power * sine ** (power - 1) * cosine * loop.turning(configuration, velocity, end)
 
-    square = Function(lambda configuration: loop.squareness(configuration, 3)[0] ** 2, slope)
-    return {"square": square, "angle": Function(loop.transmission, lambda configuration, velocity: np.nan)}
+    return Function(lambda configuration: loop.squareness(configuration, end)[0] ** power, slope)
 
 
-def _in_line(loop: FourBar, end: int) -> dict[str, Function]:
-    def slope(configuration: Configuration, velocity: Rates) -> Value:
-        return loop.squareness(configuration, end)[1] * loop.turning(configuration, velocity, end)
-
-    sine = Function(lambda configuration: loop.squareness(configuration, end)[0], slope)
-    cosine = Function(lambda configuration: loop.squareness(configuration, end)[1], lambda configuration, _: np.nan)
-    return {"sine": sine, "cosine": cosine}
+def _cosine(loop: FourBar, end: int) -> Function:
+    return Function(lambda configuration: loop.squareness(configuration, end)[1], lambda configuration, _: np.nan)
 
 
 def loops_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine | None) -> Table:
     """Every loop of every design: its links and lengths (of a single design), and how well it transmits.
 
-    Parameters
-    ----------
-    line : PoseLine or None
-        The motion along its sweep, with `functions` of the loops; None where not just one coordinate is swept.
+    `line` is the motion along its sweep, with `functions` of the loops; None where not just one coordinate is swept.
     """
     study, poses = motion.question.study, motion.question.poses
     length, angle = study.units.label("length"), study.units.label("angle")
     columns = [
         Column("kind", np.array([loop.kind for loop in loops]), "", "what the four bodies and their joints are"),
         *(Column(part, np.array([loop.links[k] for loop in loops]), "", f"the {part} link")
-          for k, part in enumerate(PARTS)),
+          for k, part in enumerate(ROLES)),
         Column("joints", np.array([" ".join(joint.name for joint in loop.joints) for loop in loops]), "",
                "joints from the frame round"),
     ]  # fmt: skip
     if poses.designs == 1:
         columns += [
             *(Column(f"{part}_length", np.array([loop.lengths[k] for loop in loops]), length, f"length of the {part}")
-              for k, part in enumerate(PARTS)),
+              for k, part in enumerate(ROLES)),
             Column("offset", np.array([loop.offset for loop in loops]), length, "offset of the slide"),
             Column("class", np.array([loop.type for loop in loops]), "",
                    "Grashof's class, or the kind of slider-crank"),
@@ -114,7 +111,7 @@ def _at_poses(motion: Motion, loops: Sequence[FourBar]) -> list[tuple[Floats, Fl
     found = []
     for sign in (1, -1):
         values = np.where(np.isnan(each), np.inf, sign * each)
-        best = (values <= values.min(axis=2, keepdims=True) + BEYOND).argmax(axis=2)
+        best = (values <= values.min(axis=2, keepdims=True) + SAME_ANGLE).argmax(axis=2)
         value = np.take_along_axis(each, best[..., None], axis=2)[..., 0]
         found.append((value, np.where(np.isnan(value), np.nan, best)))
     return found
@@ -125,11 +122,11 @@ def _between(motion: Motion, line: PoseLine, count: int) -> list[tuple[Floats, F
     squares = np.array([line.rows[f"square {k}"] for k in range(count)])
     angles = np.array([line.rows[f"angle {k}"] for k in range(count)])
     found = []
-    for peak in peaks(line, squares, np.full((count, line.poses.designs), BEYOND), all_poses=True):
+    for peak in peaks(line, squares, np.full((count, line.poses.designs), SAME_ANGLE), all_poses=True):
         values = line.at(peak.node.ravel(), peak.place.ravel())[angles].reshape(count, *peak.node.shape)
         value = np.stack([values[k, k] for k in range(count)])
         for whole in (0.0, np.pi / 2):
-            value = np.where(np.abs(value - whole) <= SQUARE, whole, value)
+            value = np.where(np.abs(value - whole) <= AT_CORNER, whole, value)
         place = as_given(motion, line.swept, peak.place, np.nan_to_num(peak.position))
         found.append((np.where(np.isnan(peak.place), np.nan, value), place))
     return found
@@ -140,7 +137,7 @@ def toggles_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine) -> T
     study, swept = motion.question.study, line.swept
     which = [(k, end) for end in (0, 3) for k in range(len(loops))]
     sines, cosines = (np.array([line.rows[f"{name} {k} {end}"] for k, end in which]) for name in ("sine", "cosine"))
-    found = zeros(line, sines, AT_POSE, IN_LINE)
+    found = zeros(line, sines, IN_LINE_AT_POSE, IN_LINE_AT_LIMIT)
     found = found.take(_once(found.position(line), found.function))
     position = found.position(line)
     cosine = line.at(found.node, found.place)[cosines[found.function], np.arange(len(found.node))]
@@ -185,7 +182,7 @@ def _together(position: Floats, loop: Ints) -> Flags:
 
 def _apart(position: Floats, kind: Ints) -> Flags:
     """Which of some sorted toggles are not one with the toggle before them."""
-    near = (np.diff(position) <= ONE_TOGGLE) & (np.diff(kind) == 0)
+    near = (np.diff(position) <= SAME_TOGGLE) & (np.diff(kind) == 0)
     return np.append(True, ~near)[: len(position)]
 
 

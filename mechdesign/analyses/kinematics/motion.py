@@ -1,13 +1,12 @@
 """One motion of a mechanism: every pose of its kinematics solved, and the columns that say how it moves.
 
-Poses at a change point that the motion follows are told from those on both sides.
+At a change point that the motion follows, values are interpolated from poses on both sides.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,32 +26,29 @@ from mechdesign.analyses.poses import (
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
+from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.jacobians import Jacobian, mixes
-from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
-from mechdesign.study.schema.kinematics import KinematicsSection
+from mechdesign.study.schema.poses import KinematicsSection
 
-# A place this near to a pose or to zero, as a part of the sweep, is there.
-AT_POSE = 1e-12
+# A place this near to a pose or to zero, as a part of the sweep, is at it.
+AT_GIVEN_PLACE = 1e-12
 # Poses with a conditioning below this have lost digits.
-NEAR = 1e-3
-# h: radians, or parts of the mechanism's size. What the formula leaves out is about 1e-12, what accelerations lose of
-# their digits this near to a change point about 1e-10.
-DISTANCE = 1e-2
-STEPS = DISTANCE * np.array([-3, -2, -1, 1, 2, 3])
-WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
-
-
-# Poses of a design's sweep that tell of it between them, about: of a finer sweep some are left out, but no step becomes
-# longer than so many radians, or so much of the mechanism's size.
-ENOUGH, LONGEST = 4096, 0.02
+NEAR_SINGULAR = 1e-3
+# Step of the interpolation at change points (radians, or parts of the mechanism's size): its error is about 1e-12, that
+# of accelerations this near to a change point about 1e-10.
+CHANGE_POINT_STEP = 1e-2
+STENCIL = CHANGE_POINT_STEP * np.array([-3, -2, -1, 1, 2, 3])
+STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
+# Of a sweep of more poses than about this some are left out where the motion between the poses is followed,
+ENOUGH_POSES = 4096
+# but no step becomes longer than this (radians, or parts of the mechanism's size).
+LONGEST_STEP = 0.02
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
@@ -79,17 +75,13 @@ class MotionQuestion:
 
     Parameters
     ----------
-    poses : Poses
-        Of kinematics.
     outputs : list of Coordinate
-        Those of the tables: the listed ones, then those that have a target and are not listed.
+        Outputs in the tables: the listed ones, then those that have a target and are not listed.
     listed : list of Coordinate
-        Those that the Jacobian is of.
-    square : bool
-        Whether the study lists as many outputs as drives.
+        Rows of the Jacobian, which is wanted where it is `square`: where the study lists as many outputs as drives.
     watched : list of Coordinate
-        All whose values are needed: drives, outputs, what targets depend on, and the angles in the expressions of
-        these and of limits.
+        All coordinates whose values are needed: drives, outputs, those that targets depend on, and the angles in
+        expressions of these and of limits.
     of_given : bool
         Whether rates and accelerations are those of the given coordinates rather than of the drives.
     """
@@ -143,14 +135,8 @@ def motion_question(study: Study) -> MotionQuestion:
 class Motion:
     """The solved poses of one assembly; `arrays` holds every column but those of the poses, nan where it has no value.
 
-    Parameters
-    ----------
-    reason : int8 array, shape (poses,)
-        See `mechdesign.mechanism.Reason`.
-    errors : list of Error
-        Of the targets.
-    smooth : bool array, shape (poses,)
-        Poses at a change point whose values are those of the motion that goes through it.
+    `reason` is that of `mechdesign.mechanism.Reason`, `errors` those of the targets; `smooth` are poses at a change
+    point whose values are those of the motion that goes through it.
     """
 
     question: MotionQuestion
@@ -158,11 +144,6 @@ class Motion:
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
     smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    @cached_property
-    def given(self) -> dict[str, Floats]:
-        """Values of the coordinates that the poses give."""
-        return self.question.poses.values
 
     @property
     def valid(self) -> Flags:
@@ -178,11 +159,12 @@ class Motion:
     def fill(self, solved: SolvedPoses) -> None:
         """Take up poses that give the same coordinates."""
         study, rows, configuration = self.question.study, solved.rows, solved.configuration
+        given = self.question.poses.values
         self.reason[rows] = configuration.reason
         for coordinate in self.question.watched:
             if coordinate.name in solved.given:
                 # As the study gives it, not there and back through radians; also where the pose fails.
-                self.put(coordinate.name, rows, self.given[coordinate.name][rows])
+                self.put(coordinate.name, rows, given[coordinate.name][rows])
             else:
                 self.put(coordinate.name, rows, in_study_units(study, coordinate, configuration.value(coordinate)))
         linear = study.mechanism.linearize(configuration)
@@ -248,7 +230,7 @@ class Motion:
             for order in ("velocity", "acceleration"):
                 rate = f"{name}_{order}"
                 if rate in arrays:
-                    kind = _RATES[output.quantity, order]
+                    kind = {"length": order, "angle": f"angular_{order}"}.get(output.quantity, "none")
                     columns.append(Column(rate, arrays[rate], label(kind), f"{order} of {name}"))
             point, _, axis = name.rpartition(".")
             columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
@@ -285,12 +267,12 @@ class Motion:
 
 
 def thinned(motion: Motion, swept: str) -> Flags:
-    """Poses of a sweep that tell the motion: its ends, those where it ceases to be valid, and enough between."""
+    """Poses of a sweep that are enough to follow the motion: its ends, those where validity changes, some between."""
     study, poses = motion.question.study, motion.question.poses
     coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
     steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
-    longest = LONGEST * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
-    stride = min(-(-each // ENOUGH), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
+    longest = LONGEST_STEP * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
+    stride = min(-(-each // ENOUGH_POSES), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
     taken: Flags = np.arange(each) % max(stride, 1) == 0
     taken[-1] = True
     taken = np.tile(taken, poses.designs)
@@ -301,31 +283,16 @@ def thinned(motion: Motion, swept: str) -> Flags:
 
 
 def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> Floats:
-    """Places on a sweep in the study's unit; those at a pose as the study gives it, not there and back through radians.
+    """Places on a sweep (core's units) in the study's unit; those at a pose exactly as the study gives it.
 
-    Parameters
-    ----------
-    places : ndarray
-        In the core's units.
-    positions : ndarray
-        Where they are along the sweep, in rows.
+    `positions` is where they are along the sweep, in rows.
     """
     (group,), study = motion.question.poses.groups, motion.question.study
     given = group.values[swept]
     values = in_study_units(study, study.mechanism.coordinate(swept), places)
-    beside, near = given[np.round(positions).astype(int)], AT_POSE * np.ptp(given)
+    beside, near = given[np.round(positions).astype(int)], AT_GIVEN_PLACE * np.ptp(given)
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(beside - values) <= near, beside, np.where(np.abs(values) <= near, 0.0, values))
-
-
-_RATES: Mapping[tuple[Quantity, str], str] = {
-    ("length", "velocity"): "velocity",
-    ("length", "acceleration"): "acceleration",
-    ("angle", "velocity"): "angular_velocity",
-    ("angle", "acceleration"): "angular_acceleration",
-    ("none", "velocity"): "none",
-    ("none", "acceleration"): "none",
-}
 
 
 def entry(output: Coordinate, drive: Coordinate) -> str:
@@ -340,12 +307,7 @@ def move(
     *,
     also: Callable[[SolvedPoses], object] | None = None,
 ) -> Motion:
-    """Solve every pose; one that fails is nan, with its reason.
-
-    Parameters
-    ----------
-    also : callable, optional
-        Called with the solved poses, so that who needs more of them does not solve them again.
+    """Solve every pose; one that fails is nan, with its reason. `also` is called with the solved poses of each chunk.
 
     Raises
     ------
@@ -378,26 +340,26 @@ def _through_change_points(motion: Motion) -> None:
     motion.smooth = np.zeros(question.poses.count, dtype=bool)
     if plan.change_points is None or len(question.poses.groups) > 1:
         return
-    rows = np.flatnonzero(motion.valid & (motion.arrays["conditioning"] < NEAR))
+    rows = np.flatnonzero(motion.valid & (motion.arrays["conditioning"] < NEAR_SINGULAR))
     if not len(rows):
         return
     (name,) = group.names
     coordinate = plan.structure.given[0]
     scale = 1.0 if coordinate.quantity == "angle" else study.mechanism.size
-    steps = in_study_units(study, coordinate, scale * STEPS)
+    steps = in_study_units(study, coordinate, scale * STENCIL)
     values = (group.values[name][rows][:, None] + steps).ravel()
     beside = Poses((PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),))
     around = Motion(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
-    each = np.repeat(rows, len(STEPS))
+    each = np.repeat(rows, len(STENCIL))
     for solved in solve_poses(study, beside):
         near = {angle: radians(study, c, motion.arrays[angle][each[solved.rows]])
                 for angle, c in angles_of(question.watched).items() if angle != name}  # fmt: skip
         configuration = replace(solved.configuration, near={**solved.configuration.near, **near})
         around.fill(replace(solved, configuration=configuration))
-    good = around.valid.reshape(-1, len(STEPS)).all(axis=1)
+    good = around.valid.reshape(-1, len(STENCIL)).all(axis=1)
     for column, array in motion.arrays.items():
         if column in (name, "conditioning"):
             continue
-        table = around.arrays[column].reshape(-1, len(STEPS))
-        array[rows[good]] = (table @ WEIGHTS)[good]
+        table = around.arrays[column].reshape(-1, len(STENCIL))
+        array[rows[good]] = (table @ STENCIL_WEIGHTS)[good]
     motion.smooth[rows[good]] = True

@@ -13,19 +13,18 @@ from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.numerics.minima import lowest
-from mechdesign.numerics.roots import bracketed_roots
+from mechdesign.numerics.roots import bracketed_roots, lowest
 from mechdesign.results import Column, Table
 
-# Which segments are of interest: of a sign, the functions times it at both ends, of shape (functions, 2, segments), and
+# Which segments are of interest, by a sign, the functions times it at both ends, of shape (functions, 2, segments), and
 # how far each may fall below both.
 Wanted = Callable[[int, Floats, Floats], Flags]
 # Values of functions, shape (functions, n), beside poses of a line with the swept coordinate elsewhere.
 Along = Callable[[Ints, Floats], Floats]
 
-# How far from its place an extreme or a zero may be found, as a part of its segment.
-PRECISION = 1e-13
-# Where a segment that may hold an extreme is looked at first.
+# Error of the place of an extreme or a zero, as a part of its segment.
+PLACE_PRECISION = 1e-13
+# Parts of a segment that may hold an extreme at which poses are added first.
 LOOKS = np.array([0.25, 0.5, 0.75])
 
 
@@ -61,16 +60,10 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """The smallest value of each function over each design's line; of shape (functions, designs), nan where none is.
+    """The smallest value of each function, times a sign, over each design's line; nan where none is.
 
-    Parameters
-    ----------
-    value : ndarray
-        Times the sign that was asked.
-    place, position : ndarray
-        Swept coordinate (core's units), and place along the sweep in rows.
-    node : ndarray of int
-        The line's pose at or beside it.
+    With its place (swept coordinate in the core's units), its position along the sweep in rows, and the line's pose at
+    or beside it; all of shape (functions, designs).
     """
 
     value: Floats
@@ -119,19 +112,14 @@ def _roots(
     none = np.full(len(rising), np.nan)
     return bracketed_roots(
         lambda lane, x: rising[lane] * evaluate(lane, x),
-        at[0], rising * ends[0], at[1], rising * ends[1], none, none, PRECISION * np.abs(at[1] - at[0]),
+        at[0], rising * ends[0], at[1], rising * ends[1], none, none, PLACE_PRECISION * np.abs(at[1] - at[0]),
     )  # fmt: skip
 
 
 def zeros(line: PoseLine, rows: Ints, at_pose: float, touching: float) -> Places:
     """Places along a line at which functions are zero.
 
-    Parameters
-    ----------
-    at_pose : float
-        What is zero at a pose of the line.
-    touching : float
-        What is zero where a function does not cross it: at a limit of motion, and where it turns back.
+    They cross zero, are below `at_pose` at a pose, or below `touching` at a limit of motion or where they turn back.
     """
     turned = turns(line, rows, lambda _, values, drop: (values >= 0).all(axis=1) & (values.min(axis=1) <= drop))
     values = line.values[rows]
@@ -159,19 +147,14 @@ def zeros(line: PoseLine, rows: Ints, at_pose: float, touching: float) -> Places
     place = _roots(value, (low, high), (at_low, at_high))
     found = value(np.arange(len(function)), place)
     crossed = Places(function, begin, end, place, found, 0 * begin)
-    # What jumps from side to side is not zero between.
+    # A function that jumps from side to side is not zero between.
     return Places.joined(at_nodes, crossed.take(np.abs(found) <= touching), touched)
 
 
 def peaks(line: PoseLine, rows: Ints, still: Floats, *, all_poses: bool = False) -> tuple[Peak, Peak]:
     """Smallest values of functions (rows of the line's values), and of them times -1.
 
-    Parameters
-    ----------
-    still : ndarray, shape (functions, designs)
-        What is rounding.
-    all_poses : bool
-        Whether those at the sweep's own poses are wanted, too.
+    `still` is their rounding, shape (functions, designs); `all_poses` takes in the sweep's own poses, too.
     """
 
     def likely(sign: int, values: Floats, drop: Floats) -> Flags:
@@ -188,12 +171,7 @@ def peaks(line: PoseLine, rows: Ints, still: Floats, *, all_poses: bool = False)
 def searched(line: PoseLine, along: Along, table: Floats, still: Floats) -> Peak:
     """Smallest values of functions without slopes, by golden section beside the poses that are below their neighbours.
 
-    Parameters
-    ----------
-    along : callable
-        Values, of shape (functions, n), at places beside poses of the line (indices); nan where there are none.
-    table : ndarray, shape (functions, n)
-        Values at the poses of the line.
+    `table` has their values at the poses of the line, shape (functions, n).
     """
     before, after = np.arange(len(line.row)), np.arange(len(line.row))
     before[line.end], after[line.begin] = line.begin, line.end
@@ -218,13 +196,7 @@ def searched(line: PoseLine, along: Along, table: Floats, still: Floats) -> Peak
 
 
 def _best(line: PoseLine, still: Floats, sign: int, values: Floats, between: Places, all_poses: bool) -> Peak:
-    """Of a line's poses and of places between them, the first along the sweep of the smallest but for rounding.
-
-    Parameters
-    ----------
-    values : ndarray, shape (functions, n)
-        Of the poses, times the sign.
-    """
+    """Of a line's poses (`values` times the sign) and places between, the first along the sweep of the smallest."""
     candidates = np.isfinite(values)
     if not all_poses:
         candidates &= line.position != np.round(line.position)
@@ -271,14 +243,7 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     angle between the two extremes, for a drive of constant speed; nan elsewhere. `min_at` is the swept coordinate, or
     the row where there is none.
 
-    Parameters
-    ----------
-    swept : str or None
-        The one coordinate that moves.
-    line : PoseLine or None
-        The motion along it.
-    names : collection of str, optional
-        Outputs and errors whose extremes between the poses are wanted; all where left out.
+    Between the poses those of `names` are searched, or all, along `line`, the motion along `swept`.
     """
     study, poses, outputs = motion.question.study, motion.question.poses, motion.question.outputs
     mechanism = study.mechanism
@@ -299,7 +264,7 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
         row[1, :, k] = first_row + (values if every else np.where(known, values, -np.inf)).argmax(axis=1)
         low, high = (values.ravel()[row[end, :, k]] for end in (0, 1))
         still[:, k] = STILL * np.fmax(np.fmax(np.abs(low), np.abs(high)), sizes.get(quantity, 0.0))
-        # What stands still does so from its first pose on.
+        # A curve that stands still has both extremes at its first pose.
         stands = some & ~(high - low > still[:, k])
         row[:, stands, k] = (first_row + known.argmax(axis=1))[stands]
         found[:, 0, some, k], found[:, 1, some, k] = values.ravel()[row[:, some, k]], at[row[:, some, k]]
@@ -342,18 +307,10 @@ def _between(
     still: Floats,
     moving: Flags,
 ) -> None:
-    """Put better extremes than those of the poses into a table: from between the poses, and at limits of the motion.
+    """Put better extremes than those of the poses into `found`: from between the poses, and at limits of the motion.
 
-    Parameters
-    ----------
-    found : ndarray, shape (2, 2, designs, names)
-        Smallest and largest: value and place, in the study's units.
-    row : ndarray of int, shape (2, designs, names)
-        Their poses.
-    still : ndarray, shape (designs, names)
-        What is rounding.
-    moving : bool array, shape (designs, names)
-        Which move; those found to move are added.
+    `found` has value and place of the smallest and the largest, shape (2, 2, designs, names), `row` their poses; of
+    shape (designs, names) are `still`, rounding, and `moving`, where those found to move are added.
     """
     study, outputs = motion.question.study, motion.question.outputs
     swept = study.mechanism.coordinate(line.swept)

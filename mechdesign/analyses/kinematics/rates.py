@@ -11,13 +11,12 @@ from mechdesign.analyses.poses import SolvedPoses, radians
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.derivatives import STALLED, Linearization
-from mechdesign.mechanism.jacobians import Jacobian
+from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization
 from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.kinematics import KinematicsSection
+from mechdesign.study.schema.poses import KinematicsSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 
 
@@ -50,10 +49,7 @@ def drive_rates(
     At a speed v along the path of a point, of length s, a coordinate c that the path gives has the velocity c'(s) v
     and the acceleration c''(s) v^2.
 
-    Parameters
-    ----------
-    linear : Linearization
-        At the solved poses.
+    `linear` is the mechanism at the solved poses.
     """
     inverse = of_given(study, section)
     names = solved.given if inverse else study.mechanism.drives
@@ -81,19 +77,10 @@ def constant_rates(study: Study, section: KinematicsSection | ReliabilitySection
 def inverse_rates(
     mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate], rates: DriveRates
 ) -> DriveRates:
-    """Drive rates that give as many coordinates their velocities v and accelerations a.
+    """Drive rates that give as many coordinates their velocities v and accelerations a, at a flat batch.
 
     With J the derivatives of the coordinates by the drives q, J q' = v and J q'' = a - b, where b is what the
     coordinates accelerate by while q'' = 0. Where J is singular there are none.
-
-    Parameters
-    ----------
-    linear : Linearization
-        At configurations of shape (n,).
-    given : sequence of Coordinate
-        As many as drives.
-    rates : DriveRates
-        Of each of them.
     """
     matrix, good = _inverted(mechanism, linear, given)
     speeds = _solve(matrix, good, rates.velocities)

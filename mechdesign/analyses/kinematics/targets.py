@@ -17,22 +17,17 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.targets import Target, timing
 
-# Distances between poses and pieces of a path that are held at once.
-BLOCK = 1 << 20
-# A drive's value this part of the table's range beyond its end is still at the end: rounding.
-ROUNDING = 1e-9
+# Distances between poses and pieces of a path that are held in memory at once.
+MAX_DISTANCES = 1 << 20
+# A drive's value within this part of the table's range beyond its end is at the end.
+TABLE_END_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Error:
-    """An output less its target.
+    """A coordinate less its target, or a point's distance from its path.
 
-    Parameters
-    ----------
-    output : str
-        The coordinate, or the point whose distance from its path it is.
-    values : ndarray
-        In the study's units, angles in (-half a turn, half a turn]; nan where the output or the target has no value.
+    In the study's units, angles in (-half a turn, half a turn]; nan where the output or the target has no value.
     """
 
     output: str
@@ -67,7 +62,7 @@ def errors(
     rows : ndarray of int, shape (n,)
         The pose of each value.
     between : bool
-        Whether they are values beside those poses, where targets that are given a pose have none.
+        Whether they are values between the poses, where targets that are given for each pose have none.
     """
     turn = 2 * np.pi / study.units.angle_factor
     for target in study.targets.values():
@@ -114,7 +109,7 @@ def _interpolated(table: Floats, at: Floats, turn: float | None) -> list[Floats]
     Where `turn` is given, values outside the table are taken at the turn in which it may hold them.
     """
     first, last = table[0, 0], table[-1, 0]
-    slack = ROUNDING * max(last - first, abs(first))
+    slack = TABLE_END_ROUNDING * max(last - first, abs(first))
     outside = (at < first - slack) | (at > last + slack)
     if turn is not None:
         at = np.where(outside, first + np.mod(at - first, turn), at)
@@ -123,15 +118,7 @@ def _interpolated(table: Floats, at: Floats, turn: float | None) -> list[Floats]
 
 
 def nearest(points: Complexes, corners: Complexes) -> Complexes:
-    """The point of a polyline that is nearest to each point.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n,)
-        x + i y.
-    corners : ndarray, shape (m,)
-        Of the polyline, which is closed where the last is the first; a single one is a point.
-    """
+    """The nearest point of a polyline, given by its corners, to each point (x + i y); a single corner is a point."""
     if len(corners) == 1:
         return np.where(np.isnan(points), np.nan, corners[0])
     begins, spans = corners[:-1], np.diff(corners)
@@ -139,7 +126,7 @@ def nearest(points: Complexes, corners: Complexes) -> Complexes:
     # A piece without length is its corner: any positive divisor gives part 0.
     lengths = np.where(lengths > 0, lengths, 1.0)
     found = np.empty(len(points), dtype=complex)
-    step = max(1, BLOCK // len(spans))
+    step = max(1, MAX_DISTANCES // len(spans))
     for first in range(0, len(points), step):
         some = points[first : first + step, None]
         feet = begins + np.clip(dot(spans, some - begins) / lengths, 0.0, 1.0) * spans

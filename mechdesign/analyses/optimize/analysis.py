@@ -1,16 +1,20 @@
-"""Which dimensions are best? A grid, a search or a Pareto front of designs, compared by normalised, weighted goals."""
+"""Which dimensions are best? A grid, a search or a Pareto front of designs, compared; the best as study files."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 
 from mechdesign.analyses.optimize import pareto
 from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer
-from mechdesign.analyses.optimize.files import best_design, optimum_files
 from mechdesign.analyses.optimize.goals import conditions_of, goals_of
 from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
 from mechdesign.analyses.optimize.tables import (
@@ -22,20 +26,24 @@ from mechdesign.analyses.optimize.tables import (
     sensitivity_table,
 )
 from mechdesign.analyses.optimize.variables import grid, in_words
-from mechdesign.analyses.workspace.analysis import index_meanings
-from mechdesign.errors import AssemblyError, Interrupted, StudyError
+from mechdesign.analyses.poses import solve_shown
+from mechdesign.analyses.workspace.analysis import index_meanings, workspace
+from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
+from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import workers
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
+from mechdesign.study.loading import load_bytes
+from mechdesign.study.variants import changed_data, rewritten, variant
 from mechdesign.threads import one_thread
 
 # Numbers that a search keeps of the rows behind its goals.
-MOST_KEPT = 10_000_000
-# Reasons of infeasible designs that are told one by one.
-MOST_REASONS = 10
+MAX_KEPT_ROWS = 10_000_000
+# Reasons of infeasible designs that are reported one by one.
+MAX_REASONS = 10
 
 
 @one_thread()
@@ -51,8 +59,6 @@ def optimize(
 
     Parameters
     ----------
-    study : Study
-        With an optimize section.
     seed : int, optional
         Of the search and the front, in place of the study's; a grid is not random.
     jobs : int or None
@@ -80,11 +86,11 @@ def optimize(
     evaluator = Evaluator(study, (*goals, *conditions_of(section)), graded=section.method != "grid")
     meanings = index_meanings(study, evaluator.question) if evaluator.question is not None else {}
     budget = section.evaluations or (
-        pareto.DEFAULT_EVALUATIONS * len(goals)
+        pareto.FRONT_EVALUATIONS * len(goals)
         if section.method == "pareto"
         else searching.allowance(len(section.variables), len(weights), len(goals), slow=evaluator.slow)
     )
-    evaluator.limit_rows(MOST_KEPT // budget)
+    evaluator.limit_rows(MAX_KEPT_ROWS // budget)
     with workers(evaluator, jobs, processes=True) as compute:
         judge = Judge(study, evaluator, compute, progress, journal)
         try:
@@ -131,7 +137,7 @@ def _ask(
     judge.progress.start(budget, "designs")
     # Values of a workspace are known to a tolerance only.
     rough = evaluator.question is not None
-    explorer = Explorer(judge.scores, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
+    explorer = Explorer(judge.known, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
     if section.method == "search":
         use_all = section.evaluations is not None
         return tuple(_doubts(searching.search(explorer, smallest, weights.tolist(), seed, use_all=use_all), budget))
@@ -165,7 +171,7 @@ def _none_feasible(designs: JudgedDesigns) -> str:
     reasons = designs.counted()
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
-    told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MOST_REASONS])
+    told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
     return f"no design of {len(designs)} is feasible: {told}"
 
 
@@ -177,11 +183,11 @@ def _finished_part(study: Study, designs: JudgedDesigns, meanings: Mapping[str, 
 
 def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Iterator[str]:
     reasons = designs.counted()
-    for reason, count, first in reasons[:MOST_REASONS]:
-        row = {name: float(column[first]) for name, column in designs.variables.items()}
-        yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {in_words(row)})"
-    if len(reasons) > MOST_REASONS:
-        yield f"designs are infeasible for {len(reasons) - MOST_REASONS} more reasons; see designs.csv"
+    for reason, count, first in reasons[:MAX_REASONS]:
+        place = in_words(designs.numbers(first))
+        yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {place})"
+    if len(reasons) > MAX_REASONS:
+        yield f"designs are infeasible for {len(reasons) - MAX_REASONS} more reasons; see designs.csv"
     if evaluator.question is None or evaluator.question.rule != "gauss":
         return
     for each, error in designs.errors.items():
@@ -189,3 +195,61 @@ def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Ite
         if loose.any():
             told = f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for"
             yield f"{told}; see {each.name}_error"
+
+
+def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
+    """Texts by file name, ``optimum.yaml`` for the first row of weights, ``optimum_2.yaml`` ..., and what is wrong.
+
+    `marked` are further designs worth a file, by its name without the suffix.
+    """
+    goals = [each.name for each in compared.designs.goals]
+    wanted = {}
+    for row, winner in enumerate(compared.winners.tolist()):
+        weights = ", ".join(f"{each} {weight:g}" for each, weight in zip(goals, compared.weights[row], strict=True))
+        name = f"optimum_{row + 1}" if row else "optimum"
+        wanted[name] = winner, f"Optimum of {study.name} for the weights {weights}"
+    wanted |= {name: (k, f"{name.capitalize()} of the Pareto front of {study.name}") for name, k in marked.items()}
+    files: dict[str, str] = {}
+    doubts = []
+    for name, (k, heading) in wanted.items():
+        numbers = compared.designs.numbers(k)
+        heading = f"{heading}: {in_words(numbers)}"
+        data = changed_data(study, numbers)
+        try:
+            mechanism = variant(study, numbers).mechanism
+            if not _assembles_alike(study, mechanism, data):
+                # With the sketch as it assembles.
+                sketch = data["mechanism"]["sketch"]
+                places = [np.asarray(mechanism.sketch_configuration.point(point)).item() for point in sketch]
+                sketch |= {point: [z.real, z.imag] for point, z in zip(sketch, places, strict=True)}
+                if not _assembles_alike(study, mechanism, data):
+                    doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
+        except MechdesignError as error:
+            doubts.append(f"{name}.yaml: {str(error).splitlines()[0]}")
+        text, beside = rewritten(study, data, heading)
+        files |= {f"{name}.yaml": text, **beside}
+    return files, doubts
+
+
+def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]) -> bool:
+    """Whether the study of this data has the assembly of the mechanism that was evaluated."""
+    try:
+        alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path or Path("study.yaml"))
+    except MechdesignError:
+        return False
+    return alone.mechanism.forward.modes == mechanism.forward.modes
+
+
+def best_design(compared: Comparison) -> tuple[Study, Result]:
+    """The design that is best on the whole as a study, and its workspace where that was judged, or else its motion."""
+    best = variant(compared.study, compared.designs.numbers(compared.best))
+    if best.workspace is not None and any(each.command == "workspace" for each in compared.designs.goals):
+        # The region is drawn, not its indices.
+        plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))
+        result = workspace(plain)
+        if "local" in result.tables:
+            return plain, result
+    drawn = {}
+    with suppress(MechdesignError):
+        drawn["motion"] = solve_shown(best)
+    return best, Result("kinematics", {}, drawn=drawn)

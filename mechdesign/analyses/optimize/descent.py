@@ -22,24 +22,24 @@ from mechdesign.numerics.arrays import Floats, Ints
 # Steps of differences, and half the widths of the boxes in which they are used, in parts of the ranges.
 LADDER = ((1e-4, 0.3), (1e-5, 0.03))
 # Where values are known to a tolerance, differences over less than this are noise.
-ROUGH = ((1e-2, 0.3), (1e-3, 0.05))
+ROUGH_LADDER = ((1e-2, 0.3), (1e-3, 0.05))
 SQUARES_STEP = 1e-5
 # Most steps of least squares, far from their end and near it, and of quadratic programs.
-MOST_SQUARES = 60
-MOST_FINAL_SQUARES = 150
-MOST_STEPS = 60
+MAX_SQUARES = 60
+MAX_FINAL_SQUARES = 150
+MAX_STEPS = 60
 # Points asked for one after the other, none of which is better than what was known: a stage ends.
-MOST_IN_VAIN = 30
-ROUGH_MOST_IN_VAIN = 12
+MAX_IN_VAIN = 30
+ROUGH_MAX_IN_VAIN = 12
 # Gains of a step, in parts of what a range changes, below which a quadratic program ends.
 SMALLEST_GAIN = 1e-14
 ROUGH_SMALLEST_GAIN = 1e-5
 # How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
-SLACK = 1e-9
-# Added to the objective where a point has no value and no condition tells why, in parts of what a range changes.
-IMPOSSIBLE = 1e3
+CONDITION_SLACK = 1e-9
+# Added to the objective where a point has no value though it meets all conditions, in parts of what a range changes.
+NO_VALUE_COST = 1e3
 # Slopes of conditions below this part of their values are none.
-FLAT = 1e-6
+FLAT_SLOPE = 1e-6
 TINY = float(np.finfo(float).tiny)
 
 
@@ -185,7 +185,7 @@ class _Descent:
 
     def ask(self, points: Floats) -> Ints:
         """Rows of points; the best of them, or of those before, is where the next stage begins."""
-        if self._in_vain > (ROUGH_MOST_IN_VAIN if self.explorer.rough else MOST_IN_VAIN):
+        if self._in_vain > (ROUGH_MAX_IN_VAIN if self.explorer.rough else MAX_IN_VAIN):
             raise _InVain
         rows = self._evaluate(points)
         known = self.explorer.known
@@ -221,7 +221,7 @@ class _Descent:
 
         begin = self.explorer.known.u[self.best]
         if np.isfinite(residuals(begin)).all():
-            most = MOST_FINAL_SQUARES if self.final else MOST_SQUARES
+            most = MAX_FINAL_SQUARES if self.final else MAX_SQUARES
             least_squares(
                 residuals, begin, jac=slopes, bounds=(0.0, 1.0), method=method, max_nfev=most,
                 xtol=1e-14, ftol=1e-14, gtol=None,
@@ -269,7 +269,7 @@ class _Descent:
 
         def room(y: Floats) -> Floats:
             _, pieces, limits = program.terms(y[:n])
-            return np.concatenate([y[n:][owner] - pieces, -limits - SLACK])
+            return np.concatenate([y[n:][owner] - pieces, -limits - CONDITION_SLACK])
 
         def room_slope(y: Floats) -> Floats:
             _, pieces, limits = program.slopes(y[:n])
@@ -282,7 +282,7 @@ class _Descent:
             cost, np.concatenate([begin, tops]), jac=cost_slope, method="SLSQP",
             bounds=[*zip(low, high, strict=True), *[(None, None)] * more],
             constraints=[{"type": "ineq", "fun": room, "jac": room_slope}] if len(owner) + len(free) else (),
-            options={"maxiter": MOST_STEPS, "ftol": ROUGH_SMALLEST_GAIN if self.explorer.rough else SMALLEST_GAIN},
+            options={"maxiter": MAX_STEPS, "ftol": ROUGH_SMALLEST_GAIN if self.explorer.rough else SMALLEST_GAIN},
         )  # fmt: skip
 
     def linear(self, u: Floats, step: float) -> tuple[list[Floats], list[Floats]]:
@@ -290,7 +290,7 @@ class _Descent:
         points, rows = self._stencil(u, step)
         found = self.terms(rows)
         if self.squared:
-            # Slopes vanish at the bottom of a valley; there the curvature tells how much a range changes.
+            # Slopes vanish at the bottom of a valley; there the curvature gives the change over a range.
             n, plain = len(u), found[0][:, 0]
             inside = np.abs(points[n + 1 :] - points[1 : n + 1]).max(axis=1) > 1.5 * step
             bends = np.abs(plain[1 : n + 1] + plain[n + 1 :] - 2 * plain[0])[inside] / step**2
@@ -310,7 +310,7 @@ class _Program:
         values, slopes = descent.linear(begin, step)
         scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), descent.curvature, TINY)
         steepest = np.abs(slopes[2]).max(axis=1, initial=0.0)
-        self.lengths = np.maximum(steepest, np.maximum(FLAT * np.abs(np.nan_to_num(values[2])), TINY))
+        self.lengths = np.maximum(steepest, np.maximum(FLAT_SLOPE * np.abs(np.nan_to_num(values[2])), TINY))
         self._scales = [np.array([scale]), np.full(len(values[1]), scale), self.lengths]
         self._at, self._slopes = begin.copy(), [a / b[:, None] for a, b in zip(slopes, self._scales, strict=True)]
         self._values = [np.nan_to_num(a / b) for a, b in zip(values, self._scales, strict=True)]
@@ -328,7 +328,7 @@ class _Program:
             told = bool((found[2] > 0).any())
             found = [np.where(np.isnan(new), line, new) for new, line in zip(found, straight, strict=True)]
             if impossible and not told:
-                found[0] = found[0] + IMPOSSIBLE
+                found[0] = found[0] + NO_VALUE_COST
             self._known = {key: found}
         return self._known[key]
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
-from mechdesign.analyses.poses import solve_poses, study_poses
+from mechdesign.analyses.poses import POSES_AT_ONCE, solve_poses, study_poses
 from mechdesign.analyses.region.panels import BATCH
-from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, questions, split
+from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, split
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -26,12 +26,8 @@ from mechdesign.rows import Chosen, UnknownColumnError, choose
 from mechdesign.study import Study
 from mechdesign.study.variants import faults, follows, variant
 
-# Poses of all designs that are solved together: their arrays fit the cache.
-BLOCK = 65536
 NO_REGION = "nothing of the workspace can be reached"
-# Tables that may be of some of the poses only.
-OF_SOME_POSES = ("extremes",)
-NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 # Why a pose fails, by `mechdesign.mechanism.Reason`.
 FAILED = np.array([
     "",
@@ -73,11 +69,8 @@ class Evaluated(NamedTuple):
 class Evaluator:
     """Evaluates goals for designs of one study, which differ in parameters or single places.
 
-    Parameters
-    ----------
-    graded : bool
-        Whether the rows are given, too, that goals are the worst of or the root mean square (in `squares`), and how far
-        poses are from assembling.
+    Graded, it also gives the rows that goals are the worst of, or the root mean square of (those in `squares`), and how
+    far poses are from assembling.
 
     Raises
     ------
@@ -105,9 +98,8 @@ class Evaluator:
                 message = "an optimisation compares one workspace a design: hold one value of each coordinate"
                 raise StudyError([study.problem(message, "workspace", "at")])
             self.question = asked[0]
-            self._regions_together = all(each.batched for each in self._regional) and not follows(
-                study, study.optimize.variables, ("workspace",)
-            )
+            one_by_one = follows(study, study.optimize.variables, ("workspace",))
+            self._regions_together = not one_by_one and all(batched(each.column) for each in self._regional)
         # Where the study names each.
         self._keys = goals_of(study.optimize) | conditions_of(study.optimize)
         commands = dict.fromkeys(each.command for each in self.goals if not each.regional)
@@ -119,7 +111,8 @@ class Evaluator:
         clear: dict[str, int] = {}
         for command, tables in self._together.items() if graded else ():
             poses = self._poses[command](1, {}, {})
-            if poses.listed or any(table not in OF_SOME_POSES for table in tables):
+            # Extremes may be of some of the poses only.
+            if poses.listed or set(tables) != {"extremes"}:
                 clear[command] = stacked.assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
         self.layout = Layout(self.goals, self._rows, clear)
         if not graded:
@@ -160,7 +153,7 @@ class Evaluator:
         if not goals:
             return
         self._alone.setdefault(command, []).extend(goals)
-        # Where the study's own design has no such result, others tell.
+        # Where the study's own design has no such result, other designs may.
         with suppress(AssemblyError):
             result = look(self.study, command)
             for each in goals:
@@ -187,7 +180,7 @@ class Evaluator:
         if self.question is not None and self._regions_together:
             self._regions(batch, batch.feasible, self.question, batch.places)
         for command, tables in self._together.items():
-            rows, size = batch.feasible, max(1, BLOCK // self._poses[command](1, {}, {}).count)
+            rows, size = batch.feasible, max(1, POSES_AT_ONCE // self._poses[command](1, {}, {}).count)
             for begin in range(0, len(rows), size):
                 self._tables(batch, command, tables, rows[begin : begin + size])
         alone = bool(self._alone) or not self._regions_together
@@ -205,7 +198,7 @@ class Evaluator:
         try:
             given = answer(question, batch.take(places, rows), len(rows), BATCH)
         except AssemblyError as error:
-            # One design's workspace has no end; the others are still to be told.
+            # One design's workspace has no end; the others are asked in halves.
             if len(rows) == 1:
                 batch.reasons[rows] = _plainly(error)
                 return
@@ -307,7 +300,7 @@ class _Batch:
 
     @property
     def feasible(self) -> Ints:
-        """Rows of the designs that nothing is said against."""
+        """Rows of the designs that have no reason to be infeasible so far."""
         return np.flatnonzero(self.reasons == "")
 
     def take(self, values: Mapping[str, Number], rows: Ints) -> dict[str, Floats]:
@@ -341,4 +334,4 @@ def _plainly(error: MechdesignError) -> str:
     if isinstance(error, StudyError):
         first = error.problems[0]
         text = ": ".join(part for part in (first.key, first.message) if part)
-    return NUMBER.sub("...", text)
+    return _NUMBER.sub("...", text)

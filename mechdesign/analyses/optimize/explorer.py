@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-# Merits of points that miss a condition, of points without a value, and of those of which nothing is known: beyond any
-# goal, with room for their order.
-MISSES, OPEN, UNKNOWN = 1e60, 1e90, 1e120
+# Least merits, beyond any goal and with room for their order, of points that miss a condition, of points without a
+# value, and of those of which nothing is known.
+CONDITION_MISSED = 1e60
+NO_VALUE = 1e90
+UNKNOWN = 1e120
 # Column of the parts that are of no goal or condition: margins of assembly, negative where a pose does not assemble.
 ASSEMBLY = -1
 FIRST_ROWS = 256
@@ -24,7 +25,7 @@ class Spent(Exception):
 
 @dataclass(frozen=True)
 class Part:
-    """Rows that a goal or a condition is the worst of, or the root mean square.
+    """Rows, columns `place` of `Known.rows`, of which a goal or a condition is the worst or the root mean square.
 
     Parameters
     ----------
@@ -34,10 +35,6 @@ class Part:
         1 where the largest row is the worst, -1 where the smallest is.
     absolute : bool
         Whether absolute values are judged.
-    place : slice
-        Columns of `Known.rows`.
-    bound : float
-        Of a condition.
     squares : bool
         Whether the goal is the root mean square of the rows.
     """
@@ -60,25 +57,16 @@ class Part:
         return np.asarray(found - self.sign * self.bound)
 
 
-class Scores(NamedTuple):
-    """What an evaluation of points gives; see `Known`. Without shortfalls, points without a value are all alike."""
-
-    values: Floats
-    margins: Floats
-    rows: Floats
-    shortfall: Floats | None = None
-
-
 @dataclass(frozen=True)
 class Known:
-    """Everything evaluated so far.
+    """Evaluated points, a line each.
 
     Parameters
     ----------
     u : ndarray, shape (points, dimensions)
         Points of the unit cube.
     values : ndarray, shape (points, goals)
-        Values of the goals; nan where there is none.
+        Of the goals; nan where there is none.
     margins : ndarray, shape (points, conditions)
         By how much each condition is met, negative where it is not.
     rows : ndarray, shape (points, rows)
@@ -112,27 +100,23 @@ class Known:
         [Deb, An efficient constraint handling method for genetic algorithms, 2000]; inf where that is not known.
         """
         valid, feasible = self.valid, self.feasible
-        merit = np.where(np.isnan(self.shortfall), np.inf, OPEN * (1.0 + self.shortfall))
+        merit = np.where(np.isnan(self.shortfall), np.inf, NO_VALUE * (1.0 + self.shortfall))
         merit[feasible] = self.values[feasible] @ objective
         missing = valid & ~feasible
         if missing.any():
             scale = np.abs(self.margins[valid]).max(axis=0)
             short = np.maximum(-self.margins[missing] / np.where(scale > 0, scale, 1.0), 0.0).sum(axis=1)
-            merit[missing] = MISSES * (1.0 + short)
+            merit[missing] = CONDITION_MISSED * (1.0 + short)
         return merit
 
 
 class Explorer:
-    """Evaluates points of the unit cube, each once.
+    """Evaluates points of the unit cube, at most `budget` of them and each once.
 
     Parameters
     ----------
     evaluate
-        From points, shape (m, dimensions), to what is known of them.
-    budget : int
-        How many points may be evaluated.
-    parts : sequence of Part
-        Which rows there are.
+        Of points, shape (m, dimensions).
     rough : bool
         Whether values are known to a tolerance only, so that differences over small steps are noise.
     slow : bool
@@ -140,12 +124,12 @@ class Explorer:
 
     Attributes
     ----------
-    reserve : int
-        How many of the evaluations that are left are kept for later.
+    left, reserve : int
+        Evaluations that are left, and how many of them are kept for later.
     """
 
     def __init__(
-        self, evaluate: Callable[[Floats], Scores], dimensions: int, budget: int, parts: Sequence[Part] = (),
+        self, evaluate: Callable[[Floats], Known], dimensions: int, budget: int, parts: Sequence[Part] = (),
         *, rough: bool = False, slow: bool = False,
     ) -> None:  # fmt: skip
         self._evaluate, self.dimensions, self.parts = evaluate, dimensions, tuple(parts)
@@ -178,9 +162,7 @@ class Explorer:
                 raise Spent
             self.left -= len(order)
             found = self._evaluate(u[order])
-            none = np.where(np.isnan(found.values).any(axis=1), 1.0, 0.0)
-            shortfall = none if found.shortfall is None else found.shortfall
-            parts = (u[order], found.values, found.margins, found.rows, shortfall[:, None])
+            parts = (found.u, found.values, found.margins, found.rows, found.shortfall[:, None])
             end = begun + len(order)
             if end > len(self._table):
                 *self._ends, width = np.cumsum([part.shape[1] for part in parts]).tolist()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.workspace.question import COLUMNS, batched, split
+from mechdesign.analyses.workspace.question import COLUMNS, split
 from mechdesign.commands import COMMANDS
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result
@@ -24,16 +24,14 @@ class Goal:
     ----------
     name : str
         As the study gives it; of a condition with its bound.
-    command, column : str
-        Where it is found; the column as `mechdesign.rows.choose` understands it.
+    column : str
+        As `mechdesign.rows.choose` understands it.
     smallest : bool
         Whether the largest row is the worst one; of a condition, whether its bound is an upper one.
     absolute : bool
         Judge absolute values.
     where : tuple of (str, object)
         Only rows whose columns have these values count.
-    bound : float
-        Of a condition.
     """
 
     name: str
@@ -49,11 +47,6 @@ class Goal:
         """Whether it is a number of the whole workspace."""
         found = self.column in COLUMNS or bool(split(self.column)[0])
         return self.command == "workspace" and found and not self.where
-
-    @property
-    def batched(self) -> bool:
-        """Whether it is a number of the workspace that is evaluated for many designs at once."""
-        return self.regional and batched(self.column)
 
     def margin(self, values: Floats) -> Floats:
         """By how much values keep the bound, negative where they do not."""
@@ -115,8 +108,8 @@ def goal(name: str, *, smallest: bool = False, where: Mapping[str, object] | Non
     """
     command, column = _parts(name)
     rows = tuple((where or {}).items())
-    told = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
-    return Goal(told, command, column, smallest, column.endswith("_error"), rows)
+    title = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
+    return Goal(title, command, column, smallest, column.endswith("_error"), rows)
 
 
 def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:

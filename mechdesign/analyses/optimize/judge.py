@@ -1,4 +1,4 @@
-"""Designs evaluated and judged: values of goals, conditions, reasons; all that is asked for, in the order of asking."""
+"""Designs evaluated and judged, in the order of evaluation: values of goals and conditions, reasons of failure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
-from mechdesign.analyses.optimize.explorer import ASSEMBLY, Part, Scores
+from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube
 from mechdesign.journal import Journal, digest
@@ -20,23 +20,20 @@ from mechdesign.progress import Progress
 from mechdesign.study import Study
 
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
-CHUNK = 384
+DESIGNS_AT_ONCE = 384
 # The same where designs cost much and a search asks for few at once.
-SMALL_CHUNK = 16
+SLOW_DESIGNS_AT_ONCE = 16
 
 
 @dataclass(frozen=True, eq=False)
 class JudgedDesigns:
-    """Designs and what was found of them.
+    """Evaluated designs; arrays are of shape (designs,).
 
     Parameters
     ----------
-    variables : dict of str to ndarray, shape (designs,)
-        Values of the design variables.
-    goals, conditions : tuple of Goal
-    values : dict of Goal to ndarray, shape (designs,)
-        Values of the goals and of what the conditions bound; nan where there is none.
-    errors : dict of Goal to ndarray, shape (designs,)
+    values : dict of Goal to ndarray
+        Of the goals and of what the conditions bound; nan where there is none.
+    errors : dict of Goal to ndarray
         Estimated errors, of goals that have any.
     codes, words : ndarray of int, list of str
         Why a design cannot be built: ``words[code]``, empty where it can.
@@ -52,6 +49,10 @@ class JudgedDesigns:
 
     def __len__(self) -> int:
         return len(self.codes)
+
+    def numbers(self, row: int) -> dict[str, float]:
+        """The variables of one design."""
+        return {name: float(column[row]) for name, column in self.variables.items()}
 
     @cached_property
     def failures(self) -> dict[str, Flags]:
@@ -82,10 +83,7 @@ class JudgedDesigns:
 class Judge:
     """Evaluates designs in chunks and keeps what is found; what a journal holds is not computed again.
 
-    Parameters
-    ----------
-    compute
-        Evaluates chunks, in their order: ``map(evaluator, chunks)``, or workers that do so.
+    `compute` evaluates chunks in their order: ``map(evaluator, chunks)``, or workers that do so.
     """
 
     def __init__(
@@ -97,7 +95,7 @@ class Judge:
         self.goals, self.conditions = tuple(goals_of(study.optimize)), tuple(conditions_of(study.optimize))
         self._names = tuple(study.optimize.variables)
         self._squares, self._compute, self._journal = evaluator.squares, compute, journal
-        self._chunk = SMALL_CHUNK if evaluator.slow and study.optimize.method != "grid" else CHUNK
+        self._chunk = SLOW_DESIGNS_AT_ONCE if evaluator.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
         # Words of an earlier run keep their numbers: this one meets them in the same order.
         self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
         self._asked: list[Floats] = []
@@ -116,7 +114,7 @@ class Judge:
             found.append(Part(ASSEMBLY, -1.0, False, slice(margins.start - head, margins.stop - head)))
         return found
 
-    def scores(self, u: Floats) -> Scores:
+    def known(self, u: Floats) -> Known:
         """Evaluate points of the unit cube."""
         designs, given = from_cube(self.study, u)
         found = np.full((len(u), self.layout.width), np.nan)
@@ -124,8 +122,8 @@ class Judge:
             found[given] = self.evaluate({name: column[given] for name, column in designs.items()})
         values = np.where(found[:, [self.layout.code]] > 0, np.nan, found[:, self.layout.values])
         margins = [each.margin(values[:, self.layout.column[each]]) for each in self.conditions]
-        return Scores(
-            values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
+        return Known(
+            u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
             found[:, self.layout.head :], found[:, self.layout.shortfall],
         )  # fmt: skip
 

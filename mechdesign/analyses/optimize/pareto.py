@@ -11,42 +11,32 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table
 
 # Evaluations for each goal where the study says none.
-DEFAULT_EVALUATIONS = 1200
+FRONT_EVALUATIONS = 1200
 # Generations that a population is given of those that are left.
 GENERATIONS = 25
-SMALLEST_POPULATION = 8
-LARGEST_POPULATION = 200
+SMALLEST_FRONT_POPULATION = 8
+LARGEST_FRONT_POPULATION = 200
 # Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ.
-SAME_DESIGN = 1e-4
+DESIGN_DISTANCE = 1e-4
 
 
 def spread(explorer: Explorer, signs: Floats, seed: int) -> None:
     """Use the evaluations that are left to spread a population along the front, from its widest gaps so far.
 
-    Parameters
-    ----------
-    signs : ndarray, shape (goals,)
-        1 where a goal is minimised, -1 where it is maximised.
+    `signs`, shape (goals,), are 1 where a goal is minimised, -1 where it is maximised.
     """
-    size, known = int(np.clip(explorer.left // GENERATIONS, SMALLEST_POPULATION, LARGEST_POPULATION)), explorer.known
+    size = int(np.clip(explorer.left // GENERATIONS, SMALLEST_FRONT_POPULATION, LARGEST_FRONT_POPULATION))
+    known = explorer.known
     begun = np.flatnonzero(known.feasible)
     if len(begun):
         rows = begun[front(known.values[begun] * signs)]
         begun = rows[np.argsort(-crowding(known.values[rows] * signs), kind="stable")[: size // 2]]
     others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
-    evolve(explorer, signs, np.concatenate([known.u[begun], others]), seed)
+    evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed)
 
 
-def evolve(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
-    """Spread a population along the front by NSGA-II [Deb et al., 2002], as pymoo does it.
-
-    Parameters
-    ----------
-    signs : ndarray, shape (goals,)
-        As `spread` takes them.
-    first : ndarray, shape (points, dimensions)
-        Points of the unit cube to begin with.
-    """
+def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
+    """Spread a population along the front by NSGA-II [Deb et al., 2002], from points of shape (points, dimensions)."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.evaluator import Evaluator
     from pymoo.core.problem import Problem
@@ -81,13 +71,7 @@ def evolve(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
 
 
 def front(values: Floats) -> Ints:
-    """Rows that no other row surpasses; of equal rows the first.
-
-    Parameters
-    ----------
-    values : ndarray, shape (designs, goals)
-        Less is better.
-    """
+    """Rows of values, shape (designs, goals), that no other surpasses, less being better; of equals the first."""
     from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
     unique, first = np.unique(values, axis=0, return_index=True)
@@ -102,11 +86,11 @@ def normalised(values: Floats) -> Floats:
 
 
 def distinct(values: Floats) -> Ints:
-    """Rows of a front, its ends among them, of which no two are closer than `SAME_DESIGN` in every goal."""
+    """Rows of a front, its ends among them, of which no two are closer than `DESIGN_DISTANCE` in every goal."""
     share = normalised(values)
     kept: list[int] = []
     for k in (*_ends(share), *range(len(share))):
-        if (np.abs(share[kept] - share[k]).max(axis=1, initial=0.0) > SAME_DESIGN).all():
+        if (np.abs(share[kept] - share[k]).max(axis=1, initial=0.0) > DESIGN_DISTANCE).all():
             kept.append(k)
     return np.sort(np.array(kept, dtype=np.intp))
 
@@ -119,12 +103,7 @@ def _ends(share: Floats) -> list[int]:
 def knee(values: Floats) -> int:
     """The row farthest from the plane through the extremes of a front (the line, for two goals), towards the ideal.
 
-    [Das, On characterizing the 'knee' of the Pareto curve, 1999.]
-
-    Parameters
-    ----------
-    values : ndarray, shape (designs, goals)
-        Of a front; less is better.
+    Less is better. [Das, On characterizing the 'knee' of the Pareto curve, 1999.]
     """
     share = normalised(values)
     ones = np.ones(share.shape[1])

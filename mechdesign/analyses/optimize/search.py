@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.optimize.descent import LADDER, ROUGH, descend
-from mechdesign.analyses.optimize.explorer import MISSES, UNKNOWN, Explorer, Known, Spent
+from mechdesign.analyses.optimize.descent import LADDER, ROUGH_LADDER, descend
+from mechdesign.analyses.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Known, Spent
 from mechdesign.numerics.arrays import Floats
 
 # Evaluations per row of weights and per (variables + 1): the fewest of a start, and the default of a search.
@@ -22,12 +22,12 @@ START_EVALUATIONS = 500
 DEFAULT_EVALUATIONS = 1800
 # That default where designs are evaluated one by one, per (variables + 1) and per row of weights and end of a goal.
 SLOW_DEFAULT_EVALUATIONS = 20
-MOST_STARTS = 12
+MAX_STARTS = 12
 # Points of a start's sample per (variables + 1); it takes one in so many of the start's evaluations, at least.
 SAMPLE_POINTS = 16
 SAMPLE_SHARE = 6
 # With no more variables than these the cube's vertices join the sample.
-MOST_VERTICES = 4
+MAX_VERTICES = 4
 # Differential evolution: population per variable, smallest population, the part of a start's evaluations that it takes.
 POPULATION = 8
 SMALLEST_POPULATION = 24
@@ -37,16 +37,16 @@ STALLED_GAIN = 1e-3
 STALLED_GENERATIONS = 8
 ROUGH_STALLED_GENERATIONS = 3
 # Most descents at once, and the smallest distance between their beginnings, in parts of the ranges.
-MOST_DESCENTS = 6
-APART = 0.05
+MAX_DESCENTS = 6
+START_DISTANCE = 0.05
 # Evaluations that a descent takes as a rule, in those of its slopes (2 n + 1).
 DESCENT_EVALUATIONS = 40
 # Rounds of descents in a start: where the search may end early, and where it uses all its evaluations.
-FEWEST_ROUNDS = 2
-MOST_ROUNDS = 1000
+MIN_ROUNDS = 2
+MAX_ROUNDS = 1000
 # Length of the steps that may not improve the optimum, in parts of the ranges, and rounds of such steps.
 CHECK_STEP = 1e-4
-MOST_CHECKS = 12
+MAX_CHECKS = 12
 # Evaluations kept for these rounds, in those of slopes; those of a root mean square have the narrowest valleys.
 CHECK_EVALUATIONS = 40
 SQUARES_CHECK_EVALUATIONS = 200
@@ -97,13 +97,13 @@ def search(
     smallest : sequence of bool
         Which goals are minimised.
     rows : sequence of sequence of float
-        Weights, in the order of the goals.
+        Rows of weights.
     use_all : bool
         Whether all evaluations are used; else it ends when two starts have found the same.
     """
     rng = np.random.default_rng(seed)
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
-    starts = int(np.clip(budget // (START_EVALUATIONS * (explorer.dimensions + 1) * len(rows)), 1, MOST_STARTS))
+    starts = int(np.clip(budget // (START_EVALUATIONS * (explorer.dimensions + 1) * len(rows)), 1, MAX_STARTS))
     checks = SQUARES_CHECK_EVALUATIONS if any(part.squares for part in explorer.parts) else CHECK_EVALUATIONS
     last = min(budget // 4, checks * slope * len(rows))
     begins = []
@@ -140,17 +140,12 @@ def _start(
     begin: int,
     use_all: bool,
 ) -> None:
-    """Search from points of its own until the evaluations of this start are used up.
+    """Search from points of its own, rows of `explorer.known` from `begin` on, until its evaluations are used up.
 
-    Where not all need be used it ends after `FEWEST_ROUNDS` of descents, or one in which two came to the same.
-
-    Parameters
-    ----------
-    begin : int
-        First row of `explorer.known` that belongs to this start.
+    Where not all need be used it ends after `MIN_ROUNDS` of descents, or one in which two came to the same.
     """
     n, allowed = explorer.dimensions, explorer.left - explorer.reserve
-    ladder = ROUGH if explorer.rough else LADDER
+    ladder = ROUGH_LADDER if explorer.rough else LADDER
     tried: list[list[int]] = [[] for _ in rows]
     try:
         explorer(sample(n, rng, max(SAMPLE_POINTS * (n + 1), allowed // SAMPLE_SHARE), allowed // 3))
@@ -159,11 +154,11 @@ def _start(
         for row in rows:
             most = int(EVOLUTION_PART * allowed) // len(rows)
             evolve(explorer, _weighted(explorer.known, smallest, row), rng, begin, most)
-        for _ in range(MOST_ROUNDS if use_all else FEWEST_ROUNDS):
+        for _ in range(MAX_ROUNDS if use_all else MIN_ROUNDS):
             room = (explorer.left - explorer.reserve) // (DESCENT_EVALUATIONS * (2 * n + 1) * len(rows))
             objectives = [_weighted(explorer.known, smallest, row) for row in rows]
             promising = [
-                _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, MOST_DESCENTS)))
+                _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, MAX_DESCENTS)))
                 for objective, done in zip(objectives, tried, strict=True)
             ]
             found = [(each, k) for each, points in zip(objectives, promising, strict=True) for k in points]
@@ -175,7 +170,7 @@ def _start(
                 agreed &= _agree(explorer.known, objective, explorer.known.merit(objective)[own])
             if agreed and not use_all:
                 break
-            if len(found) < len(rows) * MOST_DESCENTS:
+            if len(found) < len(rows) * MAX_DESCENTS:
                 explorer(rng.random((SAMPLE_POINTS, n)))
     except Spent:
         pass
@@ -187,7 +182,7 @@ def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Gener
     ends = [sign * line for line in np.eye(goals) for sign in (1.0, -1.0)]
     for goal, down in enumerate(smallest):
         evolve(explorer, ends[2 * goal + (not down)], rng, 0, int(EVOLUTION_PART * allowed) // (4 * goals))
-    descend(explorer, [(end, k) for end in ends for k in _apart(explorer.known, end, [], 0, 1)], ROUGH[1:])
+    descend(explorer, [(end, k) for end in ends for k in _apart(explorer.known, end, [], 0, 1)], ROUGH_LADDER[1:])
 
 
 def _apart(known: Known, objective: Floats, tried: Sequence[int], begin: int, most: int) -> list[int]:
@@ -196,19 +191,19 @@ def _apart(known: Known, objective: Floats, tried: Sequence[int], begin: int, mo
     found: list[int] = []
     free = np.isfinite(merit) & known.valid[begin:]
     for k in tried:
-        free &= np.abs(known.u[begin:] - known.u[k]).max(axis=1) > APART
+        free &= np.abs(known.u[begin:] - known.u[k]).max(axis=1) > START_DISTANCE
     while free.any() and len(found) < most:
         k = begin + int(np.argmin(np.where(free, merit, np.inf)))
         found.append(k)
-        free &= np.abs(known.u[begin:] - known.u[k]).max(axis=1) > APART
+        free &= np.abs(known.u[begin:] - known.u[k]).max(axis=1) > START_DISTANCE
     return found
 
 
 def _confirmed(explorer: Explorer, objectives: Sequence[Floats], rng: np.random.Generator) -> bool:
     """Whether no small step improves the best point of any objective; descends from where one does."""
     n, open_ = explorer.dimensions, list(objectives)
-    ladder: Sequence[tuple[float, float]] = ROUGH[-1:] if explorer.rough else LADDER
-    for _ in range(MOST_CHECKS):
+    ladder: Sequence[tuple[float, float]] = ROUGH_LADDER[-1:] if explorer.rough else LADDER
+    for _ in range(MAX_CHECKS):
         known = explorer.known
         starts = [_best(known, each) for each in open_]
         if not known.feasible[starts].all():
@@ -251,7 +246,7 @@ def _ends(known: Known, objective: Floats, begins: Sequence[int]) -> Floats:
 
 def _agree(known: Known, objective: Floats, found: Floats) -> bool:
     """Whether the two smallest of some values of an objective are feasible and the same."""
-    two = np.sort(found[found < MISSES])[:2]
+    two = np.sort(found[found < CONDITION_MISSED])[:2]
     return len(two) == 2 and bool(np.ptp(two) <= _rounding(known, known.merit(objective), two[0]))
 
 
@@ -260,7 +255,7 @@ def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> 
     count = min(count, most)
     strata = np.stack([rng.permutation(count) for _ in range(dimensions)], axis=1)
     u = (strata + rng.random((count, dimensions))) / max(count, 1)
-    if dimensions > MOST_VERTICES or count + 2**dimensions > most:
+    if dimensions > MAX_VERTICES or count + 2**dimensions > most:
         return np.asarray(u)
     vertices = np.stack(np.meshgrid(*[[0.0, 1.0]] * dimensions, indexing="ij"), axis=-1).reshape(-1, dimensions)
     return np.concatenate([vertices, u])
@@ -279,14 +274,8 @@ def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> F
 def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, begin: int = 0, most: int = 1000) -> None:
     """Differential evolution, a generation a batch, begun with the best known points and some others.
 
+    It begins with rows of `explorer.known` from `begin` on, and evaluates `most` points.
     [Storn & Price, Differential evolution, 1997; scipy.optimize.differential_evolution.]
-
-    Parameters
-    ----------
-    begin : int
-        First row of `explorer.known` that it may begin with.
-    most : int
-        Evaluations.
     """
     from scipy.optimize import differential_evolution
 
@@ -315,7 +304,7 @@ def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, begi
         merits.append(float(merit.min()))
         if len(merits) <= most_stalled:
             return False
-        inside = merit[merit < MISSES]
+        inside = merit[merit < CONDITION_MISSED]
         gained = merits[-1 - most_stalled] - merits[-1]
         return bool(gained <= STALLED_GAIN * (float(np.ptp(inside)) if inside.size else abs(merits[-1])))
 

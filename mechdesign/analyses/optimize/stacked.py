@@ -22,7 +22,7 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, stacked
 from mechdesign.study.text.units import QUANTITY
-from mechdesign.study.variants import follows, places_of
+from mechdesign.study.variants import follows
 
 _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
     "motion": kinematics.motion_table,
@@ -64,7 +64,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
     """
     mechanism, section = study.mechanism, getattr(study, command)
     graph, joints, links = mechanism.graph, mechanism.description.joints, mechanism.description.links
-    places = places_of(study, names)
+    places = study.parameters.moved_places(names)
     if follows(_without_poses(study), names, (command, ALSO_READ[command])):
         return False
     # Angles of slides and clamps in a ring may contradict each other, which is found design by design.
@@ -162,7 +162,12 @@ def tables(
     torn = np.zeros(poses.designs, dtype=bool)
     solved: list[SolvedPoses] = []
     if command == "kinematics":
-        found, reason, torn = _motion(study, wanted, poses, outputs, solved.append)
+        motion = move(dataclasses.replace(motion_question(study), poses=poses), also=solved.append)
+        known = {"motion": True, "targets": bool(motion.errors), "jacobian": motion.question.square}
+        found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
+        # Torn are designs whose motion ends where no limit is known.
+        between, torn = kinematics.tables_between(motion, (), wanted, outputs)
+        found, reason = found | between, motion.reason
     elif command == "reliability":
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
@@ -174,30 +179,13 @@ def tables(
     return Stack(Result(command, found), reason, {"loops": torn | reason.any(axis=1), "extremes": torn}, solved)
 
 
-def _motion(
-    study: Study, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None,
-    also: Callable[[SolvedPoses], object],
-) -> tuple[dict[str, Table], NDArray[np.int8], Flags]:  # fmt: skip
-    """Tables, reasons, and the designs whose motion ends where no limit is known."""
-    question = dataclasses.replace(motion_question(study), poses=poses)
-    motion = move(question, also=also)
-    known = {"motion": True, "targets": bool(motion.errors), "jacobian": question.square}
-    found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
-    between, torn = kinematics.tables_between(motion, (), wanted, outputs)
-    return found | between, motion.reason, torn
-
-
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:
     """Margins of every pose in parts of the mechanism's size, shape (designs, margins): negative where one is missed.
 
     Squares of lengths and angles in radians, smooth in the dimensions; nan where what comes before does not assemble.
-
-    Parameters
-    ----------
-    solved : iterable of SolvedPoses
-        As `mechdesign.analyses.poses.solve_poses` gives them for `poses`.
+    `solved` are the poses as `mechdesign.analyses.poses.solve_poses` gives them.
     """
-    return np.concatenate([_of(study.mechanism, each).reshape(poses.designs, -1) for each in solved], axis=1)
+    return np.concatenate([_margins(study.mechanism, each).reshape(poses.designs, -1) for each in solved], axis=1)
 
 
 def shortfall(margins: Floats) -> Floats:
@@ -206,7 +194,7 @@ def shortfall(margins: Floats) -> Floats:
     return np.asarray(np.where(np.isnan(missed), 1.0, missed / (1.0 + missed)).sum(axis=1))
 
 
-def _of(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
+def _margins(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
     """Margins of some poses, shape (poses, margins)."""
     configuration, size = solved.configuration, mechanism.size
     found: list[Value] = [closure / size**2 for closure in configuration.closures]

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
-from mechdesign.analyses.optimize.variables import ROUNDING, Batch, bounds, steps
+from mechdesign.analyses.optimize.variables import BOUND_ROUNDING, Batch, bounds, steps
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
-# Best designs that are told for each row of weights, and how far apart they are in parts of each variable's range.
-MOST_BEST = 10
-APART = 0.05
+# Best designs that are listed for each row of weights, and how far apart they are in parts of each variable's range.
+MAX_BEST = 10
+BEST_DISTANCE = 0.05
 # How near a bound is at it, as a fraction of the variable's range, or of a condition's bound.
 AT_BOUND = 1e-4
 
@@ -28,7 +28,6 @@ class Comparison:
     Parameters
     ----------
     weights : ndarray, shape (rows, goals)
-        As the study gives them.
     meanings : mapping
         Unit and meaning of indices of the workspace, by column.
 
@@ -96,13 +95,12 @@ class Comparison:
         designs = self.designs
         for name, column in designs.variables.items():
             yield Column(name, column[rows], self.unit_of(name), "design variable")
-        told = {each: self._unit_and_meaning(each) for each in designs.goals}
         for each in designs.goals:
-            yield Column(each.name, designs.values[each][rows], *told[each])
-        for each in designs.goals if errors else ():
-            if each in designs.errors:
+            yield Column(each.name, designs.values[each][rows], *self._unit_and_meaning(each))
+        for each, error in designs.errors.items() if errors else ():
+            if each in designs.goals:
                 meaning = f"estimated error of {each.name}"
-                yield Column(f"{each.name}_error", designs.errors[each][rows], told[each][0], meaning)
+                yield Column(f"{each.name}_error", error[rows], self._unit_and_meaning(each)[0], meaning)
         yield from shared(self.study.units, CPI=self.cpi[rows])
 
     def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
@@ -120,17 +118,13 @@ def optimum_table(compared: Comparison) -> Table:
         for name, value in study.parameters.values(parameters).items()
         if name not in variables and np.ndim(value)
     }
+    weights = zip(compared.designs.goals, compared.weights.T, strict=True)
     columns = (
-        *(
-            Column(f"w_{each.name}", column, "", f"weight of {each.name}")
-            for each, column in zip(compared.designs.goals, compared.weights.T, strict=True)
-        ),
+        *(Column(f"w_{each.name}", column, "", f"weight of {each.name}") for each, column in weights),
         *compared.columns(rows),
         *shared(study.units, score=scores),
         *(Column(name, value, "", "parameter that follows from the variables") for name, value in following.items()),
-        Column(
-            "active", np.array(_active(compared), dtype=object), "", "bounds and conditions that the optimum lies at"
-        ),
+        Column("active", _active(compared), "", "bounds and conditions that the optimum lies at"),
     )
     return Table("optimum", columns, "the best design for each set of weights")
 
@@ -174,14 +168,14 @@ def best_table(compared: Comparison) -> Table:
     chosen: list[tuple[int, int, int, float]] = []
     for row, weights in enumerate(compared.weights):
         score = np.where(designs.feasible, compared.score(weights), -np.inf)
-        for rank in range(MOST_BEST):
+        for rank in range(MAX_BEST):
             k = int(np.argmax(score))
             if score[k] == -np.inf:
                 break
             chosen.append((row + 1, rank + 1, k, float(score[k])))
             near = np.ones(len(score), dtype=bool)
             for name, column in designs.variables.items():
-                apart = max(APART * float(np.ptp(column)), gridded * float(step[name][row]) * (1 + 1e-6))
+                apart = max(BEST_DISTANCE * float(np.ptp(column)), gridded * float(step[name][row]) * (1 + 1e-6))
                 near &= np.abs(column - column[k]) <= apart
             score[near] = -np.inf
     row_numbers, ranks, picked, scores = (np.array(column) for column in zip(*chosen, strict=True))
@@ -206,7 +200,7 @@ def _active(compared: Comparison) -> NDArray[np.object_]:
     held: list[list[str]] = [[] for _ in rows]
     for name in at:
         low, high = bounds(study, at, name, len(rows))
-        near = AT_BOUND * (high - low) + ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        near = AT_BOUND * (high - low) + BOUND_ROUNDING * np.maximum(np.abs(low), np.abs(high))
         above = np.maximum(near, step[name] * (1 - 1e-6)) if study.optimize.method == "grid" else near
         for k, words in enumerate(held):
             sides = ["from"] * bool(at[name][k] - low[k] <= near[k]) + ["to"] * bool(high[k] - at[name][k] <= above[k])
@@ -260,6 +254,6 @@ def _inside(study: Study, designs: Batch) -> Flags:
     found = np.ones(len(next(iter(designs.values()))), dtype=bool)
     for name, values in designs.items():
         low, high = bounds(study, designs, name, len(values))
-        slack = ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        slack = BOUND_ROUNDING * np.maximum(np.abs(low), np.abs(high))
         found &= (low - slack <= values) & (values <= high + slack)
     return found

@@ -11,8 +11,8 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 
 # A step that ends this little (as a fraction of it) beyond the bound is still taken, as in sweeps.
-ROUNDING = 1e-9
-MOST_DESIGNS = 50_000_000
+BOUND_ROUNDING = 1e-9
+MAX_DESIGNS = 50_000_000
 
 # Designs by the values of their variables, each of shape (designs,).
 Batch = Mapping[str, Floats]
@@ -65,16 +65,16 @@ def grid(study: Study) -> dict[str, Floats]:
         low, high = bounds(study, columns, name, rows)
         with np.errstate(invalid="ignore"):
             if variable.step is not None:
-                counts, step = np.floor((high - low) / variable.step + ROUNDING) + 1, np.full(rows, variable.step)
+                counts, step = np.floor((high - low) / variable.step + BOUND_ROUNDING) + 1, np.full(rows, variable.step)
             else:
                 counts = np.where(high >= low, float(variable.number or 1), 0.0)
                 step = (high - low) / np.maximum(counts - 1, 1)
         counts = np.where(np.isfinite(counts), np.maximum(counts, 0), 0)
         total = int(counts.sum())
-        if not 0 < total <= MOST_DESIGNS:
+        if not 0 < total <= MAX_DESIGNS:
             message = "no value lies between 'from' and 'to' for any design"
             if total:
-                message = f"the grid has {total} designs; {MOST_DESIGNS} is the limit: take larger steps"
+                message = f"the grid has {total} designs; {MAX_DESIGNS} is the limit: take larger steps"
             raise StudyError((study.problem(message, "optimize", "variables", name),))
         counts = counts.astype(int)
         index = np.arange(total) - np.repeat(np.cumsum(counts) - counts, counts)

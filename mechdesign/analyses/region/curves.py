@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from mechdesign.analyses.region.pieces import Pieces
 from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, ray_through, trace
 from mechdesign.analyses.region.regions import RAYS, Region, regions
 from mechdesign.errors import AssemblyError
-from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
@@ -135,26 +135,28 @@ def workspace_nodes(study: Study) -> Poses:
         If nothing is reachable.
     """
     asked = regions(study)
-    parts = [(region, _grid(region, MAX_POSES // GRID // len(asked))) for region in asked]
-    z = np.concatenate([grid.ravel() for _, grid in parts])
-    if not z.size:
+    parts = [(region, grid) for region in asked for grid in _grids(region, MAX_POSES // GRID // len(asked))]
+    if not parts:
         raise AssemblyError("poses: workspace has no node: nothing is reachable")
+    z = np.concatenate([grid.ravel() for _, grid in parts])
+    ends = np.cumsum([0, *(len(grid) for _, grid in parts)]).tolist()
     point = study.workspace.point if study.workspace is not None else ""
     values = {f"{point}.x": z.real, f"{point}.y": z.imag}
     for name in asked[0].held:
         values[name] = np.concatenate([np.full(grid.size, region.held[name]) for region, grid in parts])
     group = PoseGroup(tuple(values), values, np.arange(len(z)))
-    return Poses((group,), len(z), False, (len(z) // GRID, GRID))
+    spans = tuple(slice(begin, end) for begin, end in pairwise(ends))
+    return Poses((group,), len(z), False, (len(z) // GRID, GRID), patches=spans)
 
 
-def _grid(region: Region, most: int) -> Value:
-    """Nodes of one region, shape (rays, GRID), on about `most` rays."""
+def _grids(region: Region, most: int) -> list[Complexes]:
+    """Nodes of the patches of one region, shape (rays, GRID), on about `most` rays."""
     designs = Designs(region.field, {}, 1, region.about)
     panels = find_panels(designs, region.scan, SINGLE)
     if region.field.same_assembly:
         designs, panels = Pieces.of(designs, panels, region.scan, SINGLE.samples).only(0)
     if not panels.closes[0]:
-        return np.zeros((0, GRID), dtype=complex)
+        return []
     found = list(patches(designs, panels, min(region.rays or RAYS, most), SINGLE.samples))
     # Every panel has a fewest number of rays: of too many some are left out, never the ends of a patch: others begin.
     total = sum(float(np.ptp(patch.theta)) for patch in found)
@@ -163,4 +165,4 @@ def _grid(region: Region, most: int) -> Value:
         number = max(MIN_RAYS, round(most * float(np.ptp(patch.theta)) / total))
         kept = np.unique(np.linspace(0, len(patch.theta) - 1, min(number, len(patch.theta))).round().astype(int))
         grids.append(patch.grid(region.about)[kept])
-    return np.asarray(np.concatenate(grids))
+    return grids

@@ -15,7 +15,7 @@ import numpy as np
 from mechdesign.analyses.region.panels import MIDDLE, Panels
 from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, is_turn, ray_through, trace
 from mechdesign.analyses.region.rules import cubic, spread
-from mechdesign.mechanism.variant import drawn, elsewhere
+from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Rays beside the ends of panels (radians, but never more than this part of the panel), until one meets what the panel's

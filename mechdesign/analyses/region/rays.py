@@ -16,8 +16,7 @@ import numpy as np
 
 from mechdesign.analyses.region.field import Field, Places
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.numerics.minima import dips
-from mechdesign.numerics.roots import bracketed_roots
+from mechdesign.numerics.roots import bracketed_roots, dips
 
 # Rays traced at once, measured: fewer cost more in calls than their smaller arrays save.
 BLOCK = 8192

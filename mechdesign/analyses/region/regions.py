@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.region.field import Field
 from mechdesign.errors import MechanismError, StudyError
-from mechdesign.mechanism.jacobians import mixes
+from mechdesign.mechanism.derivatives import mixes
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over, WorkspaceSection
 

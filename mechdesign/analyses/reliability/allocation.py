@@ -1,14 +1,13 @@
 """Tolerances from a reliability: the cheapest by the first-order model, confirmed by simulation.
 
-Every pose by itself has to reach the reliability; how likely one mechanism keeps the limits over a whole cycle is not
-asked. Where a simulated pose misses what was asked beyond its interval, the model's own target there is corrected by
-as much as the two differ, and the tolerances are sought again: tighter ones where it fails too often, and cheaper ones
-where the model holds the tolerances back for nothing.
+Every pose by itself has to reach the reliability, not a whole cycle. Where simulation and model differ beyond the
+interval, the model's target is corrected by their ratio and the tolerances are sought again: tighter where the pose
+fails too often, cheaper where the model holds them back needlessly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Any
@@ -26,8 +25,7 @@ from mechdesign.analyses.reliability.cheapest import (
     cheapest,
     tolerances,
 )
-from mechdesign.analyses.reliability.engine.intervals import Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.engine.problem import Estimate, Precision
 from mechdesign.analyses.reliability.tables import at_poses
 from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.numerics.arrays import Flags, Floats
@@ -37,22 +35,23 @@ from mechdesign.study.schema.reliability import Clearance, Dimension, Reliabilit
 from mechdesign.study.text.document import plain
 from mechdesign.study.variants import rewritten
 
-# How often a target is corrected, and the failures that the study's own samples must show to confirm one.
-_ROUNDS = 5
-_SEEN = 100
-# Half the width of the interval that `auto` confirms failures with, where the study does not say.
+# How often the model's target is corrected.
+_MAX_ROUNDS = 5
+# Expected failures from which on the study's own samples confirm them.
+_ENOUGH_FAILURES = 100
+# Relative precision by which `auto` confirms failures, where the study does not say.
 _PRECISION = 0.1
-# A pose holds the tolerances back where its failures are so near to those allowed.
+# A pose holds the tolerances back from this share of the failures allowed on.
 _ACTIVE = 0.99
-# A share of the variance that is none.
-_NOTHING = 1e-12
+# Largest share of the variance that counts as none.
+_NO_SHARE = 1e-12
 # A limit of 0 weighs as much as this one.
-_NARROW = 1e-100
+_NARROWEST = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
 class _Round:
-    """Tolerances, and what model and simulation say of them, by pose (in the order of the settings)."""
+    """Tolerances, and their failures by the model and by simulation, by pose in the order of the settings."""
 
     model: ToleranceModel
     scales: Floats
@@ -94,11 +93,11 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     if section.precision is None:
         task = replace(task, precision=Precision(_PRECISION, None))
     model = ToleranceModel(task, found, free, np.full(len(free), WIDEST))
-    method = "auto" if "auto" in section.methods or task.samples * asked < _SEEN else "monte_carlo"
+    method = "auto" if "auto" in section.methods or task.samples * asked < _ENOUGH_FAILURES else "monte_carlo"
     allowed = np.full(len(task.settings), asked)
     rounds: list[_Round] = []
     failed = ""
-    while len(rounds) < _ROUNDS:
+    while len(rounds) < _MAX_ROUNDS:
         scales = cheapest(model, allowed)
         if scales is None:
             failed = _unreachable(model, allowed, asked)
@@ -139,10 +138,10 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
             f"{len(rounds) - 1} times"
         )
     heading = f"Tolerances of {study.name}, the cheapest for a reliability of {reliability:.15g}"
-    text, beside = rewritten(study, retold(study, found, last.scales), heading)
+    text, others = rewritten(study, allocated_data(study, found, last.scales), heading)
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last, reliability)}
     notes += _ends(replace(last, model=model))
-    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **beside})
+    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **others})
 
 
 def _simulated(model: ToleranceModel, scales: Floats, method: str) -> list[Estimate]:
@@ -163,9 +162,9 @@ def _shares(model: ToleranceModel, scales: Floats) -> Floats:
     linear = model.linear(scales).take([setting.pose for setting in model.task.settings])
     weights = np.zeros(len(question.channels))
     for band in question.bands:
-        weights[band.output] += 1.0 / max(min(abs(band.low), abs(band.high)), _NARROW) ** 2
+        weights[band.output] += 1.0 / max(min(abs(band.low), abs(band.high)), _NARROWEST) ** 2
     for disc in question.discs:
-        weights[[disc.x, disc.y]] += 1.0 / max(disc.radius, _NARROW) ** 2
+        weights[[disc.x, disc.y]] += 1.0 / max(disc.radius, _NARROWEST) ** 2
     parts = np.nansum(linear.share() * (weights[:, None] * linear.deviation() ** 2)[:, None], axis=0).T
     with np.errstate(invalid="ignore"):
         return np.asarray(parts / parts.sum(axis=1, keepdims=True))
@@ -235,7 +234,7 @@ def _ends(last: _Round) -> list[str]:
 
 def _idle(model: ToleranceModel, scales: Floats) -> Flags:
     """Allocated tolerances that change no limited error at any pose, to the first order."""
-    return np.asarray(~(np.abs(_shares(model, scales)[:, model.free]) > _NOTHING).any(axis=0))
+    return np.asarray(~(np.abs(_shares(model, scales)[:, model.free]) > _NO_SHARE).any(axis=0))
 
 
 def _plain(failure: float) -> str:
@@ -277,7 +276,7 @@ def _unreachable(model: ToleranceModel, allowed: Floats, asked: float) -> str:
     )
 
 
-def retold(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
+def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
     """The study's data where tolerances are as many times as wide.
 
     What a wildcard gives is written out, place by place, unless all of it stays alike.
@@ -287,31 +286,22 @@ def retold(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dic
     data: dict[str, Any] = plain(study.resolved)
     changed = {t.name: (t, scale) for t, scale in zip(tolerances, scales.tolist(), strict=True) if t.cost is not None}
     given = data["reliability"]
+    entries = given.get("dimensions") or {}
+    # Of several wildcards the last one counts.
+    key_of = {name: name if name in entries else [key for key in entries if fnmatchcase(name, key)][-1]
+              for name in section.dimensions}  # fmt: skip
     dimensions: dict[str, Any] = {}
-    for key, raw in (given.get("dimensions") or {}).items():
-        own = {name: _dimension(raw, dimension, *changed[name]) if name in changed else raw
-               for name, dimension in _said(section.dimensions, given["dimensions"], key)}  # fmt: skip
-        values = list(own.values())
-        if key in own or not own:
-            dimensions[key] = own.get(key, raw)
-        elif all(value == values[0] for value in values):
-            dimensions[key] = values[0]
-        else:
-            dimensions |= own
-    if dimensions:
+    for key, raw in entries.items():
+        own = {name: _dimension(raw, section.dimensions[name], *changed[name]) if name in changed else raw
+               for name, origin in key_of.items() if origin == key}  # fmt: skip
+        values = [*own.values(), raw]
+        dimensions |= own if any(value != values[0] for value in values[:-1]) else {key: values[0]}
+    if entries:
         given["dimensions"] = dimensions
     for point, raw in (given.get("clearances") or {}).items():
         if point in changed:
             given["clearances"][point] = _clearance(raw, section.clearances[point], *changed[point])
     return data
-
-
-def _said(dimensions: Mapping[str, Dimension], raw: Mapping[str, Any], key: str) -> Iterator[tuple[str, Dimension]]:
-    """The dimensions that an entry of the study is about: of several wildcards the last one counts."""
-    for name, dimension in dimensions.items():
-        matching = [other for other in raw if fnmatchcase(name, other)]
-        if (name if name in raw else matching[-1]) == key:
-            yield name, dimension
 
 
 def _dimension(raw: Any, dimension: Dimension, tolerance: Tolerance, scale: float) -> Any:

@@ -23,28 +23,25 @@ from mechdesign.study.schema.reliability import Cost
 
 # Digits that allocated numbers are written with, rounded down: what is tighter keeps what was asked.
 DIGITS = 6
-# Tolerances stay between these multiples of what is given.
-TIGHTEST, WIDEST = 1e-3, 10.0
-# Step of difference quotients in log T, and how far a constraint may be broken.
-_STEP, _SLACK = 1e-4, 1e-9
+# Least and largest allocated tolerance, in multiples of the given one.
+TIGHTEST = 1e-3
+WIDEST = 10.0
+# Step of difference quotients, in log T.
+_LOG_STEP = 1e-4
+# How far a constraint may be broken, in the logarithm of `_distance`.
+_SLACK = 1e-9
 # Poses that become constraints at once, and how often more of them may.
-_MORE, _ROUNDS = 6, 30
-_TINY = 1e-300
+_POSES_ADDED = 6
+_MAX_ROUNDS = 30
+# Least failure probability that is told from 0.
+_LEAST_FAILURE = 1e-300
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The tolerance of one source.
+    """The tolerance of one source, in the study's units, without a cost where it is held.
 
-    Parameters
-    ----------
-    name : str
-    given : float
-        As the study gives it, in its units: half the width of a tolerance, sigma, or a mean radial clearance.
-    kind : str
-        ``tolerance``, ``sigma`` or ``clearance``.
-    cost : Cost or None
-        None where it is held.
+    By `kind`, half the width of a ``tolerance``, a ``sigma`` or a ``clearance``, mean and radial.
     """
 
     name: str
@@ -97,16 +94,7 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
 class ToleranceModel:
     """Costs and failure probabilities by the first-order model, of tolerances so many times as wide as given.
 
-    Parameters
-    ----------
-    task : Task
-        With the given tolerances.
-    tolerances : sequence of Tolerance
-        Of all sources.
-    free : ndarray of int
-        Sources whose tolerance is allocated.
-    widest : ndarray
-        As many times as the given one each of them may be.
+    `free` are the sources whose tolerance is allocated, and `widest` their largest factors.
     """
 
     task: Task
@@ -157,8 +145,8 @@ def cheapest(model: ToleranceModel, allowed: Floats) -> Floats | None:
         return _distance(model.failures(model.scales(x), which)) - wanted[list(which)]
 
     def slopes(x: Floats, which: Sequence[int]) -> Floats:
-        steps = _STEP * np.eye(count)
-        return np.stack([(margins(x + h, which) - margins(x - h, which)) / (2 * _STEP) for h in steps], axis=1)
+        steps = _LOG_STEP * np.eye(count)
+        return np.stack([(margins(x + h, which) - margins(x - h, which)) / (2 * _LOG_STEP) for h in steps], axis=1)
 
     if margins(lowest, every).min() < 0:
         return None
@@ -167,7 +155,7 @@ def cheapest(model: ToleranceModel, allowed: Floats) -> Floats | None:
     alike = _shifted(margins, np.zeros(count), lowest, highest, every)
     unit = model.cost(alike)[0]
     active = [int(np.argmin(margins(alike, every)))]
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         constraint = {"type": "ineq", "fun": margins, "jac": slopes, "args": (tuple(active),)}
         found: Any = minimize(
             lambda x: model.cost(x)[0] / unit, alike, jac=lambda x: model.cost(x)[1] / unit, method="SLSQP",
@@ -179,25 +167,22 @@ def cheapest(model: ToleranceModel, allowed: Floats) -> Floats | None:
         broken = [k for k in np.argsort(left).tolist() if left[k] < -_SLACK and k not in active]
         if not broken:
             break
-        active += broken[:_MORE]
+        active += broken[:_POSES_ADDED]
     x = _shifted(margins, x, lowest, highest, every)
     return model.scales(x if model.cost(x)[0] <= model.cost(alike)[0] else alike)
 
 
 def _distance(failure: Floats) -> Floats:
-    """Logarithm of the standard deviations that a normal error of this failure probability may have about it.
-
-    Of errors that grow with their tolerances it is nearly linear in the logarithm of these.
-    """
+    """Log of the distance, in standard deviations, of a limit so often broken: nearly linear in log T."""
     from scipy.special import ndtri
 
-    return np.asarray(np.log(np.maximum(-ndtri(0.5 * np.maximum(failure, _TINY)), 1e-6)))
+    return np.asarray(np.log(np.maximum(-ndtri(0.5 * np.maximum(failure, _LEAST_FAILURE)), 1e-6)))
 
 
 def _shifted(
     margins: Callable[..., Floats], x: Floats, lowest: Floats, highest: Floats, every: Sequence[int]
 ) -> Floats:
-    """All tolerances as much wider or tighter together as the poses allow just so."""
+    """All tolerances wider or tighter by one common factor, as far as the poses allow."""
     from scipy.optimize import brentq
 
     reach = float((highest - lowest).max())

@@ -1,10 +1,8 @@
 """The probability that one made mechanism keeps every limit at all poses of a motion.
 
-A made mechanism keeps its dimensions and the radii of its clearances over the whole motion, and with them what else
-`dimensions` names, such as a drive's positioning error; only its pins lie elsewhere at each pose. It fails where it
-breaks a limit, or cannot be assembled, at any of the poses asked: what happens between two of them is not seen, so the
-step of a sweep is the resolution of the answer (a crank that cannot turn fully is found where a pose lies in the range
-that it cannot reach).
+A made mechanism keeps whatever `dimensions` names and the radii of its clearances over the whole motion; only its pins
+lie elsewhere at each pose. It fails where it breaks a limit, or cannot be assembled, at any of the poses asked: what
+happens between two of them is not seen, so the step of a sweep is the resolution of the answer.
 """
 
 from __future__ import annotations
@@ -22,11 +20,12 @@ from mechdesign.numerics.arrays import Ints
 from mechdesign.parallel import map_chunks
 from mechdesign.study.schema.methods import METHODS
 
-# Streams of their own: no other name has four numbers.
+# Stream of random numbers: no other name has four numbers.
 _STREAM = (3, 0)
 # Mechanisms times poses of a chunk: about a second's work, so that an interrupt is soon heard.
-_WORK = 1_500_000
-_FEWEST = 200
+_CHUNK_WORK = 1_500_000
+# Least mechanisms of a chunk.
+_CHUNK_LEAST = 200
 
 
 def with_cycle(found: MethodResult, task: Task, before: Sequence[MethodResult]) -> MethodResult:
@@ -55,10 +54,7 @@ def with_cycle(found: MethodResult, task: Task, before: Sequence[MethodResult]) 
 
 
 def bounds(estimates: Sequence[Estimate]) -> Estimate:
-    """Of poses one by one: a cycle fails at least as often as the worst pose, at most as often as all together.
-
-    The value is the conservative end, whatever the dependence between the poses. [Boole's inequality.]
-    """
+    """A cycle fails at least as often as the worst pose and at most as their sum, its value [Boole's inequality]."""
     low = float(np.max([each.low for each in estimates]))
     high = float(np.minimum(1.0, np.sum([each.high for each in estimates])))
     return Estimate(high, low, high, 0)
@@ -68,7 +64,7 @@ def _simulated(found: MethodResult, task: Task) -> MethodResult:
     precise = METHODS[found.method].precise
     samples = max(task.samples, task.most // task.poses.count) if precise else task.samples
     settings = [setting.narrowed() for setting in task.settings]
-    size = max(_FEWEST, min(CHUNK, _WORK // len(settings)))
+    size = max(_CHUNK_LEAST, min(CHUNK, _CHUNK_WORK // len(settings)))
     chunks = -(-samples // size)
     total = np.zeros(4, dtype=np.int64)
 

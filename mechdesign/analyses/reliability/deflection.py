@@ -26,14 +26,9 @@ from mechdesign.study.schema.reliability import LOADS
 
 @dataclass(frozen=True, eq=False)
 class Elastic:
-    """How channels yield to the load in some poses.
+    """Errors of channels by each of fx, fy, mz, shape (channels, 3, poses), nan where the load is not held.
 
-    Parameters
-    ----------
-    flexibility : ndarray, shape (channels, 3, poses)
-        Error by each of fx, fy, mz; nan where the mechanism does not hold the load.
-    load : ndarray, shape (3,)
-        What acts on the average.
+    `load` is the mean one, shape (3,).
     """
 
     flexibility: Floats
@@ -69,12 +64,8 @@ class Elastic:
 class Elasticity:
     """The loaded mechanism, ready for any number of poses.
 
-    Parameters
-    ----------
-    nodes : mapping of int to str
-        Points whose displacement is known, and the part of the stiffness model that bears them.
-    bodies : mapping of str to str
-        Links whose rotation is known, likewise; of the ground the empty word.
+    `nodes` are the points whose displacement is known, and `bodies` the links whose rotation is, with the vertices of
+    the stiffness network that bear them; of the ground the empty word.
     """
 
     mechanism: Mechanism

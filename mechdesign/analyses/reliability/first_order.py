@@ -33,7 +33,7 @@ class FirstOrder:
     components : ndarray, shape (channels, components, poses)
         Derivative of each channel (radians, lengths) by each independent component of the sources.
     offset : ndarray, shape (channels, poses), or None
-        Errors that nothing random causes: deflections.
+        Deflections under the mean load.
     """
 
     sources: Sources
@@ -148,14 +148,9 @@ def derivatives(
     rates: DriveRates,
     elastic: Elastic | None = None,
 ) -> Floats:
-    """Derivative of each channel by places, drives and loads, shape (channels, names, n).
+    """Derivative of each channel by places, drives and loads, shape (channels, names, n), at a flat batch.
 
-    Parameters
-    ----------
-    configuration : Configuration
-        A flat batch.
-    elastic : Elastic, optional
-        At these configurations, or at the single pose that all of them are about.
+    `elastic` is known at these configurations, or at the single pose that all of them are about.
 
     Raises
     ------
@@ -197,13 +192,7 @@ def linear_errors(
     rates: DriveRates,
     elastic: Elastic | None = None,
 ) -> FirstOrder:
-    """Linear error model at a flat batch of nominal configurations, the drives held, perhaps under a load.
-
-    Raises
-    ------
-    MechanismError
-        For the acceleration of a measure that is an expression.
-    """
+    """Linear error model at a flat batch of nominal configurations, the drives held; raises as `derivatives`."""
     directions = [direction for source in sources.all for direction in source.directions]
     names = list(dict.fromkeys(name for direction in directions for name in direction))
     slopes = np.array([[direction.get(name, 0.0) for name in names] for direction in directions])

@@ -25,19 +25,14 @@ SIGMAS = 3.0
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 # Largest correlation of the normal variables behind two laws.
-_MOST = 0.999999
+_MAX_CORRELATION = 0.999999
 
 
 @dataclass(frozen=True)
 class Marginal(ABC):
     """The law of one deviation from its nominal value.
 
-    Parameters
-    ----------
-    low, high : float
-        Its tolerance, which a worst case counts with: of unbounded laws three standard deviations about the middle.
-    nominal : float
-        What is lognormal is nominal + deviation.
+    The tolerance [low, high] is the worst case: of unbounded laws three standard deviations about the middle.
     """
 
     low: float
@@ -83,17 +78,7 @@ class Marginal(ABC):
 
 
 def marginal(spread: Dimension, nominal: float, factor: float = 1.0) -> Marginal:
-    """The law that a study gives.
-
-    Parameters
-    ----------
-    spread : Dimension
-        Tolerance or sigma, and distribution; in the study's units.
-    nominal : float
-        Nominal value in the core's units.
-    factor : float
-        The core's units in one of the study's.
-    """
+    """The law that a study gives in its units; `nominal` is in the core's, `factor` of which are one of the study's."""
     law = LAWS[spread.distribution]
     low, high = spread.tolerance or (0.0, 0.0)
     if spread.sigma is not None:
@@ -218,8 +203,6 @@ class PinLaw:
     ----------
     variance, fourth : float
         Of each coordinate: E[x^2] and E[x^4]; E[x^2 y^2] is a third of the latter.
-    draw : callable
-        ``draw(rng, count)``: x and y, each of shape (count,).
     stretch : callable
         Ratio of the offset's length to that of two standard normal variables, of half their squared length.
     """
@@ -294,16 +277,10 @@ PIN_LAWS: Mapping[str, PinLaw] = {
 
 @dataclass(frozen=True, eq=False)
 class Correlation:
-    """Correlated deviations: normal variables behind them whose mixing gives the asked coefficients.
+    """Coefficients of the deviations, and the root of those of the normal variables behind them, shape (laws, laws).
 
+    ``root @ u`` are correlated normal variables of independent ones.
     [Der Kiureghian & Liu, Structural reliability under incomplete probability information, 1986.]
-
-    Parameters
-    ----------
-    coefficients : ndarray, shape (laws, laws)
-        Of the deviations, as the study gives them.
-    root : ndarray, shape (laws, laws)
-        Lower triangular; ``root @ u`` are the correlated normal variables of independent ones.
     """
 
     coefficients: Floats
@@ -311,13 +288,7 @@ class Correlation:
 
     @staticmethod
     def of(laws: Sequence[Marginal], pairs: Mapping[tuple[int, int], float]) -> Correlation:
-        """Correlation where these pairs of laws have these coefficients, and all others none.
-
-        Raises
-        ------
-        StudyError
-            If no random variables of these laws have these coefficients.
-        """
+        """Correlation of these pairs of laws; a StudyError where no variables of these laws have the coefficients."""
         wanted, behind = np.eye(len(laws)), np.eye(len(laws))
         for (i, j), coefficient in pairs.items():
             wanted[i, j] = wanted[j, i] = coefficient
@@ -349,6 +320,7 @@ def _behind(one: Marginal, other: Marginal, coefficient: float) -> float:
         x, y, weight = pair_nodes(rho)
         return float((weight * (one.at(x) - m) * (other.at(y) - n)).sum() / math.sqrt(v * w)) - coefficient
 
-    if excess(-_MOST) > 0 or excess(_MOST) < 0:
+    most = _MAX_CORRELATION
+    if excess(-most) > 0 or excess(most) < 0:
         raise StudyError(f"reliability.correlation: two dimensions of these distributions cannot have {coefficient:g}")
-    return float(brentq(excess, -_MOST, _MOST, xtol=1e-12))
+    return float(brentq(excess, -most, most, xtol=1e-12))

@@ -15,16 +15,17 @@ from scipy.special import ndtr, ndtri
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import Band, Disc
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.numerics.statistics import FAR, outside, rectangle_failure
+from mechdesign.numerics.statistics import MAX_DEVIATION, outside, rectangle_failure
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-_LATTICE = 8191
-_SHIFTS = 8
-# Below this sum of the limits' probabilities a lattice sees too few failures; points that are drawn there instead.
+# Points of a lattice, and its random shifts.
+_LATTICE_POINTS = 8191
+_LATTICE_SHIFTS = 8
+# Below this sum of the limits' probabilities a lattice sees too few failures: so many points are drawn beyond them.
 _RARE = 0.05
-_POINTS = 20_000
+_RARE_POINTS = 20_000
 # Sides of the polygon in a circle, beyond which points are drawn.
-_SIDES = 64
+_POLYGON_SIDES = 64
 
 
 def failure_probability(
@@ -40,7 +41,7 @@ def failure_probability(
         All limits must hold. One or two limited outputs are integrated to about 1e-14 of the result; more by a
         randomised lattice, to about 1e-5 of it, or where they are rarely broken by sampling, to about 1e-3.
     mean : ndarray, shape (..., outputs), optional
-        Of the errors; left out, zero.
+        Else zero.
     """
     mean = np.zeros(covariance.shape[:-1]) if mean is None else mean
     if len(bands) <= 2 and not discs:
@@ -93,11 +94,11 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
     slopes = [way * rows[band.output] for band in bands for way in (1.0, -1.0)]
     ends = [end for b in bands for end in (b.high - mean[b.output], mean[b.output] - b.low)]
     # What is outside a circle is beyond a side of the polygon in it.
-    turns = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    turns = 2 * np.pi * np.arange(_POLYGON_SIDES) / _POLYGON_SIDES
     for disc in discs:
         for x, y in zip(np.cos(turns), np.sin(turns), strict=True):
             slopes.append(x * rows[disc.x] + y * rows[disc.y])
-            ends.append(disc.radius * np.cos(np.pi / _SIDES) - x * mean[disc.x] - y * mean[disc.y])
+            ends.append(disc.radius * np.cos(np.pi / _POLYGON_SIDES) - x * mean[disc.x] - y * mean[disc.y])
     size = np.linalg.norm(slopes, axis=1)
     used = (size > 0) & np.isfinite(ends)
     flat = np.count_nonzero(used[: 2 * len(bands)])
@@ -113,18 +114,13 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
     )
 
 
-def half_spaces(
-    normals: Floats,
-    distances: Floats,
-    broken: Callable[[Floats, Flags], Flags] | None = None,
-) -> float:
+def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Flags], Flags] | None = None) -> float:
     """Probability that a standard normal point lies in any half-space ``normal . u > distance``, to some 1e-3 of it.
 
     Parameters
     ----------
-    normals : ndarray, shape (half-spaces, dimension)
-        Unit vectors.
-    distances : ndarray, shape (half-spaces,)
+    normals, distances : ndarray, shape (half-spaces, dimension) and (half-spaces,)
+        Unit vectors, and distances from the mean.
     broken : callable, optional
         Which points count, where not all in the half-spaces do: from points, shape (dimension, n), and the half-spaces
         that hold them, shape (half-spaces, n).
@@ -132,22 +128,21 @@ def half_spaces(
     Notes
     -----
     The sum of their probabilities, times the mean of one over how many of them hold a point that was drawn in one
-    [Owen, Maximov & Chertkov, Importance sampling the union of rare events, 2019]: however rare, and however they
-    depend on each other.
+    [Owen, Maximov & Chertkov, Importance sampling the union of rare events, 2019].
     """
     chances = ndtr(-distances)
     total = float(chances.sum())
     if total == 0 or (len(chances) < 2 and broken is None):
         return total
     rng = np.random.Generator(np.random.SFC64(0))
-    half = rng.choice(len(chances), _POINTS, p=chances / total)
+    half = rng.choice(len(chances), _RARE_POINTS, p=chances / total)
     normal = normals[half].T
     u = rng.standard_normal(normal.shape)
-    depth = -ndtri(chances[half] * (1.0 - rng.random(_POINTS)))
+    depth = -ndtri(chances[half] * (1.0 - rng.random(_RARE_POINTS)))
     u += normal * (depth - (normal * u).sum(axis=0))
     held = normals @ u > distances[:, None]
     # Its own half-space holds a point whatever rounding says.
-    held[half, np.arange(_POINTS)] = True
+    held[half, np.arange(_RARE_POINTS)] = True
     weights = 1.0 / held.sum(axis=0)
     if broken is not None:
         weights = np.where(broken(u, held), weights, 0.0)
@@ -170,7 +165,7 @@ def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) 
         half = np.sqrt(radius**2 - n * n) if abs(n) <= radius else 0.0
         return float(outside((-half - m) / a, (half - m) / a)) if half else 1.0
     total = float(outside((-radius - m) / a, (radius - m) / a))
-    begin, end = (np.arcsin(np.clip((m + way * FAR * a) / radius, -1.0, 1.0)) for way in (-1, 1))
+    begin, end = (np.arcsin(np.clip((m + way * MAX_DEVIATION * a) / radius, -1.0, 1.0)) for way in (-1, 1))
     if begin == end:
         return total
     # The chance that y is outside changes within b of where the circle is as high as y's mean: panels shrink there.
@@ -204,13 +199,12 @@ def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], c
         primes = np.arange(2, len(order) + 2) + np.pi
     rng = np.random.Generator(np.random.SFC64(20))
     means = []
-    for _ in range(_SHIFTS):
-        shift = rng.random(len(order))
-        steps = np.arange(1, _LATTICE + 1)[:, None] * np.sqrt(primes[: len(order)])
-        points = np.abs(2.0 * np.mod(steps + shift, 1.0) - 1.0)
-        drawn = np.zeros((len(order), _LATTICE))
-        log_success = np.zeros(_LATTICE)
-        before = np.zeros(_LATTICE)
+    steps = np.arange(1, _LATTICE_POINTS + 1)[:, None] * np.sqrt(primes[: len(order)])
+    for _ in range(_LATTICE_SHIFTS):
+        points = np.abs(2.0 * np.mod(steps + rng.random(len(order)), 1.0) - 1.0)
+        drawn = np.zeros((len(order), _LATTICE_POINTS))
+        log_success = np.zeros(_LATTICE_POINTS)
+        before = np.zeros(_LATTICE_POINTS)
         for k, (output, low, high, radius) in enumerate(order):
             mean = root[k, :k] @ drawn[:k]
             lower, upper = low - mean, high - mean

@@ -51,15 +51,10 @@ class Disc:
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
-    """What is asked: channels (outputs by order), and the limits on them.
+class ReliabilityQuestion:
+    """Channels (outputs order by order, all positions first), and the limits on their errors.
 
-    Parameters
-    ----------
-    channels : tuple of Channel
-        Outputs, order by order: all positions first.
-    pair : (int, int) or None
-        The two limited channels, where there are just two; without limits, the two outputs.
+    `pair` are the two limited channels, where there are just two; without limits, the two outputs.
     """
 
     channels: tuple[Channel, ...]
@@ -78,10 +73,10 @@ class Question:
         return sorted({b.output for b in self.bands} | {k for d in self.discs for k in (d.x, d.y)})
 
     @cached_property
-    def narrowed(self) -> Question:
-        """The question of these alone."""
+    def narrowed(self) -> ReliabilityQuestion:
+        """The same with the limited channels alone."""
         place = {channel: k for k, channel in enumerate(self.limited_channels)}
-        return Question(
+        return ReliabilityQuestion(
             tuple(self.channels[k] for k in self.limited_channels),
             tuple(replace(band, output=place[band.output]) for band in self.bands),
             tuple(replace(disc, x=place[disc.x], y=place[disc.y]) for disc in self.discs),
@@ -102,9 +97,9 @@ class Question:
 
     @property
     def _ends(self) -> list[tuple[int, float, float]]:
-        """Ends of the bands that are finite: error, end, and 1 of an upper one, -1 of a lower one."""
-        both = [(b.output, end, way) for b in self.bands for end, way in ((b.high, 1.0), (b.low, -1.0))]
-        return [each for each in both if np.isfinite(each[1])]
+        """Finite ends of the bands: error, end, and 1 of an upper one, -1 of a lower one."""
+        return [(b.output, end, way) for b in self.bands for end, way in ((b.high, 1.0), (b.low, -1.0))
+                if np.isfinite(end)]  # fmt: skip
 
     def margins(self, errors: Floats) -> Floats:
         """How far errors, of shape (channels, n), are from each limit, negative beyond it, shape (limits, n)."""
@@ -121,7 +116,7 @@ class Question:
         return np.stack(found)
 
 
-def ask(study: Study, section: ReliabilitySection) -> Question:
+def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     """Channels and limits of a section; limited coordinates are outputs too."""
     mechanism = study.mechanism
     limits = [(*_limited(mechanism, name), limit) for name, limit in section.limits.items()]
@@ -155,7 +150,7 @@ def ask(study: Study, section: ReliabilitySection) -> Question:
     elif not limited and len(outputs) == 2:
         pair = (0, 1)
     channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
-    return Question(channels, tuple(bands), tuple(discs), pair)
+    return ReliabilityQuestion(channels, tuple(bands), tuple(discs), pair)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
@@ -170,7 +165,7 @@ def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
     return split_order(name, known)
 
 
-def unsaid(study: Study, question: Question) -> list[str]:
+def unsaid(study: Study, question: ReliabilityQuestion) -> list[str]:
     """A sentence for each output whose pin has a clearance, where the study does not say which link's point it is."""
     section: dict[str, Any] = study.resolved["reliability"]
     names = [*fields.as_list(section.get("outputs")), *(section.get("limits") or {})]
@@ -178,8 +173,8 @@ def unsaid(study: Study, question: Question) -> list[str]:
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         node = study.mechanism.graph.node(point)
         about = [c.name for c in question.channels if not c.order and node in _nodes(c.coordinate)]
-        told = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
-        if about and rest and not told:
+        named = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
+        if about and rest and not named:
             sentences.append(
                 f"{', '.join(about)}: {point} has a clearance and is that of {' and '.join(rest)}, not of {link}, "
                 f"in which the pin moves; say so by {rest[0]}.{point}, or give reliability.clearances.{point} a 'link'"

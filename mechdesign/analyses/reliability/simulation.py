@@ -12,7 +12,7 @@ from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, counted, slopes
 from mechdesign.analyses.reliability.first_order import derivatives, nominal_values
-from mechdesign.analyses.reliability.question import Question
+from mechdesign.analyses.reliability.question import ReliabilityQuestion
 from mechdesign.analyses.reliability.sources import Made, Sources
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Configuration, Mechanism
@@ -24,16 +24,17 @@ from mechdesign.progress import NULL, Progress
 
 # Samples drawn together.
 CHUNK = 20_000
-# The density's grid, in standard deviations [S2, Fig. 4], and the chunks it is counted over: a million samples.
+# Cells and half width, in standard deviations, of the density's grid [S2, Fig. 4].
 CELLS = 25
 REACH = 3.0
+# Chunks that the density is counted over: a million samples.
 _DENSITY_CHUNKS = 50
 # The trend of the means is followed in steps of this many samples through the first chunks, whose errors are kept for a
 # histogram too, then at powers of two.
 _TREND_STEP = 1000
 _TREND_CHUNKS = 16
-# Step of the difference quotients of what varies, which is known to rounding, in standard deviations.
-_STEP = 1e-5
+# Step of the difference quotients of what varies, in standard deviations.
+_SOURCE_STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,19 +47,15 @@ class Setting:
         Row of the pose; names its streams.
     plan : Plan
         That of the drives, in the assembly of the pose.
-    nominal : Configuration
-        Solved pose of the nominal mechanism.
-    centres : sequence of float
-        Nominal values of the channels.
-    elastic : Elastic or None
-        Deflections at this pose.
+    nominal, centres
+        The nominal mechanism, and values of its channels.
     scale : two of (float, float) or None
         Means and standard deviations for the density of the pair; None where no density is wanted.
     followed : bool
         Whether to follow the means and the failures, and to keep the errors of the first chunks.
     """
 
-    question: Question
+    question: ReliabilityQuestion
     pose: int
     mechanism: Mechanism
     plan: Plan
@@ -123,10 +120,7 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
 
 
 def problem_of(setting: Setting, sources: Sources) -> Problem:
-    """Where the mechanism breaks a limit: margins are nan where it cannot be assembled.
-
-    What has no closed derivative is differenced.
-    """
+    """Margins of the limits, nan where the mechanism cannot be assembled, and derivatives where these are closed."""
     setting = setting.narrowed()
     question = setting.question
 
@@ -143,7 +137,7 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
         by_name = derivatives(
             setting.mechanism, solve(setting, made), question.channels, names, setting.rates, setting.elastic
         )
-        by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes(varying, u, _STEP))
+        by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes(varying, u, _SOURCE_STEP))
         found = question.margins(errors)
         found[:, ~valid] = np.nan
         return found, question.margin_slopes(errors, by_variable)
@@ -161,23 +155,16 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
 
 
 def generator(seed: int, *stream: int) -> np.random.Generator:
-    """The stream of this name, for example one chunk of samples at one pose.
-
-    Every chunk of every pose has its own, so that the answer depends neither on the number of threads nor on how many
-    samples follow.
-    """
+    """The stream of this name; each chunk of each pose has its own, whatever the threads and the samples to follow."""
     return np.random.Generator(np.random.SFC64(np.random.SeedSequence(entropy=seed, spawn_key=stream)))
 
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """Sums over samples; they add up chunk by chunk, in order.
+    """Sums of errors about the nominal value, and of their products, over valid samples; chunks add up in order.
 
     Parameters
     ----------
-    errors : ndarray, shape (channels,)
-    products : ndarray, shape (channels, channels)
-        Of errors about the nominal value, over valid samples: small numbers, so the variance loses no digits.
     density : ndarray of int, shape (CELLS * CELLS,) or (0,)
         Samples in each cell, over `counted` samples.
     trend : ndarray, shape (steps, 3 + channels)
@@ -238,10 +225,7 @@ def simulate(
     settings: Sequence[Setting], sources: Sources, seed: int, samples: int, sums: dict[int, Sums],
     jobs: int | None = 1, progress: Progress = NULL,
 ) -> None:  # fmt: skip
-    """Fill `sums` by pose; they do not depend on `jobs`.
-
-    All settings come forward together, so that an interrupt leaves something of each.
-    """
+    """Fill `sums` by pose, all poses chunk by chunk, so that an interrupt leaves something of each."""
 
     def work(item: tuple[int, Setting]) -> tuple[int, Sums]:
         chunk, setting = item

@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.intervals import CONFIDENCE
-from mechdesign.analyses.reliability.engine.problem import BLOCK
+from mechdesign.analyses.reliability.engine.problem import CONFIDENCE, POINTS_TOGETHER
 from mechdesign.analyses.reliability.first_order import FirstOrder
 from mechdesign.analyses.reliability.simulation import Setting, errors_of, generator
 from mechdesign.analyses.reliability.sources import Sources
@@ -27,26 +26,22 @@ from mechdesign.parallel import map_chunks
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.reliability import ReliabilitySection
 
-REPLICATES = 16
+# Least number of replicates, and the most points of one.
+_REPLICATES = 16
+_REPLICATE_POINTS = 4_000
 # Mechanisms solved a pose, and poses, where the study does not say how many points.
-BUDGET = 8_000
-POSES = 4
-# Points of a replicate: beyond these there are more of them.
-_MOST = 4_000
+_POSE_MECHANISMS = 8_000
+_POSES = 4
+# Stream of random numbers, besides those of the methods.
 _STREAM = 3
 
 
 @dataclass(frozen=True, eq=False)
 class SobolIndices:
-    """Indices at one pose.
+    """Indices at one pose, shape (3, channels, sources): value, lower and upper end of its interval at 99.7 %.
 
-    Parameters
-    ----------
-    first, total : ndarray, shape (3, channels, sources)
-        Value, and lower and upper end of its interval at 99.7 %; nan of a source without indices of its own and where
-        nothing varies.
-    samples, invalid : int
-        Points evaluated, and those left out since a mechanism cannot be assembled.
+    nan of a source without indices of its own and where nothing varies. Of the `samples` evaluated those are left out
+    as `invalid` where a mechanism cannot be assembled.
     """
 
     first: Floats
@@ -61,7 +56,7 @@ class Replicate:
 
     Parameters
     ----------
-    mixed, change, square : ndarray, shape (2, channels, sources)
+    products : ndarray, shape (3, 2, channels, sources)
         Of f(B) (f(AB_i) - f(A)), f(AB_i) - f(A) and (f(A) - f(AB_i))^2.
     sums, squares : ndarray, shape (2, channels)
         Of f and its square, over A and B.
@@ -69,9 +64,7 @@ class Replicate:
         Points of A that enter, and all.
     """
 
-    mixed: Floats
-    change: Floats
-    square: Floats
+    products: Floats
     sums: Floats
     squares: Floats
     kept: int
@@ -87,10 +80,10 @@ def sample(
     Parameters
     ----------
     model : callable
-        From standard normal variables, shape (dimension, n), to the values of the model and of the linear model
-        beside it (zero without one), shape (2, channels, n); nan where there is none.
+        From standard normal variables, shape (dimension, n), to the values of the model and of the linear model (zero
+        without one), shape (2, channels, n); nan where there is none.
     rows : sequence of sequences of int
-        The variables of each source; a source without is not asked.
+        The variables of each source; one without has no indices.
     """
     asked = [k for k, own in enumerate(rows) if len(own)]
     points = np.empty((dimension, 2 + len(asked), count))
@@ -100,7 +93,7 @@ def sample(
         own = list(rows[k])
         points[own, 2 + place] = points[own, 1]
     flat = points.reshape(dimension, -1)
-    parts = [model(flat[:, begin : begin + BLOCK]) for begin in range(0, flat.shape[1], BLOCK)]
+    parts = [model(flat[:, begin : begin + POINTS_TOGETHER]) for begin in range(0, flat.shape[1], POINTS_TOGETHER)]
     found = np.concatenate(parts, axis=-1).reshape(*parts[0].shape[:2], 2 + len(asked), count)
     keep = np.isfinite(found).all(axis=(0, 1, 2))
     found = found[..., keep]
@@ -108,27 +101,24 @@ def sample(
     products = np.full((3, *found.shape[:2], len(rows)), np.nan)
     products[..., asked] = [values.sum(axis=-1) for values in (of_b[:, :, None] * change, change, change * change)]
     sums, squares = of_a.sum(axis=-1) + of_b.sum(axis=-1), (of_a * of_a + of_b * of_b).sum(axis=-1)
-    return Replicate(products[0], products[1], products[2], sums, squares, int(keep.sum()), count)
+    return Replicate(products, sums, squares, int(keep.sum()), count)
 
 
 def combine(replicates: Sequence[Replicate], linear: tuple[Floats, Floats] | None = None) -> SobolIndices:
     """Indices and their intervals from independent replicates.
 
-    Parameters
-    ----------
-    linear : two of ndarray, optional
-        Variances of the linear model: of each source, shape (channels, sources), and of all together.
+    `linear` are variances of the linear model: of each source, shape (channels, sources), and of all together.
     """
     points = sum(each.points for each in replicates)
     full = [each for each in replicates if each.kept]
     kept = sum(each.kept for each in full)
-    shape = (3, *replicates[0].mixed.shape[1:])
     if len(full) < 2:
-        return SobolIndices(np.full(shape, np.nan), np.full(shape, np.nan), points, points - kept)
+        nowhere = np.full((3, *replicates[0].products.shape[2:]), np.nan)
+        return SobolIndices(nowhere, nowhere, points, points - kept)
     # About the common mean, or a large mean would drown the products.
     centre = sum((each.sums for each in full), np.zeros_like(full[0].sums)) / (2 * kept)
-    first = np.stack([(each.mixed - centre[..., None] * each.change) / each.kept for each in full])
-    total = np.stack([0.5 * each.square / each.kept for each in full])
+    first = np.stack([(each.products[0] - centre[..., None] * each.products[1]) / each.kept for each in full])
+    total = np.stack([0.5 * each.products[2] / each.kept for each in full])
     whole = np.stack([each.squares / (2 * each.kept) - centre * (each.sums / each.kept - centre) for each in full])
     # The linear model's variances are those over all points; without those that cannot be assembled they are others.
     if linear is not None and kept == points:
@@ -157,21 +147,21 @@ def indices(task: Task, section: ReliabilitySection) -> dict[int, SobolIndices]:
     settings, count = task.settings, section.sobol
     if count is None:
         sampled = any(METHODS[method].sampled for method in section.methods)
-        settings = settings[:POSES] if task.poses.listed and sampled else ()
+        settings = settings[:_POSES] if task.poses.listed and sampled else ()
     if not settings or count == 0:
         return {}
     sources, linear = task.sources, task.linear
     alone, owners = uncorrelated(sources), np.array(sources.owners)
     rows = [np.flatnonzero(owners == s.name).tolist() if s.name in alone else [] for s in sources.all]
-    points = BUDGET // (sum(map(bool, rows)) + 2) if count is None else count
-    replicates = max(REPLICATES, -(-points // _MOST))
+    points = _POSE_MECHANISMS // (sum(map(bool, rows)) + 2) if count is None else count
+    replicates = max(_REPLICATES, -(-points // _REPLICATE_POINTS))
     each = max(2, points // replicates)
     task.progress.start(len(settings) * replicates, "replicates")
 
     def work(item: tuple[Setting, int]) -> Replicate:
         setting, replicate = item
         rng = generator(task.seed, setting.pose, _STREAM, replicate)
-        return sample(_beside(setting, sources, linear), rows, len(owners), each, rng)
+        return sample(_both_models(setting, sources, linear), rows, len(owners), each, rng)
 
     found: dict[int, list[Replicate]] = {setting.pose: [] for setting in settings}
     items = [(setting, replicate) for setting in settings for replicate in range(replicates)]
@@ -207,7 +197,7 @@ def doubts(task: Task, found: Mapping[int, SobolIndices]) -> list[str]:
     return notes
 
 
-def _beside(setting: Setting, sources: Sources, linear: FirstOrder) -> Callable[[Floats], Floats]:
+def _both_models(setting: Setting, sources: Sources, linear: FirstOrder) -> Callable[[Floats], Floats]:
     slopes = linear.components[:, :, setting.pose]
     if not np.isfinite(slopes).all():
         slopes = np.zeros_like(slopes)

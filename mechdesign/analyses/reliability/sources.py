@@ -16,20 +16,17 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import LOADS, Clearance
 
-# Of all that varies, in radians or in sizes of the mechanism; of loads.
-MOST, HEAVY = 1e6, 1e100
+# Largest deviation, in radians or in sizes of the mechanism.
+MAX_DEVIATION = 1e6
+# Largest deviation of a force or moment, in the study's units.
+MAX_LOAD = 1e100
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """A dimension that varies: a ``parameter``, a ``place``, a ``drive`` or a ``load``.
+    """A dimension that varies: by `kind` a ``parameter`` (in its own unit), a ``place``, a ``drive`` or a ``load``.
 
-    Parameters
-    ----------
-    law : Marginal
-        Of a parameter in its own unit, of an angle in radians.
-    moves : mapping of str to (float, str)
-        Derivative of each place, drive or load that it changes (radians, lengths), and the quantity of that.
+    `moves` has the derivative of each place, drive or load that it changes (radians, lengths), and its quantity.
     """
 
     name: str
@@ -55,18 +52,10 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Pin:
-    """A clearance.
+    """A clearance: its mean radius, and the law of its deviation.
 
-    Parameters
-    ----------
-    radius : float
-        Mean radial clearance.
-    law : Marginal or None
-        Of its deviation.
-    analytic, sampled : str
-        Laws of the pin's place, of the analytic methods and of those that sample.
-    places : tuple of str
-        What the pin moves: the offsets of its point in its link, or the link's length.
+    `analytic` and `sampled` are the laws of the pin's place, of the analytic methods and of those that sample; `places`
+    what the pin moves: the offsets of its point in its link, or the link's length.
     """
 
     name: str
@@ -112,15 +101,8 @@ class Made(NamedTuple):
 class Sources:
     """All that varies in a study.
 
-    What is drawn has the shape (variables, count): deviations of the scalars in their order, then each pin's radial
-    clearance, and x and y of its place for a radial clearance of 1.
-
-    Parameters
-    ----------
-    scalars : tuple of Scalar
-        Parameters first, then places, drives and loads.
-    correlation : Correlation or None
-        Of the scalars.
+    Draws have the shape (variables, count): deviations of the scalars in their order (parameters first, then places,
+    drives and loads), then each pin's radial clearance, and x and y of its place for a radial clearance of 1.
     """
 
     study: Study
@@ -279,17 +261,18 @@ def _quantity(mechanism: Mechanism, name: str) -> str:
 
 
 def _check_sizes(sources: Sources) -> None:
-    """Refuse what no mechanism of this size varies by: its squares are no numbers any more."""
+    """Refuse deviations so large that their squares overflow."""
     study, size = sources.study, sources.study.mechanism.size or 1.0
-    most = {"angle": (MOST, "a million radians"), "force": (HEAVY, "1e100"), "moment": (HEAVY, "1e100")}
+    loads = (MAX_LOAD, "1e100")
+    most = {"angle": (MAX_DEVIATION, "a million radians"), "force": loads, "moment": loads}
     for scalar in sources.scalars:
         for slope, quantity in scalar.moves.values():
-            allowed, words = most.get(quantity, (MOST * size, "a million times the size of the mechanism"))
+            allowed, words = most.get(quantity, (MAX_DEVIATION * size, "a million times the size of the mechanism"))
             if not max(abs(slope * end) for end in scalar.ends) <= allowed:
                 message = f"varies by more than {words}"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
     for pin in sources.pins:
-        if not pin.ends[1] <= MOST * size:
+        if not pin.ends[1] <= MAX_DEVIATION * size:
             message = "is more than a million times the size of the mechanism"
             raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
 

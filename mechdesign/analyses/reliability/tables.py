@@ -10,8 +10,7 @@ import numpy as np
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.reliability import methods
-from mechdesign.analyses.reliability.engine.intervals import binomial
-from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.engine.problem import Estimate, binomial
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import links_meant
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
@@ -20,9 +19,12 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Ints
 from mechdesign.results import Column, Table
 
-# A histogram has about so many bins, of samples that vary no farther than so many standard deviations.
-BINS, WIDEST = 60, 6.0
-ROUNDING = 1e-12
+# Bins of a histogram.
+_BINS = 60
+# Farthest errors in it, in standard deviations.
+_FARTHEST = 6.0
+# Standard deviation, as a part of the size, up to which an error does not vary.
+_CONSTANT = 1e-12
 # Where nothing was computed.
 _UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
 
@@ -136,7 +138,8 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
 
 def _index_columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> list[Column]:
     """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; nan where not asked."""
-    made: list[Column] = []
+    ends = {"": "", "_low": ", lower end of its interval, 99.7 %", "_high": ", upper end of its interval, 99.7 %"}
+    columns: list[Column] = []
     for kind, meaning in (
         ("first", "share of the output's variance that the source causes by itself [Sobol, 1993]"),
         ("total", "share that the source causes by itself and together with others"),
@@ -144,14 +147,9 @@ def _index_columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) ->
         values = np.full((3, *shape), np.nan)
         for pose, each in found.items():
             values[:, pose] = getattr(each, kind)
-        ends = (
-            ("", ""),
-            ("_low", ", lower end of its interval, 99.7 %"),
-            ("_high", ", upper end of its interval, 99.7 %"),
-        )
-        made += [Column(f"sobol_{kind}{end}", part.ravel(), meaning=meaning + more)
-                 for (end, more), part in zip(ends, values, strict=True) if found]  # fmt: skip
-    return made
+        columns += [Column(f"sobol_{kind}{end}", part.ravel(), meaning=meaning + more)
+                    for (end, more), part in zip(ends.items(), values, strict=True) if found]  # fmt: skip
+    return columns
 
 
 def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:
@@ -206,18 +204,18 @@ def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
         mean, sigma = float(error.mean()), float(error.std(ddof=1))
         # What does not vary has rounding for its deviation: of the size of what it is computed from.
         size = task.study.mechanism.size if units[k] == task.study.units.label("length") else 0.0
-        if not sigma > ROUNDING * max(size, float(nominal[units == units[k]].max())):
+        if not sigma > _CONSTANT * max(size, float(nominal[units == units[k]].max())):
             continue
-        low = max(float(error.min()), mean - WIDEST * sigma)
-        high = min(float(error.max()), mean + WIDEST * sigma)
-        count, edges = np.histogram(error, bins=BINS, range=(low, high))
+        low = max(float(error.min()), mean - _FARTHEST * sigma)
+        high = min(float(error.max()), mean + _FARTHEST * sigma)
+        count, edges = np.histogram(error, bins=_BINS, range=(low, high))
         middle = 0.5 * (edges[1:] + edges[:-1])
         normal = np.exp(-0.5 * ((middle - mean) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
         varying.append(k)
         parts.append(np.stack([edges[:-1], edges[1:], count, normal]))
     if not parts:
         return None
-    channel, samples = np.repeat(varying, BINS), sums[row].kept.shape[1]
+    channel, samples = np.repeat(varying, _BINS), sums[row].kept.shape[1]
     low_, high_, count_, normal_ = np.concatenate(parts, axis=1)
     columns = [
         *at_poses(task, np.full(len(channel), row)),

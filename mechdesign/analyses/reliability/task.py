@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.engine.intervals import Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.engine.problem import Estimate, Precision
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
-from mechdesign.analyses.reliability.question import Question
+from mechdesign.analyses.reliability.question import ReliabilityQuestion
 from mechdesign.analyses.reliability.simulation import Setting, Sums
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.mechanism import Reason
@@ -26,8 +25,9 @@ from mechdesign.study.schema.checker import ORDERS as QUANTITIES
 
 Strings = NDArray[np.str_]
 
-# Samples that `auto` draws at most where the study says nothing, and its precision: a twentieth of the probability.
-MOST, RELATIVE = 2_000_000, 0.05
+# Most samples of `auto` where the study says nothing, and its precision as a share of the probability.
+MAX_SAMPLES = 2_000_000
+RELATIVE_PRECISION = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,21 +40,15 @@ class Task:
         See `mechdesign.mechanism.Reason`.
     nominal : ndarray, shape (channels, poses)
         Values of the channels (radians, lengths).
-    linear : FirstOrder
-        Of all poses.
-    elastic : Elastic or None
-        Deflections at all poses.
     settings : sequence of Setting
         Poses that can be assembled, in their order; none where only the first order is asked.
-    samples : int
-        As the study asks.
     most : int
         Samples of methods that end where their precision is reached.
     """
 
     study: Study
     poses: Poses
-    question: Question
+    question: ReliabilityQuestion
     sources: Sources
     reason: NDArray[np.int8]
     nominal: Floats
@@ -63,8 +57,8 @@ class Task:
     settings: Sequence[Setting] = ()
     seed: int = 0
     samples: int = 0
-    most: int = MOST
-    precision: Precision = field(default_factory=lambda: Precision(RELATIVE, None))
+    most: int = MAX_SAMPLES
+    precision: Precision = field(default_factory=lambda: Precision(RELATIVE_PRECISION, None))
     jobs: int | None = 1
     progress: Progress = NULL
 
@@ -96,23 +90,21 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class MethodResult:
-    """What a method says.
+    """What a method finds, by pose, and over the whole `cycle`.
 
     Parameters
     ----------
     estimates : dict of int to Estimate
-        By pose, where there are limits.
+        Where there are limits.
     sums : dict of int to Sums
-        By pose, of methods that sample the errors.
+        Of methods that sample the errors.
     used : dict of int to str
-        By pose, the method that the value comes from, where it is not this one.
+        The method that the value comes from, where it is not this one.
     rungs : dict of int to dict of str to Estimate
-        By pose, what the methods tried before say.
+        Those of the methods tried before.
     normal : (ndarray, ndarray) or None
         Mean, shape (channels, poses), and covariance, shape (poses, channels, channels), of errors that are not drawn
         (radians, lengths); None where the method gives none.
-    cycle : Estimate or None
-        Of the whole motion.
     """
 
     method: str
@@ -143,7 +135,7 @@ class MethodResult:
 
 
 class Partial(KeyboardInterrupt):
-    """An interrupted method, and what it had found."""
+    """An interrupted method, and its result so far."""
 
     def __init__(self, found: MethodResult) -> None:
         super().__init__()

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
-from mechdesign.analyses.stiffness.beams import beams_of
 from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held, put
+from mechdesign.analyses.stiffness.elements import Guide, Hinge, beams_of
 from mechdesign.analyses.stiffness.force_method import Effects, Loaded, effects_of, load, twists_of
 from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
-from mechdesign.analyses.stiffness.network import Guide, Hinge, Network, build_network, carrying_edges
+from mechdesign.analyses.stiffness.network import Network, build_network, carrying_edges
 from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,
@@ -37,8 +37,9 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.threads import one_thread
 
+# Poses solved together.
 CHUNK = 8192
-# Wrenches (of unit size) nearer to dependence than this are told: the answer hangs on rounding and on tolerances.
+# Wrenches (of unit size) nearer to dependence than this get a warning: rounding and tolerances decide the answer.
 NEAR_SINGULAR = 1e-4
 Pose = tuple[int, Configuration]
 
@@ -106,18 +107,9 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """How the body is held in every pose.
+    """How the body is held in every pose, why poses fail (`Reason`, shape (poses,)), and the effects of any loads.
 
-    Parameters
-    ----------
-    reason : int8 array, shape (poses,)
-        See `mechdesign.mechanism.Reason`.
-    springs : Springs
-        Of the legs, by pose.
-    effects : Effects or None
-        What the study's loads do, where it has any.
-    first, loose : (int, Configuration) or None
-        The first valid pose and the first that has a free twist, with their rows.
+    `first` and `loose` are the first valid pose and the first that has a free twist, with their rows.
     """
 
     held: Held
@@ -130,17 +122,7 @@ class Solved:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """What pictures show of one pose.
-
-    Parameters
-    ----------
-    row : int
-        Its row among the study's poses.
-    springs : Springs
-        Those of this pose.
-    twists : mapping of str to ndarray, shape (3, loads)
-        How each vertex shifts and turns under the study's loads, about the asked point.
-    """
+    """One pose as pictures show it, and the row of it; `twists` by vertex, shape (3, loads), about the asked point."""
 
     body: Body
     row: int
@@ -215,13 +197,7 @@ def tables(study: Study, body: Body, poses: Poses, solved: Solved) -> dict[str, 
 
 
 def ask(study: Study) -> Body:
-    """Find the legs that hold what the study asks.
-
-    Raises
-    ------
-    StudyError
-        If the study has no stiffness section.
-    """
+    """Find what carries the asked body; a StudyError where the study has no stiffness section."""
     section = study.stiffness
     if section is None:
         message = "is missing: say which point's stiffness is asked, for example {link: platform, at: P}"
@@ -278,26 +254,26 @@ def _loaded(body: Body, configuration: Configuration) -> Loaded:
 def _cautions(study: Study, poses: Poses, body: Body, held: Held) -> list[str]:
     known = (held.rank > 0) | np.isfinite(held.stiffness).all(axis=(1, 2))
     links = study.mechanism.description.links
-    told = [
+    cautions = [
         f"link '{name}' has a single point, and so no beam: it is rigid, though 'elastic' names it; give it two ends"
         for name in body.section.elastic
         if len(beams_of(links[name]).corners) < 2
     ]
     loose = np.flatnonzero(known & (held.rank < body.size))
     if len(loose):
-        told.append(
+        cautions.append(
             f"{len(loose)} of {poses.count} poses are under-constrained: a twist is free (free_x, free_y, free_phi), "
             f"and the compliance is nan; the first: {pose_in_words(study, poses, int(loose[0]))}"
         )
     near = np.flatnonzero(known & (held.rank == body.size) & (held.margin < NEAR_SINGULAR))
     if len(near):
-        told.append(
+        cautions.append(
             f"{len(near)} of {poses.count} poses are nearly under-constrained (wrenches within "
             f"{held.margin[near].min():.1e} of dependence); the first: {pose_in_words(study, poses, int(near[0]))}"
         )
     for leg in body.legs or ():
         if not any(isinstance(element, Hinge | Guide) and element.drive is None for element in leg.elements):
-            told.append(
+            cautions.append(
                 f"leg '{leg.name}' has no free joint: it holds three ways at once and has no equivalent springs"
             )
-    return told
+    return cautions

@@ -25,16 +25,12 @@ class Contact:
 
     Parameters
     ----------
-    point : str
-        Where it is.
     slide : int or None
         Index of its slide in the mechanism's graph.
     mount : str or None
-        Where it sits on body `a`, if elsewhere: of a motor between links that share no pin.
+        Where it sits on body `a`, if not at `point`: of a motor between links that share no pin.
     give : float
         How many times the compliance of the joint's bearing lies here.
-    drive : str or None
-        The drive that holds or moves it.
     """
 
     kind: Literal["hinge", "slide", "clamp", "motor"]
@@ -57,14 +53,9 @@ class Contact:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Bodies of a mechanism, the asked one among them, and their contacts.
+    """Bodies of a mechanism and their contacts.
 
-    Parameters
-    ----------
-    asked : str
-        Name of the asked body: a link's, or `ASKED` for a pin or the end of an elastic link.
-    link : str or None
-        The asked link; None for a pin.
+    The `asked` one is that of the `link`, or `ASKED` for a pin (without a link) or the end of an elastic link.
     """
 
     names: tuple[str, ...]

@@ -7,7 +7,7 @@ lambda = W^-1 w and the body the twist W^-T C_c lambda: no inverse of C_c is nee
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,6 +71,12 @@ def put(whole: object, rows: Ints, part: object) -> None:
         getattr(whole, name)[rows] = values
 
 
+def poses_by(values: Ints) -> Iterator[tuple[int, Ints]]:
+    """Each of the values, of shape (n,), and the poses that have it."""
+    for value in np.unique(values).tolist():
+        yield value, np.flatnonzero(values == value)
+
+
 def moved_to(arm: Complexes) -> Floats:
     """M, shape (n, 3, 3), that takes a body's twist to that at a point `arm` away; its inverse is that of `-arm`."""
     found = np.tile(np.eye(3), (len(arm), 1, 1))
@@ -83,14 +89,8 @@ def by_wrenches(
 ) -> tuple[Floats, Floats, Flags]:
     """Stiffness and compliance, shape (n, size, size), where as many wrenches as needed hold the body, and where so.
 
-    Parameters
-    ----------
-    wrenches, compliances : sequence of ndarray, shape (3, m, n) and (m, m, n)
-        Of all legs.
-    length : float
-        Moments are divided by it wherever sizes are compared.
-    size : int
-        3 for a body; 2 for a pin, on which no leg exerts a moment.
+    Wrenches and compliances are those of all legs, shapes (3, m, n) and (m, m, n). Moments are divided by `length`
+    wherever sizes are compared; on a pin (`size` 2) no leg exerts a moment.
     """
     scale = np.array([1.0, 1.0, 1.0 / length])[:size]
     outer = np.outer(scale, scale)

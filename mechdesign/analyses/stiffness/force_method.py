@@ -20,14 +20,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.beams import course_of
-from mechdesign.analyses.stiffness.chains import bending, freedoms, looked_at_from
-from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to
+from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to, poses_by
+from mechdesign.analyses.stiffness.elements import bending, course_of, freedoms, looked_at_from
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import RANK, RIGID
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.study.schema.stiffness import StiffnessSection
 
 # Of states of self-stress, those with less than this share of the largest one's energy are rounding: rigid.
@@ -38,11 +37,10 @@ STORED = 1e-26
 
 @dataclass(frozen=True, eq=False)
 class Twists:
-    """Freedoms of a network in n poses, with rotations scaled to lengths.
+    """Freedoms of a network in n poses, with rotations scaled to lengths by `length`.
 
     Parameters
     ----------
-    network : Network
     twist : ndarray, shape (n, 3, freedoms)
         Seen from the asked point, or from the middle of the joints where that is far away.
     compliance : ndarray, shape (n, freedoms)
@@ -52,8 +50,6 @@ class Twists:
         go together in each pose.
     arm : complex ndarray, shape (n,)
         From where the twists are seen to the asked point.
-    length : float
-        What turns rotations into lengths.
     """
 
     network: Network
@@ -69,16 +65,12 @@ class Twists:
 class Loaded:
     """A body held by a network in n poses, and what unit loads at it do; nan where the body is not held.
 
-    Loads and displacements are plain, not scaled.
-
     Parameters
     ----------
-    held : Held
-    twists : Twists
     stress : ndarray, shape (n, 3 loops, size)
         Wrenches of the loops under scaled unit loads.
     shift : ndarray, shape (n, freedoms, size)
-        Displacements in all freedoms.
+        Displacements in all freedoms under the same.
     """
 
     held: Held
@@ -163,13 +155,7 @@ def _beam_freedoms(
 
 
 def load(twists: Twists, size: int) -> Loaded:
-    """Stiffness and compliance, and what bears and moves under unit loads.
-
-    Parameters
-    ----------
-    size : int
-        3 for a body, 2 for a pin, which bears no moment.
-    """
+    """Stiffness and compliance, and what bears and moves under unit loads, of a body or (`size` 2) a pin."""
     n, (around, onward) = len(twists.twist), _ways(twists.network)
 
     def of(chosen: Flags) -> tuple[Floats, Floats]:
@@ -310,7 +296,7 @@ def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> He
     twist = np.full((n, size), np.nan)
     # Of the displacements that are not free: an orthonormal basis.
     _, axes = np.linalg.eigh(lost)
-    for count, rows in _by(freedom):
+    for count, rows in poses_by(freedom):
         basis = axes[rows][:, :, : size - count]
         inner = basis.swapaxes(1, 2) @ compliance[rows] @ basis
         values, vectors = np.linalg.eigh(inner)
@@ -331,11 +317,6 @@ def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> He
         with np.errstate(divide="ignore", invalid="ignore"):
             twist = np.where(twist[:, 2:] != 0, twist / twist[:, 2:], twist)
     return Held(stiffness / outer, compliance * outer, size - freedom, twist, statics.margin)
-
-
-def _by(values: Ints) -> Iterator[tuple[int, Ints]]:
-    for value in np.unique(values):
-        yield int(value), np.flatnonzero(values == value)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.stiffness.bodies import Bodies
-from mechdesign.analyses.stiffness.chains import freedoms, looked_at_from
-from mechdesign.analyses.stiffness.compliance import Held, by_wrenches
-from mechdesign.analyses.stiffness.network import Beam, Edge, Element, Hinge, Shift
+from mechdesign.analyses.stiffness.compliance import Held, by_wrenches, poses_by
+from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, looked_at_from
+from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.analyses.stiffness.screws import (
     RIGID,
-    Chain,
+    LegScrews,
     constraint_compliance,
     equivalent_springs,
     joint_rank,
@@ -26,22 +26,16 @@ from mechdesign.analyses.stiffness.screws import (
 from mechdesign.analyses.stiffness.tables import Springs
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes, Ints
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.study.schema.stiffness import StiffnessSection
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A serial chain from the ground to the asked body.
+    """A serial chain from the ground to the asked body, its joints and beams in order from the base.
 
-    Parameters
-    ----------
-    name : str
-        Its links, from the base, joined by ``+``; that of its joint where it has none.
-    base, tip : str
-        Points of its first and last joint.
-    elements : tuple
-        Joints and beams in order from the base; rigid drives and rigid links are not among them.
+    Its `name` is that of its links, joined by ``+``, or else of its joint; `base` and `tip` are the points of its first
+    and last joint. Rigid drives and links are not among its elements.
     """
 
     name: str
@@ -50,16 +44,8 @@ class Leg:
     elements: tuple[Element, ...]
 
 
-def find_legs(edges: Sequence[Edge], bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
-    """The legs that carry a body, in the order of their links; None where they are not serial chains.
-
-    Parameters
-    ----------
-    edges : sequence of Edge
-        Those that carry.
-    links : sequence of str
-        All links, in the study's order.
-    """
+def find_legs(edges: Sequence[NetworkEdge], bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
+    """The legs among the edges that carry, in the order of their `links`; None where they are not serial chains."""
     found: list[tuple[int, Leg]] = []
     for piece in _pieces(edges, bodies.asked):
         ends = {end for edge in piece for end in (edge.a, edge.b)}
@@ -75,7 +61,7 @@ def find_legs(edges: Sequence[Edge], bodies: Bodies, links: Sequence[str]) -> tu
     return tuple(leg for _, leg in sorted(found, key=lambda each: each[0]))
 
 
-def _pieces(edges: Sequence[Edge], asked: str) -> Iterator[list[Edge]]:
+def _pieces(edges: Sequence[NetworkEdge], asked: str) -> Iterator[list[NetworkEdge]]:
     """Edges that hang together otherwise than through the ground or the asked body."""
     left = list(edges)
     while left:
@@ -90,7 +76,7 @@ def _pieces(edges: Sequence[Edge], asked: str) -> Iterator[list[Edge]]:
         yield piece
 
 
-def _path(piece: list[Edge], asked: str) -> list[str] | None:
+def _path(piece: list[NetworkEdge], asked: str) -> list[str] | None:
     """Vertices from the ground to the asked body, the edges put in their order; None where they are no plain path."""
     path, left = [GROUND], list(piece)
     piece.clear()
@@ -104,7 +90,7 @@ def _path(piece: list[Edge], asked: str) -> list[str] | None:
     return None if left else path
 
 
-def _elements(edges: Sequence[Edge], path: Sequence[str], bodies: Bodies) -> Iterator[Element]:
+def _elements(edges: Sequence[NetworkEdge], path: Sequence[str], bodies: Bodies) -> Iterator[Element]:
     """What gives along a path: of an elastic link its beams from the one joint to the other."""
     entry: str | None = None
     for k, (edge, vertex) in enumerate(zip(edges, path, strict=False)):
@@ -126,14 +112,7 @@ def hold_by_legs(
 ) -> tuple[Held, list[Springs]]:  # fmt: skip
     """Springs in a batch of assembled poses of shape (n,), and how they hold the body: rank 0 where not in closed form.
 
-    Parameters
-    ----------
-    length : float
-        What turns rotations into lengths where sizes are compared.
-    size : int
-        3 for a body's twist, 2 for the displacement of a pin.
-    condensed : bool
-        The pin is a point of one link only: the link turns freely under forces at it.
+    `length`, `size` and `condensed` are those of the `Body`.
     """
     n, body = configuration.shape[0], 3 if condensed else size
     at = configuration.point(section.at)
@@ -143,7 +122,9 @@ def hold_by_legs(
     ranks = [np.broadcast_to(joint_rank(chain.passive, length), (n,)) for chain in chains]
     springs: list[Springs] = []
     held = Held.unknown(n, body)
-    for signature, rows in _signatures(np.stack(ranks, axis=1)):
+    # Ranks are at most 3: together they are one number to the base 4.
+    for _, rows in poses_by(np.array(ranks).T @ 4 ** np.arange(len(legs))):
+        signature = [int(rank[rows[0]]) for rank in ranks]
         here = chains if len(rows) == n else [chain.take(rows) for chain in chains]
         wrenches = [
             reciprocal_wrenches(chain.passive, rank, length, len(rows))
@@ -161,14 +142,6 @@ def hold_by_legs(
     return _restrict(held.seen_from(at - origin), condensed), springs
 
 
-def _signatures(ranks: Ints) -> list[tuple[list[int], Ints]]:
-    """Poses in which all legs have the same ranks together."""
-    if (ranks == ranks[:1]).all():
-        return [(ranks[0].tolist(), np.arange(len(ranks)))]
-    kinds, which = np.unique(ranks, axis=0, return_inverse=True)
-    return [(kind.tolist(), np.flatnonzero(which.reshape(-1) == k)) for k, kind in enumerate(kinds)]
-
-
 def _restrict(held: Held, condensed: bool) -> Held:
     """Only displacements of the point, the link free to turn: the compliance is a part, its inverse the stiffness."""
     if not condensed:
@@ -182,10 +155,10 @@ def _restrict(held: Held, condensed: bool) -> Held:
     return Held(stiffness, compliance, np.minimum(held.rank, 2), held.free[:, :2], held.margin)
 
 
-def _chain(leg: Leg, section: StiffnessSection, configuration: Configuration, at: Complexes) -> Chain:
+def _chain(leg: Leg, section: StiffnessSection, configuration: Configuration, at: Complexes) -> LegScrews:
     """A leg's joints and elastic elements in each pose, seen from places `at`."""
     found = list(freedoms(leg.elements, section, configuration, at))
-    return Chain(
+    return LegScrews(
         [twist for twist, compliance in found if compliance is None],
         [twist for twist, compliance in found if compliance is not None],
         [compliance for _, compliance in found if compliance is not None],

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.beams import Beams, beams_of
 from mechdesign.analyses.stiffness.bodies import ASKED, Bodies, Contact
+from mechdesign.analyses.stiffness.elements import Beam, Bearing, Element, Guide, Hinge, Shift, beams_of
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
@@ -26,61 +26,11 @@ Way = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
-class Hinge:
-    """A revolute joint at a point; driven if `drive` names a drive."""
-
-    point: str
-    drive: str | None = None
-
-
-@dataclass(frozen=True)
-class Guide:
-    """A slide of the mechanism's graph (its index); driven if `drive` names a drive."""
-
-    slide: int
-    drive: str | None = None
-
-
-@dataclass(frozen=True)
-class Beam:
-    """The beams of an elastic link between the feet of two points; see `mechdesign.analyses.stiffness.beams`."""
-
-    beams: Beams
-    tail: str
-    head: str
-    section: str
-
-
-@dataclass(frozen=True)
-class Shift:
-    """A free displacement along a direction of the world: between links that only a motor holds to each other."""
-
-    direction: complex
-
-
-@dataclass(frozen=True)
-class Bearing:
-    """The give of a joint itself, so many times; across its slide, or in all directions of a pin."""
-
-    name: str
-    point: str
-    slide: int | None = None
-    give: float = 1.0
-
-
-Element = Hinge | Guide | Beam | Shift | Bearing
-
-
-@dataclass(frozen=True)
-class Edge:
+class NetworkEdge:
     """A joint or a beam from vertex `a` to vertex `b`, its freedoms in order from `a`.
 
-    Parameters
-    ----------
-    name : str
-        Of the joint's point or slide, or of the link whose beams it goes along.
-    point : str
-        Where it is; along beams, what sits at its end.
+    Its `name` is that of the joint's point or slide, or of the link whose beams it goes along; there, `point` is what
+    sits at its end.
     """
 
     a: str
@@ -97,12 +47,10 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """Vertices, edges and loops.
+    """Vertices, of which one is asked, edges and loops.
 
     Parameters
     ----------
-    asked : str
-        The vertex whose displacement is asked.
     paths : mapping of str to ((int, int), ...)
         To each vertex, the edges on the way from the ground and whether they are gone along (1) or against (-1).
     loops : tuple of ((int, int), ...)
@@ -111,7 +59,7 @@ class Network:
         Of each link, its points and the vertices that bear them.
     """
 
-    edges: tuple[Edge, ...]
+    edges: tuple[NetworkEdge, ...]
     asked: str
     paths: Mapping[str, Way]
     loops: tuple[Way, ...]
@@ -146,7 +94,7 @@ def build_network(mechanism: Mechanism, bodies: Bodies, section: StiffnessSectio
     return replace(network, paths=_with_idle(edges, network.paths))
 
 
-def carrying_edges(mechanism: Mechanism, bodies: Bodies, section: StiffnessSection) -> list[Edge]:
+def carrying_edges(mechanism: Mechanism, bodies: Bodies, section: StiffnessSection) -> list[NetworkEdge]:
     """Joints and beams that can carry a load from the asked body."""
     return _carrying(_Builder(mechanism, bodies, section).edges(), bodies.asked)
 
@@ -157,16 +105,16 @@ class _Builder:
     bodies: Bodies
     section: StiffnessSection
 
-    def edges(self) -> list[Edge]:
+    def edges(self) -> list[NetworkEdge]:
         """All joints, the motors that sit at no joint, and the ways along the beams of elastic links."""
-        found: list[Edge] = []
+        found: list[NetworkEdge] = []
         for contact in self.bodies.contacts:
             elements = tuple(_joint_elements(self.mechanism, contact, self.section))
             name = contact.point if contact.slide is None else self.mechanism.graph.slides[contact.slide]
             if contact.kind == "motor":
                 name = contact.drive or ""
             a, b = (self._vertex(contact, body) for body in (contact.a, contact.b))
-            found.append(Edge(a, b, elements, name, contact.point))
+            found.append(NetworkEdge(a, b, elements, name, contact.point))
         for name in self.section.elastic:
             found += self._beams(name)
         return found
@@ -186,7 +134,7 @@ class _Builder:
     def _node(self, body: str, point: str) -> str:
         """The vertex of a body at one of its points."""
         link = self.bodies.link_of(body)
-        if link not in self.section.elastic:
+        if body == GROUND or link not in self.section.elastic:
             return body
         telescopic = self.mechanism.description.links[link].telescopic
         # Of a telescopic leg the first body is rigid, and the second the cantilever, from the leg's base to its end.
@@ -196,19 +144,14 @@ class _Builder:
 
     def _vertex(self, contact: Contact, body: str) -> str:
         """The vertex of a body at a contact; what slides on an elastic link sits on its beams."""
-        link = self.bodies.link_of(body)
-        if body in (GROUND, ASKED) or link not in self.section.elastic:
-            return body
-        described = self.mechanism.description.links[link]
-        if described.telescopic and described.ends is not None:
-            if body == link:
-                return body
-            inner = contact.slide is not None and contact.other(body) == link
-            return f"{body}@{described.ends[0 if inner else 1]}"
+        link = self.mechanism.description.links.get(self.bodies.link_of(body))
+        if link is not None and link.telescopic and link.ends is not None:
+            inner = contact.slide is not None and contact.other(body) == link.name
+            return self._node(body, link.ends[0 if inner else 1])
         rides = contact.slide is not None and body == contact.a
-        return f"{body}@{self.mechanism.graph.slides[contact.slide or 0] if rides else contact.at(body)}"
+        return self._node(body, self.mechanism.graph.slides[contact.slide or 0] if rides else contact.at(body))
 
-    def _beams(self, name: str) -> list[Edge]:
+    def _beams(self, name: str) -> list[NetworkEdge]:
         """From the beginning of a link's beams to its other points and to what slides on it."""
         link = self.mechanism.description.links[name]
         beams, body = beams_of(link), rod_of(name) if link.telescopic else name
@@ -220,7 +163,7 @@ class _Builder:
         root, *_ = sitting
         section = self.section.elastic[name]
         return [
-            Edge(f"{body}@{root}", f"{body}@{seat}", (Beam(beams, root, point, section),), name, point)
+            NetworkEdge(f"{body}@{root}", f"{body}@{seat}", (Beam(beams, root, point, section),), name, point)
             for seat, point in sitting.items()
             if seat != root
         ]  # fmt: skip
@@ -244,7 +187,7 @@ def _joint_elements(mechanism: Mechanism, contact: Contact, section: StiffnessSe
     return found
 
 
-def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
+def _carrying(edges: list[NetworkEdge], asked: str) -> list[NetworkEdge]:
     """Edges that can carry a load from the asked vertex: what hangs by one edge is taken off, again and again."""
     while True:
         degree = Counter(end for edge in edges for end in (edge.a, edge.b))
@@ -254,9 +197,9 @@ def _carrying(edges: list[Edge], asked: str) -> list[Edge]:
         edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
 
 
-def _pinned(edges: list[Edge], bodies: Bodies) -> list[Edge]:
+def _pinned(edges: list[NetworkEdge], bodies: Bodies) -> list[NetworkEdge]:
     """Massless pins turn with the first link that they join, so that no motion of theirs is open."""
-    found, seen = list[Edge](), set[str]()
+    found, seen = list[NetworkEdge](), set[str]()
     for edge in edges:
         pins = {end for end in (edge.a, edge.b) if bodies.is_pin(end) or (end == ASKED and bodies.link is None)}
         if pins - seen:
@@ -266,7 +209,7 @@ def _pinned(edges: list[Edge], bodies: Bodies) -> list[Edge]:
     return found
 
 
-def _with_idle(edges: Sequence[Edge], paths: Mapping[str, Way]) -> dict[str, Way]:
+def _with_idle(edges: Sequence[NetworkEdge], paths: Mapping[str, Way]) -> dict[str, Way]:
     """Ways to all vertices: to those that carry nothing as to what they hang on."""
     found = dict(paths)
     waiting = list(edges)
@@ -279,7 +222,7 @@ def _with_idle(edges: Sequence[Edge], paths: Mapping[str, Way]) -> dict[str, Way
     return found
 
 
-def _looped(edges: tuple[Edge, ...], asked: str, points: Mapping[str, tuple[tuple[str, str], ...]]) -> Network:
+def _looped(edges: tuple[NetworkEdge, ...], asked: str, points: Mapping[str, tuple[tuple[str, str], ...]]) -> Network:
     """A tree from the ground, as short ways as possible, and a loop for every other edge."""
     paths: dict[str, Way] = {GROUND: ()}
     queue = deque([GROUND])

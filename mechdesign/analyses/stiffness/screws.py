@@ -41,19 +41,10 @@ def screw_product(a: Floats, b: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
-    """A serial leg in n poses.
+class LegScrews:
+    """A serial leg in n poses: twists, shape (3, n), of its free and its elastic joints, and compliances of the latter.
 
-    Parameters
-    ----------
-    passive : sequence of ndarray, shape (3, n)
-        Twists of the free joints.
-    elastic : sequence of ndarray, shape (3, n)
-        Twists of the elastic joints.
-    compliance : sequence of float or ndarray, shape (n,)
-        Of each elastic joint.
-    base, tip : complex ndarray, shape (n,)
-        Places of the first and last joint from the origin.
+    `base` and `tip` are the places of its first and last joint from the origin.
     """
 
     passive: Sequence[Floats]
@@ -62,9 +53,9 @@ class Chain:
     base: Complexes
     tip: Complexes
 
-    def take(self, index: Ints) -> Chain:
+    def take(self, index: Ints) -> LegScrews:
         """Poses by index."""
-        return Chain(
+        return LegScrews(
             [twist[:, index] for twist in self.passive],
             [twist[:, index] for twist in self.elastic],
             [c if np.ndim(c) == 0 else c[index] for c in self.compliance],
@@ -115,7 +106,7 @@ def _one_joint(twist: Floats) -> Floats:
     return np.stack([np.stack([-dy, zero]), np.stack([dx, zero]), np.stack([zero, one])])
 
 
-def constraint_compliance(wrenches: Floats, chain: Chain) -> Floats:
+def constraint_compliance(wrenches: Floats, chain: LegScrews) -> Floats:
     """C_c = W^T C W, shape (m, m, n), as the sum over elastic joints of c (W^T s)(W^T s)^T  [S4, eq. 20]."""
     _, m, n = wrenches.shape
     total = np.zeros((m, m, n))
@@ -143,7 +134,7 @@ class Spring(NamedTuple):
     angle: Floats
 
 
-def equivalent_springs(wrenches: Floats, chain: Chain, length: float) -> list[Spring]:
+def equivalent_springs(wrenches: Floats, chain: LegScrews, length: float) -> list[Spring]:
     """Springs that hold the body as a leg does: one on the line of one wrench, two for two; none for three.
 
     Two wrenches reciprocal to a slide give two parallel springs at +-a along it from the tip, a = sqrt(c11/c22), the
@@ -164,7 +155,7 @@ def equivalent_springs(wrenches: Floats, chain: Chain, length: float) -> list[Sp
     ]
 
 
-def _single(wrench: Floats, chain: Chain, length: float) -> Spring:
+def _single(wrench: Floats, chain: LegScrews, length: float) -> Spring:
     compliance = constraint_compliance(wrench[:, None], chain)[0, 0]
     force = vector(wrench[0], wrench[1])
     size = np.abs(force)
@@ -179,7 +170,7 @@ def _single(wrench: Floats, chain: Chain, length: float) -> Spring:
     )
 
 
-def _parallel_springs(twist: Floats, chain: Chain) -> list[Spring]:
+def _parallel_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
     with np.errstate(divide="ignore", invalid="ignore"):
         along = vector(twist[0], twist[1])
         along = along / np.abs(along)
@@ -209,7 +200,7 @@ def _parallel_springs(twist: Floats, chain: Chain) -> list[Spring]:
     return springs
 
 
-def _pin_springs(twist: Floats, chain: Chain) -> list[Spring]:
+def _pin_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
     with np.errstate(divide="ignore", invalid="ignore"):
         place = vector(-twist[1] / twist[2], twist[0] / twist[2])
         basis = _one_joint(np.stack([place.imag, -place.real, np.ones(place.shape)]))

@@ -35,10 +35,9 @@ class Springs:
     @staticmethod
     def sorted(parts: Sequence[Springs]) -> Springs:
         """All together, by pose and leg."""
-        if not parts:
-            none = np.zeros(0)
-            return Springs(none.astype(np.intp), none.astype(np.intp), none, none.astype(complex), none)
-        whole = Springs(*(np.concatenate(values) for values in zip(*(vars(p).values() for p in parts), strict=True)))
+        none = Springs(*(np.zeros(0, dtype) for dtype in (np.intp, np.intp, float, complex, float)))
+        each = zip(*(vars(part).values() for part in (none, *parts)), strict=True)
+        whole = Springs(*(np.concatenate(values) for values in each))
         return whole.take(np.lexsort((whole.leg, whole.row)))
 
 

@@ -14,7 +14,7 @@ from mechdesign.analyses.region.field import Field, Places
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.jacobians import Jacobian
+from mechdesign.mechanism.derivatives import Jacobian
 from mechdesign.numerics.arrays import Complexes, Floats
 
 if TYPE_CHECKING:

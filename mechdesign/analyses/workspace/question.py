@@ -17,7 +17,7 @@ from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
 from mechdesign.indices import INDEX_NAMES, USUAL, needed_section
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.numerics.minima import dips
+from mechdesign.numerics.roots import dips
 from mechdesign.parallel import keep_freed_memory
 from mechdesign.study import Study
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,27 +13,23 @@ from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 
 PAD = 0.5  # inches around what is drawn, for symbols and names
-LEAST, TALLEST = 1.5, 5.3  # inches, height of a window
+MIN_HEIGHT = 1.5  # inches, of a window
+MAX_HEIGHT = 5.3  # inches
 TITLE = 0.36  # inches above a window for a line of words
-# Inches left of a window and below it, for axis labels, and above and right of it.
-LEFT, BELOW, ABOVE, RIGHT = 0.78, 0.55, 0.12, 0.15
+# Inches beside a window; left and below for axis labels.
+LEFT = 0.78
+BELOW = 0.55
+ABOVE = 0.12
+RIGHT = 0.15
 
 
-@dataclass(frozen=True)
-class Window:
+class Window(NamedTuple):
     """Part of the plane about `middle`; a length is drawn `scale` times as many inches long."""
 
     middle: complex
     scale: float
     width: float
     height: float
-
-    def limit(self, axes: Axes) -> None:
-        """Give axes of this size on paper the window's limits."""
-        half_width, half_height = self.width / 2 / self.scale, self.height / 2 / self.scale
-        axes.set_xlim(self.middle.real - half_width, self.middle.real + half_width)
-        axes.set_ylim(self.middle.imag - half_height, self.middle.imag + half_height)
-        axes.set_aspect("equal")
 
 
 def extent(places: Complexes | Iterable[complex]) -> tuple[complex, float, float]:
@@ -54,7 +50,7 @@ def fit(places: Complexes | Iterable[complex], width: float, height: float, pad:
     """A window `width` inches wide and at most `height` inches high that shows all of the places."""
     middle, wide, tall = extent(places)
     scale = scale_of(wide, tall, width, height, pad)
-    return Window(middle, scale, width, max(scale * tall + 2 * pad, min(LEAST, height)))
+    return Window(middle, scale, width, max(scale * tall + 2 * pad, min(MIN_HEIGHT, height)))
 
 
 def windows(
@@ -68,21 +64,19 @@ def windows(
     top: float = 0.0,
     below: float = BELOW,
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of `count` windows in rows.
+    """A figure of `count` windows in rows; inches between columns, above each window, above all and below all of them.
 
-    Parameters
-    ----------
-    gap : float
-        Inches between columns; with room for it each has an axis label of its own, or else the first one.
-    above, top, below : float
-        Inches above each window, above all of them for titles, and below all of them.
+    Where the gap between columns has room for it each has an axis label of its own, or else the first one.
     """
     rest = style.WIDTH - LEFT - columns * window.width - (columns - 1) * gap
     figure, panels = style.page(
         count, columns, window.height, left=LEFT, right=rest, top=top + above, bottom=below, across=gap, down=above
     )
+    half_width, half_height = window.width / 2 / window.scale, window.height / 2 / window.scale
     for k, axes in enumerate(panels):
-        window.limit(axes)
+        axes.set_xlim(window.middle.real - half_width, window.middle.real + half_width)
+        axes.set_ylim(window.middle.imag - half_height, window.middle.imag + half_height)
+        axes.set_aspect("equal")
         lowest, first = k + columns >= count, k % columns == 0 or gap >= LEFT
         axes.tick_params(labelleft=first, labelbottom=lowest)
         axes.set_xlabel(style.axis_label("x", unit) if lowest else "")

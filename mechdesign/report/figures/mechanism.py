@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.shown import solve_shown
+from mechdesign.analyses.poses import solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
@@ -17,19 +17,21 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, extent, fit, framed, scale_of, windows
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.scene import Scene, pose, travels
-from mechdesign.report.figures.sweep import Sweep
+from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
 from mechdesign.results import Result
 from mechdesign.study import Study
 
-Panel = tuple[str, "Configuration", int]
+Panel = tuple[str, Configuration, int]
 _POSES = 100  # poses from which the range of the motion is taken
-_TITLE, _LINE, _LETTERS = 0.42, 0.18, 11.5  # inches for a title and a further line of it, letters in an inch
-_SAME = 0.02  # part of the mechanism's size by which the points of two poses differ that need not both be drawn
+_TITLE = 0.42  # inches
+_TITLE_LINE = 0.18  # inches, a further line of a title
+_LETTERS_AN_INCH = 11.5
+_MAX_HEIGHT = 4.2  # inches, of a panel
+_MAX_STACKED_HEIGHT = 3.0  # inches, of a panel below another
+_ALIKE = 0.02  # part of the mechanism's size by which the points of two poses differ that need not both be drawn
 _ROUGH = 10.0  # points on paper: a place drawn nearer than this lies under the symbol of its joint
-_TALLEST = 4.2
-_SHORTEST = 0.005  # part of the mechanism's size: nearer to a beam than this, a bracket is too short to be seen
-_BEAMS = 3.3  # order: above links and slots, below pins and names
+_MIN_BRACKET = 0.005  # part of the mechanism's size: nearer to a beam than this, a bracket is too short to be seen
+_BEAM_ORDER = 3.3  # above links and slots, below pins and names
 
 
 def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -> Figure:
@@ -44,7 +46,7 @@ def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -
     try:
         sweep = Sweep.of(result.drawn["motion"] if "motion" in result.drawn else solve_shown(study, _POSES))
     except MechdesignError:
-        return _compose(study, panels, travels(_drawable(scenes)))
+        return _compose(study, panels, travels(scenes))
     some = np.unique(np.linspace(0, len(sweep.rows) - 1, _POSES).round().astype(int)).tolist()
     poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
     first = next((k for k, scene in poses.items() if scene is not None), None)
@@ -55,7 +57,7 @@ def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -
             note = f"{title.removesuffix(' pose')} and {note}"
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
         scenes += poses.values()
-    return _compose(study, panels, travels(_drawable(scenes)))
+    return _compose(study, panels, travels(scenes))
 
 
 def sketch_figure(study: Study) -> Figure:
@@ -81,14 +83,10 @@ def sketch_figure(study: Study) -> Figure:
     return figure
 
 
-def _drawable(scenes: list[Scene | None]) -> list[Scene]:
-    return [scene for scene in scenes if scene is not None]
-
-
 def _same(one: Scene | None, other: Scene | None) -> bool:
     if one is None or other is None:
         return False
-    return all(abs(one.points[name] - other.points[name]) <= _SAME * one.span for name in one.points)
+    return all(abs(one.points[name] - other.points[name]) <= _ALIKE * one.span for name in one.points)
 
 
 def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
@@ -109,8 +107,8 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
 
     columns = count if count == 1 or scale(count) >= 0.55 * scale(1) else 1
     window = fit(places, *_room(columns, count // columns))
-    titles = [textwrap.fill(title, int(window.width * _LETTERS)) for title, _, _ in panels]
-    above = _TITLE + _LINE * max(title.count("\n") for title in titles)
+    titles = [textwrap.fill(title, int(window.width * _LETTERS_AN_INCH)) for title, _, _ in panels]
+    above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
     figure, grid = windows(window, study.units.label("length"), count, columns, above=above)
     for axes, title, (_, configuration, index) in zip(grid, titles, panels, strict=True):
         axes.set_title(title, loc="left")
@@ -121,7 +119,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    return (style.WIDTH - RIGHT - LEFT * columns) / columns, 3.0 if rows > 1 else _TALLEST
+    return (style.WIDTH - RIGHT - LEFT * columns) / columns, _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
 
 
 def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: int = 0) -> None:
@@ -139,7 +137,7 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
             continue
         for kind, ends in lines:
             width, dashes = looks[kind]
-            axes.plot(ends.real, ends.imag, color=style.INK, linewidth=width, linestyle=dashes, zorder=_BEAMS,
+            axes.plot(ends.real, ends.imag, color=style.INK, linewidth=width, linestyle=dashes, zorder=_BEAM_ORDER,
                       label=kind if kind not in told else None)  # fmt: skip
             told.add(kind)
     if told:
@@ -148,7 +146,7 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
 
 def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
     """The beams of a link, all in one line, and its brackets."""
-    from mechdesign.analyses.stiffness.beams import beams_of, course_of
+    from mechdesign.analyses.stiffness.elements import beams_of, course_of
 
     mechanism = study.mechanism
     link = mechanism.description.links[name]
@@ -162,5 +160,5 @@ def _lines(study: Study, name: str, configuration: Configuration, index: int) ->
     for point in (*link.points, *riding):
         place = configuration.point(point)
         ends = np.array([np.ravel(end)[index] for end in (course.place(course.foot(point, place)), place)])
-        if abs(ends[1] - ends[0]) > _SHORTEST * mechanism.size:
+        if abs(ends[1] - ends[0]) > _MIN_BRACKET * mechanism.size:
             yield "rigid bracket", ends

@@ -16,11 +16,15 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 # More of them in one picture cannot be told apart.
-MOST_PANELS = 6
-_LEFT, _RIGHT, _TOP, _APART = 0.88, 0.3, 0.62, 0.42  # inches
-_TALL = 1.75
-# Below the lowest panel: its axis alone, and with a legend of one or two rows.
-BARE, WITH_LEGEND = 0.6, 0.95
+MAX_PANELS = 6
+# Inches.
+_LEFT = 0.88
+_RIGHT = 0.3
+_TOP = 0.62
+_GAP = 0.42
+_HEIGHT = 1.75
+BELOW_BARE = 0.6  # below the lowest panel: its axis alone
+BELOW_WITH_LEGEND = 0.95  # and with a legend of one or two rows
 _LETTER = 0.56  # mean width of a letter in font sizes
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
@@ -68,13 +72,11 @@ def title(figure: Figure, text: str, note: str = "", left: float = _LEFT) -> Non
 
 
 def stack(
-    panels: int, heading: str, label: str, *, note: str = "", tall: float = _TALL, bottom: float = WITH_LEGEND
+    panels: int, heading: str, label: str, *, note: str = "", tall: float = _HEIGHT, bottom: float = BELOW_WITH_LEGEND
 ) -> tuple[Figure, list[Axes]]:
     """Panels one below the other over one labelled axis, with this much room (inches) below for a legend."""
     top = _TOP + 0.1 * bool(note)
-    figure, axes = style.page(
-        panels, 1, tall, left=_LEFT, right=_RIGHT, top=top, bottom=bottom, down=_APART, sharex=True
-    )
+    figure, axes = style.page(panels, 1, tall, left=_LEFT, right=_RIGHT, top=top, bottom=bottom, down=_GAP, sharex=True)
     title(figure, heading, note)
     for axis in axes:
         # Given places: to find them from the tick labels would take as long as the rest of the picture.
@@ -88,7 +90,7 @@ def stack(
 
 
 def tick_abscissa(axis: Axes, swept: Along) -> None:
-    """Places for the ticks of a sweep: degrees of much of a turn are told in parts of a turn."""
+    """Places for the ticks of a sweep: over much of a turn its parts, such as 30 or 45 degrees."""
     turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
     axis.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=TURNS if turning else [1, 2, 2.5, 5, 10]))
 

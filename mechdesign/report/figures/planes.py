@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,56 +16,37 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import coordinate_label, moving_names, title
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.poses import PoseSection
 
 Extend = Literal["neither", "min", "max", "both"]
 
-# Rays that differ in direction by less than this (radians) are the end of one patch and the begin of another.
-_SAME = 1e-6
-# Rays shorter than this share of the longest one are points.
-_POINT = 1e-9
-_LEFT, _BELOW, _BAR, _TOP, _GAP = 0.75, 0.55, 1.1, 0.7, 0.5  # inches
-_TALLEST = 5.2
+# Inches.
+_LEFT = 0.75
+_BELOW = 0.55
+_BAR = 1.1
+_TOP = 0.7
+_GAP = 0.5
+_MAX_HEIGHT = 5.2
 
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Poses in the plane of the two coordinates that vary, shape (lines, nodes)."""
+    """Poses in the plane of the two coordinates that vary, shape (lines, nodes), and the lines that are joined."""
 
     names: tuple[str, str]
     x: Floats
     y: Floats
     equal: bool
-    rays: bool
-
-    def patches(self) -> Iterator[slice]:
-        """Lines that belong together: rays of a workspace turn on within a patch, and stay or turn back to the next."""
-        cuts = np.zeros(0, dtype=int)
-        if self.rays:
-            ray = (self.x[:, -1] - self.x[:, 0]) + 1j * (self.y[:, -1] - self.y[:, 0])
-            # Where a patch ends in a tip its ray is a point, without a direction.
-            long = np.flatnonzero(np.abs(ray) > _POINT * np.abs(ray).max())
-            here, there = long[:-1], long[1:]
-            cuts = ((here + there + 2) // 2)[np.angle(ray[there] / ray[here]) < _SAME]
-        for begin, end in zip([0, *cuts], [*cuts, len(self.x)], strict=True):
-            if end - begin > 1:
-                yield slice(int(begin), int(end))
+    patches: tuple[slice, ...]
 
 
-def plane(study: Study, poses: Poses, section: PoseSection | None) -> Plane | None:
-    """The plane of a grid over two coordinates; None for every other choice of poses.
-
-    Parameters
-    ----------
-    section : PoseSection or None
-        What gives the poses: the nodes of a workspace are told by it.
-    """
+def plane(study: Study, poses: Poses) -> Plane | None:
+    """The plane of a grid over two coordinates; None for every other choice of poses."""
     names = moving_names(poses)
     if poses.listed or len(poses.grid) != 2 or len(names) != 2 or min(poses.grid) < 3:
         return None
     x, y = (poses.values[name].reshape(poses.grid) for name in names)
     quantities = {study.mechanism.quantity(name) for name in names}
-    return Plane((names[0], names[1]), x, y, quantities == {"length"}, section is not None and section.at_nodes)
+    return Plane((names[0], names[1]), x, y, quantities == {"length"}, poses.patches or (slice(None),))
 
 
 def map_sheet(
@@ -77,7 +57,7 @@ def map_sheet(
     lines = -(-len(parts) // columns)
     wide = (style.WIDTH - 0.1) / columns - _LEFT - _BAR
     spans = np.ptp(over.x[np.isfinite(over.x)]), np.ptp(over.y[np.isfinite(over.y)])
-    tall = min(_TALLEST / lines, wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
+    tall = min(_MAX_HEIGHT / lines, wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
     tall = max(tall, 1.2)
     figure, grid = style.page(
         len(parts), columns, tall, left=_LEFT, right=_BAR + 0.1, top=_TOP, bottom=_BELOW, across=_LEFT + _BAR,
@@ -112,12 +92,11 @@ def _map(figure: Figure, axes: Axes, bar: Axes, over: Plane, values: Floats, log
     ends = bool(shown.min() < levels[0]), bool(shown.max() > levels[-1])
     extend: Extend = "both" if all(ends) else "min" if ends[0] else "max" if ends[1] else "neither"
     norm = BoundaryNorm(levels, 256, extend=extend)
-    for patch in over.patches():
+    for patch in over.patches:
         axes.contourf(over.x[patch], over.y[patch], shown[patch], levels=levels, cmap=style.COLORMAP, norm=norm,
                       extend=extend)  # fmt: skip
         axes.contour(over.x[patch], over.y[patch], shown[patch], levels=levels, colors="white", linewidths=0.5,
-                     linestyles="solid",
-                     alpha=0.7)  # fmt: skip
+                     linestyles="solid", alpha=0.7)  # fmt: skip
         if over.equal:
             for end in (0, -1):
                 axes.plot(over.x[patch, end], over.y[patch, end], color=style.INK, linewidth=1.2)

@@ -1,4 +1,4 @@
-"""A mechanism in one pose as places and directions in the plane: what a drawing needs to know."""
+"""A mechanism in one pose as places and directions in the plane, and along a motion: what a drawing needs to know."""
 
 from __future__ import annotations
 
@@ -7,15 +7,22 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from mechdesign.analyses.poses import Shown, pose_in_words
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Link, Slot
+from mechdesign.numerics.arrays import Complexes, Ints
+from mechdesign.report.figures.framing import extent
 
-GROUND = "ground"
+_TRAVEL_POSES = 100  # poses from which the travel of the slides is taken
+# Two poses are one where no point is farther apart than this part of the mechanism's size.
+_SAME_POSE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -44,16 +51,9 @@ class Guide:
 
 @dataclass(frozen=True)
 class Scene:
-    """One pose of a mechanism.
+    """One pose of a mechanism: places of the points, unit vectors of the links' x axes, lines of the slides.
 
-    Parameters
-    ----------
-    points : mapping of str to complex
-        World place of every named point.
-    rotations : mapping of str to complex
-        Unit vector of every link's x axis.
-    span : float
-        Width or height of the sketch pose, the larger: what guides are drawn longer by must not change with the pose.
+    `span` is the width or height of the sketch pose, the larger: guides must not change their length with the pose.
     """
 
     description: Description
@@ -128,10 +128,10 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
     return Scene(description, points, rotations, tuple(guides), span)
 
 
-def travels(scenes: Sequence[Scene]) -> dict[str, tuple[float, float]]:
-    """Range of each slide over several poses."""
+def travels(scenes: Sequence[Scene | None]) -> dict[str, tuple[float, float]]:
+    """Range of each slide over those of several poses that can be assembled."""
     ranges: dict[str, tuple[float, float]] = {}
-    for scene in scenes:
+    for scene in filter(None, scenes):
         for guide in scene.guides:
             low, high = ranges.get(guide.joint, (math.inf, -math.inf))
             ranges[guide.joint] = min(low, guide.travel), max(high, guide.travel)
@@ -158,3 +158,100 @@ def hull(places: Sequence[complex]) -> list[complex]:
 
 def _area(a: complex, b: complex, c: complex) -> float:
     return ((b - a).conjugate() * (c - a)).imag
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep(Shown):
+    """The poses of a motion that a result carries, in their order, with paths of points and travel of slides."""
+
+    @classmethod
+    def of(cls, shown: Shown) -> Sweep:
+        """What a result carries."""
+        return cls(shown.study, shown.poses, shown.rows, shown.configuration)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism that moves."""
+        return self.study.mechanism
+
+    @cached_property
+    def valid(self) -> Ints:
+        """Indices of the valid poses."""
+        return np.flatnonzero(self.configuration.valid)
+
+    @cached_property
+    def places(self) -> dict[str, Complexes]:
+        """Path of every moving point, nan where a pose is not valid."""
+        still = link_points(self.mechanism.description.links[GROUND])
+        valid = self.configuration.valid
+        return {
+            point: np.where(valid, self.configuration.point(point), complex(np.nan, np.nan))
+            for point in self.mechanism.points
+            if point not in still
+        }
+
+    @cached_property
+    def travel(self) -> dict[str, tuple[float, float]]:
+        """Range of each slide."""
+        some = self.valid[np.unique(np.linspace(0, len(self.valid) - 1, _TRAVEL_POSES).astype(int))]
+        return travels([pose(self.mechanism, self.configuration, int(index)) for index in some])
+
+    @cached_property
+    def extent(self) -> Complexes:
+        """Everything the motion reaches: points, their paths and the ends of guides."""
+        mechanism, configuration = self.mechanism, self.configuration
+        ground = [configuration.point(point)[:1] for point in link_points(mechanism.description.links[GROUND])]
+        reached = [np.empty(0, dtype=complex), *ground, *self.places.values()]
+        for index in self.valid[[0, -1]] if len(self.valid) else ():
+            scene = pose(mechanism, configuration, int(index))
+            if scene is not None:
+                reached += [np.array(guide.ends(self.travel, scene.span)) for guide in scene.guides]
+        return np.concatenate(reached)
+
+    @property
+    def returns(self) -> bool:
+        """Whether the first and the last pose are one."""
+        if self.poses.closed:
+            return True
+        _, wide, tall = extent(self.extent)
+        return all(abs(path[-1] - path[0]) <= _SAME_POSE * max(wide, tall) for path in self.places.values())
+
+    @property
+    def closed(self) -> bool:
+        """Whether the motion ends where it began, every pose valid."""
+        return len(self.valid) == len(self.rows) and self.returns
+
+    def words(self, index: int) -> str:
+        """``crank = 60 deg`` for one pose; a line may be broken between coordinates only."""
+        words = pose_in_words(self.study, self.poses, int(self.rows[index]), digits=4)
+        return words.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
+
+
+def ranks(mechanism: Mechanism, outputs: tuple[str, ...] = ()) -> dict[str, int]:
+    """How boldly the path of each moving point is drawn.
+
+    2 for points that are asked for and points of one link only (a coupler point, a tool), 1 for joints between moving
+    links, 0 for points that turn about a pivot of the ground or slide along a line of it.
+    """
+    links = mechanism.description.links
+    ground = set(link_points(links[GROUND]))
+    uses = Counter(point for link in links.values() for point in link_points(link))
+    simple = {
+        joint.point
+        for joint in mechanism.description.joints.values()
+        if not isinstance(joint, Fixed) and joint.line.link == GROUND
+    }
+    for name, link in links.items():
+        points = link_points(link)
+        if name != GROUND and not link.telescopic and ground & set(points):
+            simple |= set(points)
+    asked = {name.split(".")[0] for name in outputs}
+    found = {}
+    for point in mechanism.points:
+        if point in ground:
+            continue
+        if point in asked or (uses[point] == 1 and point not in simple):
+            found[point] = 2
+        else:
+            found[point] = 0 if point in simple else 1
+    return found

@@ -20,8 +20,8 @@ from mechdesign.report.figures.style import INK
 
 BAR = 8.0  # width of a link, points
 PIN = 3.6  # radius of a joint
-GROUND = 13.0  # height of the ground symbol
-BLOCK = (22.0, 13.0)
+GROUND_HEIGHT = 13.0  # height of the ground symbol
+SLIDER_SIZE = (22.0, 13.0)  # points, along its guide and across
 ARC = 25.0  # radius of an angle drive's arrow
 _STEEL = "#777777"
 Color = str | tuple[float, float, float]
@@ -123,7 +123,7 @@ class Pen:
 
     def pivot(self, place: complex) -> None:
         """The ground symbol under a pivot: triangle and hatch."""
-        foot = -GROUND + 3
+        foot = -GROUND_HEIGHT + 3
         triangle = Path([(0, 0), (-8, foot), (8, foot), (0, 0)], closed=True)
         self._symbol(triangle, self._at(place), 0.0, facecolor="#EEEEEE", edgecolor=INK, lw=1.2)
         vertices: list[tuple[float, float]] = [(-12, foot), (12, foot)]
@@ -140,7 +140,7 @@ class Pen:
         down = rail_side(along)
         figure = self.axes.get_figure(root=True)
         assert figure is not None
-        shift = down * (BLOCK[1] / 2 + 1.2) * self.size / 72
+        shift = down * (SLIDER_SIZE[1] / 2 + 1.2) * self.size / 72
         offset = self.axes.transData + ScaledTranslation(shift.real, shift.imag, figure.dpi_scale_trans)
         # Ticks stand to the left of the path's direction: run so that this is away from the slider.
         first, last = (start, end) if (1j * along * down.conjugate()).real > 0 else (end, start)
@@ -149,7 +149,7 @@ class Pen:
 
     def block(self, place: complex, direction: complex, color: str) -> None:
         """A slider on its guide."""
-        half, high = BLOCK[0] / 2, BLOCK[1] / 2
+        half, high = SLIDER_SIZE[0] / 2, SLIDER_SIZE[1] / 2
         corners = [(-half, -high), (half, -high), (half, high), (-half, high), (-half, -high)]
         where = self._at(place, math.atan2(direction.imag, direction.real))
         self._symbol(Path(corners, closed=True), where, 0.2, facecolor=lighter(color), edgecolor=color, lw=1.4)

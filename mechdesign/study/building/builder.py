@@ -191,20 +191,18 @@ class Builder:
         if drawn is None:
             return {}
         places = drawn[len(known) :]
-        if not ends and not free:
-            return dict(zip(measured, places, strict=True))
+        start, turn, centre = 0j, 1 + 0j, 0j
         if free and given:
             local = [complex(x.nominal, y.nominal) for x, y in given.values()]
-            turn = rotation(local, drawn[: len(local)])
-            centre, drawn_centre = sum(local) / len(local), sum(drawn[: len(local)]) / len(local)
-            return {point: (at - drawn_centre) / turn + centre for point, at in zip(measured, places, strict=True)}
-        if drawn[0] == drawn[1]:
-            first, second = [*known, *measured][:2]
-            self.report(path, f"{first!r} and {second!r} are at one place in the sketch: no x axis")
-            return {}
-        turn = (drawn[1] - drawn[0]) / abs(drawn[1] - drawn[0])
-        found = {point: (at - drawn[0]) / turn for point, at in zip(measured, places, strict=True)}
-        if not ends:
+            start, turn, centre = sum(drawn[: len(local)]) / len(local), rotation(local, drawn), sum(local) / len(local)
+        elif free or ends:
+            if drawn[0] == drawn[1]:
+                first, second = [*known, *measured][:2]
+                self.report(path, f"{first!r} and {second!r} are at one place in the sketch: no x axis")
+                return {}
+            start, turn = drawn[0], (drawn[1] - drawn[0]) / abs(drawn[1] - drawn[0])
+        found = {point: (at - start) / turn + centre for point, at in zip(measured, places, strict=True)}
+        if free and not given:
             # Rounding leaves the second point off its own axis.
             found[measured[1]] = complex(found[measured[1]].real, 0.0)
         return found
@@ -234,7 +232,8 @@ class Builder:
 
 
 def rotation(local: list[complex], drawn: list[complex]) -> complex:
-    """Unit complex number that turns local vectors best onto the drawn ones (least squares)."""
+    """Unit complex number that turns local vectors best onto the first of the drawn ones (least squares)."""
+    drawn = drawn[: len(local)]
     centre, drawn_centre = sum(local) / len(local), sum(drawn) / len(drawn)
     fit = sum(((b - drawn_centre) * (a - centre).conjugate() for a, b in zip(local, drawn, strict=True)), 0j)
     return fit / abs(fit) if abs(fit) > 0 and math.isfinite(abs(fit)) else 1 + 0j

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
@@ -26,16 +26,28 @@ class Parameters:
     # Places that the study leaves out and that are so measured from its sketch.
     measured: frozenset[str] = frozenset()
 
+    def moved(self, names: Collection[str]) -> set[str]:
+        """Those of the names that are parameters, and the parameters that follow from them."""
+        found = {name for name in names if name in self.nominal}
+        for name, formula in self.formulas.items():
+            if formula.names & found:
+                found.add(name)
+        return found
+
+    def moved_places(self, names: Collection[str]) -> set[str]:
+        """Places that are among the names, or follow from one of them."""
+        parameters = self.moved(names)
+        followers = {place for place, formula in self.dependent.items() if formula.names & parameters}
+        return {*followers, *(name for name in names if name in self.factors)}
+
     def values(self, changed: Mapping[str, ArrayLike]) -> dict[str, Number]:
         """All parameters where some have other values; those that depend on them follow."""
         env: dict[str, Number] = dict(self.nominal)
-        moved = {name for name in changed if name in env}
-        for name in moved:
-            env[name] = _number(changed[name])
+        moved = self.moved(changed)
+        env |= {name: _number(changed[name]) for name in moved if name in changed}
         for name, formula in self.formulas.items():
-            if name not in changed and formula.names & moved:
+            if name in moved and name not in changed:
                 env[name] = formula.evaluate(env)
-                moved.add(name)
         return env
 
     def places(self, changed: Mapping[str, ArrayLike]) -> dict[str, Number]:
@@ -59,18 +71,13 @@ class Parameters:
         for name in changed:
             if name not in self.nominal and name not in self.factors:
                 raise KeyError(name)
-        env = self.values(changed)
-        moved = {name for name in env if env[name] is not self.nominal[name]}
-        result: dict[str, Number] = {
-            place: formula.evaluate(env) * self.factors[place]
-            for place, formula in self.dependent.items()
-            if formula.names & moved
-        }
+        env, moved = self.values(changed), self.moved_places(changed)
         # A place that is set by itself varies alone, whatever gives its nominal value.
-        for name in changed:
-            if name in self.factors:
-                result[name] = _number(changed[name]) * self.factors[name]
-        return result
+        return {
+            place: (_number(changed[place]) if place in changed else self.dependent[place].evaluate(env)) * factor
+            for place, factor in self.factors.items()
+            if place in moved
+        }
 
     def derivatives(self, name: str) -> dict[str, float]:
         """Derivative of every place that depends on a parameter (or is the place `name`), at the nominal values.

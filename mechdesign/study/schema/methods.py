@@ -8,64 +8,28 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Method:
-    """A way to errors and probabilities of failure.
+    """A way to errors and probabilities of failure."""
 
-    Parameters
-    ----------
-    name : str
-        In studies and tables.
-    words : str
-        In pictures.
-    meaning : str
-        What it computes, in a line.
-    accuracy : int
-        The higher, the nearer to the truth: where there is room for one method only, it is the one that stands.
-    color : str
-        A colour of `mechdesign.report.figures.style`; vermilion is left to limits.
-    marker : str
-        Matplotlib's, of values.
-    dashes : str
-        Of the line through computed values; values of made mechanisms have none, but whiskers.
-    sampled : bool
-        Whether made mechanisms are solved at random.
-    errors : bool
-        Whether their errors are drawn as they are made, so that moments, densities and whole cycles follow.
-    precise : bool
-        Whether it ends where the precision asked is reached.
-    step : int
-        Its place among the steps of `auto` (`rung` of its module), which begins with plain samples; 0: none.
-    module : str
-        Where its ``run(task)`` is; imported when it is asked, for a study is read without numerics.
-    """
-
-    name: str
-    words: str
-    meaning: str
-    accuracy: int = 0
-    color: str = "YELLOW"
-    marker: str = "h"
-    dashes: Literal["-", "--", ":", "-."] = "-."
-    sampled: bool = False
-    errors: bool = False
-    precise: bool = False
-    step: int = 0
-    module: str = ""
+    name: str  # in studies and tables
+    words: str  # in pictures
+    meaning: str  # what it computes, in a line
+    accuracy: int = 0  # where there is room for one method only, it is that of the highest
+    color: str = "YELLOW"  # of `mechdesign.report.figures.style`; vermilion is left to limits
+    marker: str = "h"  # Matplotlib's, of values
+    dashes: Literal["-", "--", ":", "-."] = "-."  # of computed values; those of made mechanisms have whiskers instead
+    sampled: bool = False  # whether made mechanisms are solved at random
+    errors: bool = False  # whether their errors are drawn as they are made: moments, densities, whole cycles follow
+    precise: bool = False  # whether it ends where the precision asked is reached
+    step: int = 0  # place among the steps of `auto` (`rung` of its module), which begins with plain samples; 0: none
+    module: str = ""  # that of its ``run(task)``, imported when it is asked; by default the one of its name
 
     @property
     def place(self) -> str:
-        """The module."""
+        """The module of its ``run(task)``."""
         return self.module or f"mechdesign.analyses.reliability.methods.{self.name}"
 
 
-METHODS: dict[str, Method] = {}
-
-
-def register(method: Method) -> None:
-    """Make a method known to studies, analyses and pictures."""
-    METHODS[method.name] = method
-
-
-for _method in (
+_METHODS = (
     Method("analytic", "first order", "first-order errors, normal", 1, "BLUE", "D", "-"),
     Method("second_order", "second order", "second-order errors, normal about the shifted mean", 3, "SKY", "s", "--"),
     Method("monte_carlo", "Monte Carlo", "made mechanisms, drawn at random", 4, "INK", "o", sampled=True, errors=True),
@@ -82,5 +46,5 @@ for _method in (
         "auto", "auto", "the cheapest of these that reaches the precision asked", 7, "ORANGE", "*",
         sampled=True, errors=True, precise=True,
     ),
-):  # fmt: skip
-    register(_method)
+)  # fmt: skip
+METHODS = {method.name: method for method in _METHODS}

@@ -26,7 +26,7 @@ _UNASSUMED = ("reliability", "stiffness")
 class Variable(fields.Model):
     """A design variable; its bounds are expressions over parameters and the variables above it.
 
-    The step is that of a grid, and of the sensitivities told with an optimum.
+    The step is that of a grid, and of the sensitivities reported with an optimum.
     """
 
     from_: fields.Bound = Field(alias="from")
@@ -76,7 +76,7 @@ class Condition(Judged):
 def _weight_row(raw: Any, info: ValidationInfo) -> Any:
     """Bring ``{GII: 1, SUI: 1}`` to a list in the order maximize then minimize; say what is wrong with a row."""
     if "maximize" not in info.data or "minimize" not in info.data:
-        # What is wrong with the goals is told; their weights cannot be judged.
+        # What is wrong with the goals is reported; their weights cannot be judged.
         return ()
     goals = [goal.name for goal in info.data["maximize"] + info.data["minimize"]]
     if isinstance(raw, Mapping):

@@ -20,10 +20,11 @@ from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import FILES, Context, failure, read_number, read_rows
 
-# Number of poses where a study does not say it: a circle in steps of 5 deg, and both ends of a line or an arc.
-ROUND, STRAIGHT = 72, 51
+# Numbers of poses where a study does not say them: of a circle (in steps of 5 deg); of a line or an arc, both ends too.
+CIRCLE_POSES = 72
+LINE_POSES = 51
 # Pieces of a spline between two of its points whose lengths are added up.
-PIECES = 64
+SPLINE_PIECES = 64
 _ROWS = {"type": ["array", "string", "number"]}
 
 Speed = Annotated[
@@ -87,6 +88,7 @@ class PathSection(fields.Model):
     """What one coordinate or point passes; a list, a CSV file's name or a number alone are short forms."""
 
     short = (_ROWS,)
+    one_of = ("a path is one of through, file, circle, arc, line", "through", "file", "circle", "arc", "line")
     through: Annotated[tuple[tuple[float, ...], ...], fields.Read(_through, _ROWS)] | None = None
     file: str | None = None
     circle: Circle | None = None
@@ -95,7 +97,8 @@ class PathSection(fields.Model):
         Annotated[tuple[Point, Point], fields.pair_of("a line from [x, y] to [x, y], as a list of the two")] | None
     ) = None
     points: Annotated[int, fields.whole(2, 10_000_000)] | None = Field(
-        None, description=f"number of poses, evenly spaced: {ROUND} on a circle, else {STRAIGHT}, where left out"
+        None,
+        description=f"number of poses, evenly spaced: {CIRCLE_POSES} on a circle, else {LINE_POSES}, where left out",
     )
     spline: bool = Field(
         False, description="whether a smooth curve (a cubic spline) is laid through the points, closed where they are"
@@ -114,13 +117,9 @@ class PathSection(fields.Model):
         return raw if isinstance(raw, dict | PathSection) else {"through": raw}
 
     @model_validator(mode="after")
-    def _one(self) -> PathSection:
-        shapes = ("through", "file", "circle", "arc", "line")
-        given = self.given(*shapes)
-        if len(given) != 1:
-            raise failure(f"a path is one of {', '.join(shapes)}, not {' and '.join(given) or 'none of them'}")
+    def _fitting(self) -> PathSection:
         if self.spline and self.shape:
-            raise failure(f"{given[0]!r} is smooth already: 'spline' is for a list of points")
+            raise failure(f"{self.shape!r} is smooth already: 'spline' is for a list of points")
         if self.points is not None and not self.shape and not self.spline:
             raise failure(
                 "a list of points has its own number; 'points' goes with a spline, a circle, an arc or a line"
@@ -129,7 +128,7 @@ class PathSection(fields.Model):
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class PointPath:
     """The path of a point; all arrays have the shape (poses,)."""
 
     places: Complexes  # x + i y
@@ -139,7 +138,7 @@ class Course:
     closed: bool = False  # whether the path goes on from its last place to its first
 
 
-def course(name: str, given: PathSection, folder: pathlib.Path) -> Course | Floats:
+def course(name: str, given: PathSection, folder: pathlib.Path) -> PointPath | Floats:
     """The path of a point, or the values of a coordinate.
 
     Raises
@@ -148,14 +147,14 @@ def course(name: str, given: PathSection, folder: pathlib.Path) -> Course | Floa
         Where a file cannot be read, or what is listed is no such path.
     """
     if given.circle is not None:
-        return _round(given.circle, given.points or ROUND, closed=True)
+        return _round(given.circle, given.points or CIRCLE_POSES, closed=True)
     if given.arc is not None:
-        return _round(given.arc, given.points or STRAIGHT, closed=False)
+        return _round(given.arc, given.points or LINE_POSES, closed=False)
     if given.line is not None:
         start, stop = (complex(*place) for place in given.line)
         if start == stop:
             raise StudyError(f"path: the line of {name!r} needs two different places")
-        return polyline(np.linspace(start, stop, given.points or STRAIGHT, dtype=np.complex128))
+        return polyline(np.linspace(start, stop, given.points or LINE_POSES, dtype=np.complex128))
     point = "." not in name
     table = read_table(folder / given.file) if given.file is not None else np.array(given.through, dtype=float)
     if point and table.shape[1] == 2:
@@ -170,16 +169,16 @@ def course(name: str, given: PathSection, folder: pathlib.Path) -> Course | Floa
     raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
 
 
-def _round(given: Circle | Arc, count: int, *, closed: bool) -> Course:
+def _round(given: Circle | Arc, count: int, *, closed: bool) -> PointPath:
     angles = np.linspace(given.from_, given.to, count, endpoint=not closed)
     forward = complex(0.0, math.copysign(1.0, given.to - given.from_))
     outward = np.exp(1j * angles).astype(np.complex128)
     way = given.radius * np.abs(angles - angles[0])
     places = complex(*given.center) + given.radius * outward
-    return Course(places, way, forward * outward, outward / -given.radius, closed)
+    return PointPath(places, way, forward * outward, outward / -given.radius, closed)
 
 
-def polyline(places: Complexes) -> Course:
+def polyline(places: Complexes) -> PointPath:
     """Straight segments; a corner has the direction of the segment that begins there, directions nan for one place."""
     steps = np.diff(places)
     lengths = np.abs(steps)
@@ -192,17 +191,17 @@ def polyline(places: Complexes) -> Course:
         after = np.searchsorted(moving, np.arange(len(places)))
         last = 0 if places[0] == places[-1] else len(moving) - 1
         directions = units[np.where(after < len(moving), after, last)]
-    return Course(places, way, directions, np.zeros(len(places), dtype=complex))
+    return PointPath(places, way, directions, np.zeros(len(places), dtype=complex))
 
 
-def spline(places: Complexes, points: int | None) -> Course:
+def spline(places: Complexes, points: int | None) -> PointPath:
     """A cubic spline by the length of the chords through three places or more, periodic where the first is the last."""
     from scipy.interpolate import CubicSpline
 
     knots = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(places)))])
     # The curve as complex numbers, for a spline is linear in its values.
     curve: Any = CubicSpline(knots, places, bc_type="periodic" if places[0] == places[-1] else "not-a-knot")
-    fine = np.unique(np.concatenate([np.linspace(a, b, PIECES + 1) for a, b in pairwise(knots)]))
+    fine = np.unique(np.concatenate([np.linspace(a, b, SPLINE_PIECES + 1) for a, b in pairwise(knots)]))
     nodes, weights = np.polynomial.legendre.leggauss(4)
     middle, half = (fine[1:] + fine[:-1]) / 2, np.diff(fine) / 2
     speeds = np.abs(curve(middle[:, None] + half[:, None] * nodes, 1))
@@ -212,7 +211,7 @@ def spline(places: Complexes, points: int | None) -> Course:
     speed = np.abs(first)
     unit = first / speed
     across = second - (second * np.conj(unit)).real * unit
-    return Course(places if points is None else curve(x), np.interp(x, fine, length), unit, across / speed**2)
+    return PointPath(places if points is None else curve(x), np.interp(x, fine, length), unit, across / speed**2)
 
 
 def read_table(file: pathlib.Path, most: int = 2) -> Floats:

@@ -1,4 +1,4 @@
-"""Poses of a question as the study file gives them: a list, a sweep, or a path; and rates at them."""
+"""Poses and rates as the study file gives them: a list, a sweep, a path; and the kinematics section, which has both."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
             if of_given:
                 message = f"{name!r} is not among what the poses give: {key} are those of {', '.join(sorted(one))}"
             elif one and not one <= set(drives):
-                message += f", or of all that the poses give, {', '.join(sorted(one))}"
+                message += f", or of all coordinates that the poses give, {', '.join(sorted(one))}"
             elif len(given) > 1:
                 message += " where poses give different coordinates"
             checker.report((section.command, key, name), message, at_key=True)
@@ -188,3 +188,39 @@ def _sets(checker: Checker, section: PoseSection) -> list[set[str]]:
     if section.poses:
         given = list(dict.fromkeys(frozenset(pose) for pose in section.poses))
     return [{part for name in names for part in checker.mechanism.coordinates_of(name)} for names in given]
+
+
+class Load(fields.Model):
+    """A force at a point, or a moment on a link."""
+
+    at: fields.PointName | None = None
+    force: tuple[fields.Force, fields.Force] | None = None
+    link: fields.LinkName | None = None
+    moment: fields.Moment | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Load:
+        if (self.at is None) != (self.force is None) or (self.moment is not None and self.link is None):
+            raise failure("a load is {at: point, force: [fx, fy]} or {link: name, moment: m}")
+        if self.force is None and self.moment is None:
+            raise failure("a load needs a force or a moment")
+        return self
+
+
+class KinematicsSection(MotionSection):
+    """How does it move?"""
+
+    command: ClassVar[str] = "kinematics"
+    loads: tuple[Load, ...] = ()
+    characteristic_length: fields.PositiveLength | None = None
+
+    def checked(self, checker: Checker) -> Self:
+        """Check the outputs as well, and what loads act on."""
+        checker.outputs(self.outputs, ("kinematics", "outputs"))
+        for index, load in enumerate(self.loads):
+            path: KeyPath = ("kinematics", "loads", index)
+            if load.at is not None:
+                checker.known(load.at, checker.mechanism.owners, "point", (*path, "at"))
+            if load.link is not None:
+                checker.known(load.link, checker.mechanism.moving, "moving link", (*path, "link"))
+        return super().checked(checker)

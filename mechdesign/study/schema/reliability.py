@@ -319,11 +319,6 @@ def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str,
     return found
 
 
-def _carrier(links: list[str], meant: str | None) -> str:
-    """The link that a pin moves in where the study does not say: the last one of those that are not meant."""
-    return ([link for link in links if link != meant] or links)[-1]
-
-
 def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension]) -> tuple[float, ...] | None:
     """The load as fx, fy, mz."""
     path: KeyPath = ("reliability", "load")
@@ -370,7 +365,8 @@ def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | 
     held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
     if len(held) < 2:
         report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
-    link = clearance.link or _carrier(links, meant)
+    # Where the study does not say, the pin moves in the last link that no output or limit means.
+    link = clearance.link or ([link for link in links if link != meant] or links)[-1]
     if link not in links:
         checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
     elif clearance.effect == "length":

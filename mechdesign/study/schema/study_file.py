@@ -1,18 +1,23 @@
-"""The whole study file: its sections and its JSON Schema."""
+"""The whole study file: its sections, its JSON Schema, and overrides of its entries (``--set a.b.c=value``)."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from pydantic import Field
 
+from mechdesign.errors import Problem, StudyError, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
-from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.poses import KinematicsSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text import fields
+from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, read
+from mechdesign.study.text.reporter import LIST_FORM, schema_fields
 
 
 class StudyFile(fields.Model):
@@ -35,3 +40,101 @@ def schema() -> dict[str, Any]:
     found = StudyFile.model_json_schema(by_alias=True, mode="validation")
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "mechdesign study"}
     return head | {key: value for key, value in found.items() if key not in head}
+
+
+# Longest dotted name of an override, in characters.
+MAX_NAME = 1000
+_INDEX = re.compile(r"[0-9]{1,9}")
+
+
+def override(document: Document, overrides: Sequence[str]) -> None:
+    """Apply overrides ``a.b.c=value`` to a document in their order.
+
+    Raises
+    ------
+    StudyError
+        Where one cannot be read or has no place to go.
+    """
+    for text in overrides:
+        _apply(document, text)
+
+
+def _apply(document: Document, text: str) -> None:
+    label = f"--set {text if len(text) <= 60 else text[:57] + '...'}"
+    name, separator, value = text.partition("=")
+    segments = name.strip().split(".")
+    if not separator or not all(segments):
+        raise StudyError([Problem("an override is <dotted name>=<value>", file=label)])
+    if len(name) > MAX_NAME:
+        raise StudyError([Problem(f"a name longer than {MAX_NAME} characters", file=label)])
+    # Bytes that the terminal could not decode are reported as not UTF-8, as they would be in a file.
+    parsed = read(value.encode(errors="surrogateescape"), label) if value.strip() else Document(label, None)
+    if parsed.problems:
+        raise StudyError(parsed.problems)
+    if not isinstance(document.data, dict):
+        return
+    holder, path = _descend(document, segments, label, making=parsed.data is not None)
+    key: Any = path[-1]
+    there = has(holder, key)
+    if isinstance(holder, dict) and parsed.data is None:
+        # Nothing takes the entry away: `--set kinematics.sweep=` makes room for other poses.
+        if not there and key not in schema_fields(StudyFile, path[:-1]):
+            raise StudyError([Problem(f"there is no {dotted(path)} to take away{suggestion(key, holder)}", file=label)])
+        holder.pop(key, None)
+    elif isinstance(holder, list) and not there:
+        holder.append(parsed.data)
+    else:
+        holder[key] = parsed.data
+    mark = Mark(label)
+    for known in (document.keys, document.values):
+        for old in [place for place in known if place[: len(path)] == path]:
+            del known[old]
+    document.keys[path] = document.values[path] = mark
+    document.spoiled = {place for place in document.spoiled if place[: len(path)] != path}
+    if not there:
+        document.added.add(path)
+
+
+def _descend(document: Document, segments: list[str], label: str, *, making: bool) -> tuple[Any, KeyPath]:
+    """Find the mapping or list to change and the path of the entry; mappings on the way are made where wanted."""
+    data: Any = document.data
+    path: list[str | int] = []
+    rest = list(segments)
+    while True:
+        segment, rest = _next_key(data, path, rest, label)
+        path.append(segment)
+        key: Any = segment
+        if not rest:
+            return data, tuple(path)
+        inner = data[key] if has(data, key) else None
+        if inner is None:
+            inner = {}
+            if making:
+                data[key] = inner
+                document.keys.setdefault(tuple(path), Mark(label))
+                document.values[tuple(path)] = Mark(label)
+                document.added.add(tuple(path))
+        if not isinstance(inner, dict | list):
+            raise StudyError([Problem(f"{dotted(path)} is neither a mapping nor a list", file=label)])
+        data = inner
+
+
+def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> tuple[str | int, list[str]]:
+    if isinstance(data, list):
+        index = LIST_FORM.get(rest[0], int(rest[0]) if _INDEX.fullmatch(rest[0]) else -1)
+        if not 0 <= index <= len(data) or (index == len(data) and len(rest) > 1):
+            raise StudyError([Problem(f"{dotted(path)} is a list of {len(data)}; it has no {rest[0]!r}", file=label)])
+        return index, rest[1:]
+    # The longest existing key wins.
+    for length in range(len(rest), 0, -1):
+        key = ".".join(rest[:length])
+        if key in data:
+            return key, rest[length:]
+    # A new key that contains dots ends where the schema knows what follows.
+    for length in range(1, len(rest)):
+        key = ".".join(rest[:length])
+        if rest[length] in schema_fields(StudyFile, [*path, key]):
+            return key, rest[length:]
+    if schema_fields(StudyFile, path):
+        return rest[0], rest[1:]
+    return ".".join(rest), []

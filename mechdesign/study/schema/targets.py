@@ -26,24 +26,14 @@ ROOT: KeyPath = ("mechanism", "targets")
 class Target:
     """What an output should be: a function of coordinates, or a table.
 
-    Parameters
-    ----------
-    owner : str
-        A coordinate or a measure, or a point whose path it is.
-    coordinates : tuple of str
-        What has an error: the owner, or the point's x and y.
-    expression : Expression or None
-        Over coordinates and parameters, in the study's units.
-    table : ndarray, shape (rows, columns), or None
-        In the study's units. As many columns as coordinates: one row a pose, or of a point a path without timing,
-        a polyline. One more: the first is the drive's value, between which the others are interpolated linearly; its
-        rows are in rising order then.
+    A table has as many columns as coordinates: one row a pose, or of a point a path without timing, a polyline. With
+    one more the first is the drive's value, rising, between which the others are interpolated linearly.
     """
 
-    owner: str
-    coordinates: tuple[str, ...]
-    expression: Expression | None = None
-    table: Floats | None = None
+    owner: str  # a coordinate or a measure, or a point whose path it is
+    coordinates: tuple[str, ...]  # what has an error: the owner, or the point's x and y
+    expression: Expression | None = None  # over coordinates and parameters, in the study's units
+    table: Floats | None = None  # in the study's units, shape (rows, columns)
 
     @property
     def timed(self) -> bool:

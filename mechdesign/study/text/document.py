@@ -30,6 +30,12 @@ _WORDS = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
+# What mends a mistake, by the words that YAML has for it.
+_HINTS = {
+    "cannot start any token": " (indent with spaces, not tabs; put special characters in quotes)",
+    "alias": " (put a word that begins with '*' in quotes, as in \"*.length\")",
+    "mapping values are not allowed": " (a ':' too many on the line, or wrong indentation)",
+}
 
 
 class Mark(NamedTuple):
@@ -95,28 +101,16 @@ def read(content: bytes, name: str) -> Document:
         mark = error.problem_mark or error.context_mark
         here = Mark(name, mark.line + 1, mark.column + 1) if mark else Mark(name)
         parts = [str(part) for part in (error.context, error.problem) if part]
-        raise StudyError([here.problem(f"is not YAML: {', '.join(parts)}{_hint(parts)}")]) from None
+        hint = next((hint for words, hint in _HINTS.items() if any(words in part for part in parts)), "")
+        raise StudyError([here.problem(f"is not YAML: {', '.join(parts)}{hint}")]) from None
     except yaml.YAMLError as error:
         first = str(getattr(error, "reason", error)).splitlines()[0]
         raise StudyError([Mark(name).problem(f"is not a text in YAML: {first}")]) from None
 
 
-def _hint(parts: Sequence[str]) -> str:
-    text = " ".join(parts)
-    if "cannot start any token" in text:
-        return " (indent with spaces, not tabs; put special characters in quotes)"
-    if "alias" in text:
-        return " (put a word that begins with '*' in quotes, as in \"*.length\")"
-    if "mapping values are not allowed" in text:
-        return " (a ':' too many on the line, or wrong indentation)"
-    return ""
-
-
 def _check_events(text: str, name: str) -> None:
-    """Check what holds of a text before anything is built of it."""
-    begun: list[Any] = []
-    anchors: set[Any] = set()
-    documents = 0
+    """Check what can be judged of a text before anything is built of it."""
+    depth = documents = 0
     event: Any
     for event in yaml.parse(text, Loader=_Loader):
         here = _mark(event, name)
@@ -124,20 +118,11 @@ def _check_events(text: str, name: str) -> None:
             documents += 1
             if documents > 1:
                 raise StudyError([here.problem("a second YAML document; a study file holds one")])
-        elif isinstance(event, yaml.AliasEvent):
-            if event.anchor not in anchors:
-                message = f"undefined alias *{event.anchor}; quote a word that begins with '*', as in \"*.length\""
-                raise StudyError([here.problem(message)])
         elif isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent) and event.tag not in (None, "!"):
             message = f"the YAML tag {event.tag!r} has no place in a study; write plain values"
             raise StudyError([here.problem(message)])
-        if isinstance(event, yaml.CollectionStartEvent):
-            begun.append(event.anchor)
-            _check_depth(begun, here)
-        elif isinstance(event, yaml.CollectionEndEvent):
-            anchors.add(begun.pop())
-        elif isinstance(event, yaml.ScalarEvent):
-            anchors.add(event.anchor)
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        _check_depth(depth, here)
     if not documents:
         raise StudyError([Mark(name).problem("is empty: nothing to study (`mechdesign new` prints a start)")])
 
@@ -147,8 +132,8 @@ def _mark(part: Any, name: str) -> Mark:
     return Mark(name, begin.line + 1, begin.column + 1, begin.index, part.end_mark.index)
 
 
-def _check_depth(path: Sequence[Any], here: Mark) -> None:
-    if len(path) > MAX_DEPTH:
+def _check_depth(depth: int, here: Mark) -> None:
+    if depth > MAX_DEPTH:
         raise StudyError([here.problem(f"nested deeper than {MAX_DEPTH} levels")])
 
 
@@ -161,7 +146,7 @@ class _Builder:
 
     def value(self, node: Any, path: KeyPath) -> Any:
         here = _mark(node, self.document.name)
-        _check_depth(path, here)
+        _check_depth(len(path), here)
         self.nodes += 1
         if self.nodes > MAX_NODES:
             raise StudyError([here.problem(f"more than {MAX_NODES} values once its aliases are expanded")])
@@ -216,12 +201,6 @@ def _scalar(node: yaml.ScalarNode) -> Any:
     if _NOT_FINITE.fullmatch(text):
         return float(text.replace(".", ""))
     return text
-
-
-def parse_value(text: str, name: str) -> Document:
-    """Read the value of an override, which may be empty."""
-    # What the terminal could not decode is told as not UTF-8, as it would be in a file.
-    return read(text.encode(errors="surrogateescape"), name) if text.strip() else Document(name, None)
 
 
 def plain(data: Any) -> Any:

@@ -29,10 +29,12 @@ PAIR_FORM: Form = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxIte
 
 NAME = re.compile(r"[^\W\d]\w*")
 COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
-# Magnitudes beyond which a number is a slip of writing: its square or reciprocal would soon overflow.
-LARGEST, SMALLEST = 1e60, 1e-60
-# The same for lengths, which are multiplied with one another more often.
-LONGEST, SHORTEST = 1e15, 1e-15
+# Magnitudes beyond which a number is a slip of writing, as its square or reciprocal would soon overflow: of numbers,
+# and of lengths, which are multiplied with one another more often.
+MAX_NUMBER = 1e60
+MIN_NUMBER = 1e-60
+MAX_LENGTH = 1e15
+MIN_LENGTH = 1e-15
 # Endings of the names of files with a table.
 FILES = (".csv", ".txt", ".dat")
 
@@ -65,7 +67,7 @@ class StudyNumber:
 
 
 LOST = StudyNumber(math.nan)
-"""Stands for a number whose own mistake has been told, so that the rest can be checked."""
+"""Stands for a number whose own mistake has been reported, so that the rest can be checked."""
 
 
 def failure(message: str) -> PydanticCustomError:
@@ -107,7 +109,7 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Study
         raise failure("too large a number") from None
     if not isinstance(raw, str) and not math.isfinite(value.nominal):
         raise failure(f"expected a finite number, not {value.nominal:g}")
-    largest, what = (LONGEST, "length") if kind == "length" else (LARGEST, "number")
+    largest, what = (MAX_LENGTH, "length") if kind == "length" else (MAX_NUMBER, "number")
     if abs(value.nominal) > largest:
         raise failure(f"{shown(raw)} is too large a {what}: none is beyond {largest:g}; choose a larger unit")
     return value
@@ -129,7 +131,7 @@ def read_expression(raw: object, context: Context) -> Expression:
     """Read an expression whose names are looked up later; a number is one without names."""
     if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
         number = read_number(raw, context).nominal
-        # A number that is lost has been told already.
+        # A number that is lost has been reported already.
         return Expression.parse(repr(0.0 if math.isnan(number) else number))
     try:
         expression = context.expression(raw)
@@ -205,7 +207,7 @@ def number(
 
     It becomes a float, or with `value` a `StudyNumber`.
     """
-    smallest = SHORTEST if kind == "length" else SMALLEST
+    smallest = MIN_LENGTH if kind == "length" else MIN_NUMBER
 
     def read(raw: Any, context: Context) -> float | StudyNumber:
         found = read_number(raw, context, kind)
@@ -281,22 +283,12 @@ class OrShort:
 
 
 class Model(BaseModel):
-    """Base of all sections: frozen, unknown keys are errors, values come in study units.
-
-    Attributes
-    ----------
-    bare : str
-        Key that a value stands for which is written alone, instead of a mapping.
-    short : tuple of dict
-        JSON Schema of the short forms.
-    one_of : tuple of str
-        Keys of which exactly one is given, after the message where they are none or several.
-    """
+    """Base of all sections: frozen, unknown keys are errors, values come in study units."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
-    bare: ClassVar[str] = ""
-    short: ClassVar[tuple[Form, ...]] = ()
-    one_of: ClassVar[tuple[str, ...]] = ()
+    bare: ClassVar[str] = ""  # key of a value that is written alone, instead of a mapping
+    short: ClassVar[tuple[Form, ...]] = ()  # JSON Schema of the short forms
+    one_of: ClassVar[tuple[str, ...]] = ()  # a message, and keys of which exactly one is given
 
     @model_validator(mode="before")
     @classmethod
@@ -305,8 +297,9 @@ class Model(BaseModel):
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Self:
-        if self.one_of and len(self.given(*self.one_of[1:])) != 1:
-            raise failure(self.one_of[0])
+        given = self.given(*self.one_of[1:])
+        if self.one_of and len(given) != 1:
+            raise failure(self.one_of[0] + (f"; {' and '.join(given)} are given" if given else ""))
         return self
 
     def given(self, *keys: str) -> list[str]:

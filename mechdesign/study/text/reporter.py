@@ -77,10 +77,6 @@ class Reporter:
                 except QuantityError as error:
                     self.report((*path, *keys), str(error))
 
-    def warn(self, path: Sequence[str | int], message: str) -> None:
-        """Note what is likely a mistake, though the study can be answered, at a key of the data."""
-        self.warnings.append(self._placed(self.written(path), message, True))
-
     def unused(self, path: KeyPath, what: str, others: Iterable[str]) -> None:
         """Note a named thing that nothing uses: one that an override brought in is a name misspelt."""
         name = path[-1]
@@ -88,10 +84,12 @@ class Reporter:
             hint = suggestion(str(name), others)
             self.report(path, f"the study has no {what} {name!r}, and nothing uses one{hint}", at_key=True)
         else:
-            self.warn(path, f"nothing uses {what} {name!r}")
+            self.warnings.append(self._placed(self.written(path), f"nothing uses {what} {name!r}", True))
 
     def _placed(self, found: KeyPath, message: str, at_key: bool) -> Problem:
-        known = self._nearest(found)
+        known = found
+        while known and known not in self.document.values:
+            known = known[:-1]
         mark = self.document.values[known]
         if (at_key or known != found) and known in self.document.keys:
             mark = self.document.keys[known]
@@ -146,11 +144,6 @@ class Reporter:
             else:
                 found.append(segment)
         return tuple(found)
-
-    def _nearest(self, path: KeyPath) -> KeyPath:
-        while path and path not in self.document.values:
-            path = path[:-1]
-        return path
 
     def report_validation(self, error: ValidationError, root: type[BaseModel], prefix: KeyPath) -> None:
         """Note every error of the validation of the part at `prefix`, in words."""

@@ -52,10 +52,9 @@ QUANTITY = re.compile(
 No text matches in two ways: what does not match is found out in time that grows with its length.
 """
 
-MAX_LENGTH = 60
-"""Longest text of a unit, in characters."""
+# Longest text of a unit, in characters, and its highest power of length, angle, time or force.
+MAX_UNIT = 60
 MAX_POWER = 9
-"""Highest power of length, angle, time or force in a unit."""
 
 _DEFINITIONS = """
 kilo- = 1000 = k-
@@ -101,13 +100,7 @@ class QuantityError(ValueError):
 
 @dataclass(frozen=True)
 class Units:
-    """Units that bare numbers of a study mean.
-
-    Parameters
-    ----------
-    length, angle, time, force : str
-        As the study writes them; length may be ``dimensionless``.
-    """
+    """Units of a study's bare numbers; length may be ``dimensionless``."""
 
     length: str = "mm"
     angle: str = "deg"
@@ -132,14 +125,7 @@ class Units:
         return f"{above or '1'}/{below[0] if len(below) == 1 else '(' + '*'.join(below) + ')'}"
 
     def convert(self, text: str, kind: str | None = None) -> float:
-        """Convert a quantity to the study's units.
-
-        Parameters
-        ----------
-        text : str
-            A number and a unit.
-        kind : str, optional
-            What is expected, a name of `KINDS`; left out: whatever the unit says.
+        """Convert a quantity of a kind (a name of `KINDS`, or any) to the study's units.
 
         Raises
         ------
@@ -205,8 +191,8 @@ def measure(text: str, kind: str | None = None) -> tuple[float, Powers, float]:
     if match is None:
         raise QuantityError(f"{text!r} is not a number with a unit")
     unit = match["unit"]
-    if len(unit) > MAX_LENGTH:
-        raise QuantityError(f"{unit[:MAX_LENGTH]!r}... is no unit: none is longer than {MAX_LENGTH} characters")
+    if len(unit) > MAX_UNIT:
+        raise QuantityError(f"{unit[:MAX_UNIT]!r}... is no unit: none is longer than {MAX_UNIT} characters")
     powers, factor = _common(unit) or _unit(unit)
     if max(map(abs, powers)) > MAX_POWER:
         raise QuantityError(f"{unit!r} is no unit: it is {_describe(powers)}, and no power is beyond {MAX_POWER}")

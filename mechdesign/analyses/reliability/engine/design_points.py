@@ -1,8 +1,7 @@
 """Design points: where each limit is broken nearest to the mean, found from many starts at once.
 
-A direction (`Problem.circles`) is no normal variable: it costs no distance. Each is turned to where its limit is
-nearest, which of a margin that is linear in its cosine and sine is against the slope, and the nearest point is sought
-again.
+A direction (`Problem.circles`) costs no distance: each is turned against the slope of its limit, where that is nearest
+if it is linear in cosine and sine, and the nearest point is sought again.
 """
 
 from __future__ import annotations
@@ -16,30 +15,36 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Standard deviations of the samples that starts are taken from, and how many of each.
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
-SAMPLES = 160
-# Starts of one limit: as many as leave no wide gap on a circle, all of which is as near. Fewer where directions count,
-# for these have starts of their own (`TURNED`), and where margins end: tangents are rough there, and their sum grows.
-STARTS, FEW_STARTS = 24, 8
-EXPLORED = len(SPREADS) * SAMPLES
-HALVINGS = 10
-# Rounds in which ends of the margins come nearer, by so many points at least about each, of this spread.
-WALKS, AROUND, NEAR = 3, 60, 0.5
-# Two points in directions nearer than this (cosine), at like distances, are one.
-ALIKE = 0.95
-MOST = 24
-# How often directions are turned to the worst, and what is no turn (distance on the circle).
-TURNS, STILL = 6, 0.02
+_SPREAD_SAMPLES = 160
+EXPLORED = len(SPREADS) * _SPREAD_SAMPLES
+# Starts of one limit: as many as leave no wide gap on a circle, all of which is as near.
+_STARTS = 24
+# Fewer where directions count, for these have starts of their own, and where margins end: tangents are rough there.
+_FEW_STARTS = 8
 # Starts of each limit near the mean where directions count: each has its own.
-TURNED = 6
-ITERATIONS = 30
+_DIRECTED_STARTS = 6
+# Halvings of a ray on which a limit is sought.
+_HALVINGS = 10
+# Rounds in which ends of the margins come nearer, and points (at least, of this spread) about each.
+_WALKS = 3
+_WALK_POINTS = 60
+_WALK_SPREAD = 0.5
+# Two points in directions nearer than this (cosine), at like distances, are one.
+_SAME_COSINE = 0.95
+MAX_POINTS = 24
+# How often directions are turned to the worst, and what is no turn (distance on the circle).
+_TURNS = 6
+_NO_TURN = 0.02
+_ITERATIONS = 30
 # Fractions of a step that are tried where the whole of it does not improve.
-FRACTIONS = np.array([0.5, 0.25, 0.0625])
-# A point is a design point where a step is shorter than this, or nothing improves, and the margin this small.
-SHORT, ZERO = 5e-3, 1e-2
-# A step that leaves more than this share of what is made smaller gains little.
-GAIN = 0.95
-# Directions farther from each other than this are two.
-APART = 0.5
+_FRACTIONS = np.array([0.5, 0.25, 0.0625])
+# A point is a design point where a step is shorter than this, or nothing improves, and the margin is this small.
+_SHORT_STEP = 5e-3
+_ZERO_MARGIN = 1e-2
+# A step that leaves more than this share of the merit gains little.
+_LITTLE_GAIN = 0.95
+# Directions farther from each other than this (distance on the circle) are two.
+_DIRECTIONS_APART = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +79,8 @@ class DesignPoints:
 def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     """Look for the design points of all limits."""
     d = problem.dimension
-    near = problem.draw(rng, TURNED if len(problem.circles) else 1, 0.1 / np.sqrt(d))
-    u = np.concatenate([near, *(problem.draw(rng, SAMPLES, spread) for spread in SPREADS)], axis=1)
+    near = problem.draw(rng, _DIRECTED_STARTS if len(problem.circles) else 1, 0.1 / np.sqrt(d))
+    u = np.concatenate([near, *(problem.draw(rng, _SPREAD_SAMPLES, spread) for spread in SPREADS)], axis=1)
     margins = problem.margins(u)
     limit, starts = _starts(problem, u, margins)
     ends = starts[:, limit < 0]
@@ -97,14 +102,11 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
 
 
 def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]:
-    """Limits (-1 where margins end) and their edges towards samples, shape (dimension, starts), that lie far apart.
-
-    A limit may be reached in several directions.
-    """
+    """Limits (-1 where margins end) and their edges towards samples, shape (dimension, starts), that lie far apart."""
     nowhere = np.isnan(margins).any(axis=0)
     broken = [(margin < 0) & ~nowhere for margin in margins]
-    most = FEW_STARTS if len(problem.circles) else STARTS
-    chosen = [*(_apart(problem, u[:, beyond], most) for beyond in broken), _apart(problem, u[:, nowhere], FEW_STARTS)]
+    most = _FEW_STARTS if len(problem.circles) else _STARTS
+    chosen = [*(_apart(problem, u[:, beyond], most) for beyond in broken), _apart(problem, u[:, nowhere], _FEW_STARTS)]
     limit = np.repeat([*range(len(margins)), -1], [part.shape[1] for part in chosen])
     return limit, _edges(problem, limit, np.concatenate(chosen, axis=1))
 
@@ -113,7 +115,7 @@ def _edges(problem: Problem, limit: Ints, far: Floats) -> Floats:
     """Where limits (-1: where margins end) are on the rays to points beyond them, shape (dimension, points)."""
     low, high = np.zeros(len(limit)), np.ones(len(limit))
     straight = problem.straight[:, None]
-    for _ in range(HALVINGS if len(limit) else 0):
+    for _ in range(_HALVINGS if len(limit) else 0):
         middle = 0.5 * (low + high)
         found = problem.margins(np.where(straight, middle * far, far))
         ended = np.isnan(found).any(axis=0)
@@ -125,14 +127,13 @@ def _edges(problem: Problem, limit: Ints, far: Floats) -> Floats:
 def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
     """Ends of the margins nearer to the mean, shape (dimension, ends).
 
-    Where margins end there is no slope: the direction that tells apart the points about an end that have margins and
-    that have none stands for it.
+    In place of the slope there is the direction that separates points with margins from those without.
     """
     d, count = ends.shape
-    about = max(AROUND, 4 * d)
-    for _ in range(WALKS if count else 0):
+    about = max(_WALK_POINTS, 4 * d)
+    for _ in range(_WALKS if count else 0):
         shift = rng.standard_normal((d, count, about)) * problem.straight[:, None, None]
-        found = problem.margins((ends[:, :, None] + NEAR * shift).reshape(d, -1))
+        found = problem.margins((ends[:, :, None] + _WALK_SPREAD * shift).reshape(d, -1))
         gone = np.isnan(found).any(axis=0).reshape(count, about)
         steep = np.einsum("dca,ca->dc", shift, gone - gone.mean(axis=1, keepdims=True))
         size = (steep * steep).sum(axis=0)
@@ -154,7 +155,7 @@ def _apart(problem: Problem, u: Floats, most: int) -> Floats:
     directions /= np.linalg.norm(directions, axis=0)
     chosen = [int(np.argmin(size))]
     cosine = directions[:, chosen[0]] @ directions
-    while len(chosen) < most and cosine.min() < ALIKE:
+    while len(chosen) < most and cosine.min() < _SAME_COSINE:
         chosen.append(int(np.argmin(cosine)))
         cosine = np.maximum(cosine, directions[:, chosen[-1]] @ directions)
     return u[:, chosen]
@@ -165,15 +166,15 @@ def _distinct(problem: Problem, u: Floats, limit: Ints, normal: Floats, pull: Fl
     order = np.argsort((u * normal).sum(axis=0), kind="stable")
     kept: list[int] = []
     for k in order.tolist():
-        if len(kept) == MOST:
+        if len(kept) == MAX_POINTS:
             break
-        if not any(alike(problem, u[:, k], u[:, j]) and _along(normal[:, k], normal[:, j]) for j in kept):
+        if not any(_alike(problem, u[:, k], u[:, j]) and _along(normal[:, k], normal[:, j]) for j in kept):
             kept.append(k)
     return DesignPoints(u.T[kept], limit[kept], normal.T[kept], pull[kept], seen)
 
 
 def _along(one: Floats, other: Floats) -> bool:
-    return bool(one @ other >= ALIKE * np.linalg.norm(one) * np.linalg.norm(other))
+    return bool(one @ other >= _SAME_COSINE * np.linalg.norm(one) * np.linalg.norm(other))
 
 
 def explored_weights(problem: Problem, u: Floats) -> Floats:
@@ -188,31 +189,21 @@ def explored_weights(problem: Problem, u: Floats) -> Floats:
 def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats, Floats]:
     """Descend with directions held, and turn these to the worst, one after the other until they stay.
 
-    Parameters
-    ----------
-    limit : ndarray of int, shape (starts,)
-    u : ndarray, shape (dimension, starts)
-    scale : ndarray, shape (limits,)
-        Those of `sizes`.
-
-    Returns
-    -------
-    u, limit, normal, pull
-        Of the points that were found, as in `DesignPoints`, but `u` and `normal` of shape (dimension, points). Where
-        directions alone break a limit, the point is at the mean of all else.
+    Arguments as of `descend`; answers as in `DesignPoints`, but `u` and `normal` of shape (dimension, points). Where
+    directions alone break a limit, the point is at the mean of all else.
     """
     found, at, normal = _points(problem, limit, _turned(problem, limit, u)[0], scale)
     if not len(problem.circles):
         return found, at, normal, np.zeros((len(at), 0, 2))
-    for _ in range(TURNS):
+    for _ in range(_TURNS):
         turned = _turned(problem, at, found)[0]
         moved = np.linalg.norm(turned - found, axis=0).max(initial=0.0)
         found, at, normal = _points(problem, at, turned, scale)
-        if moved < STILL:
+        if moved < _NO_TURN:
             break
     # What directions do alone, all normal variables at their means.
     alone = np.where(problem.straight[:, None], 0.0, u)
-    for _ in range(TURNS):
+    for _ in range(_TURNS):
         alone, margin, _ = _turned(problem, limit, alone)
     alone, by = alone[:, margin < 0], limit[margin < 0]
     found, at = np.concatenate([found, alone], axis=1), np.concatenate([at, by])
@@ -270,8 +261,8 @@ def descend(
 
     Parameters
     ----------
-    limit : ndarray of int, shape (starts,)
-    u : ndarray, shape (dimension, starts)
+    limit, u : ndarray, shape (starts,) and (dimension, starts)
+        Limits, and points to start from.
     scale : ndarray, shape (limits,)
         Those of `sizes`.
     together : bool
@@ -279,17 +270,16 @@ def descend(
 
     Returns
     -------
-    u, normal : ndarray, shape (dimension, starts)
-        Points, and unit vectors into the failure.
-    good : ndarray of bool, shape (starts,)
-        Which of them came to their limit, once where several came together.
+    u, normal, good
+        Points and unit vectors into the failure, shape (dimension, starts), and which came to their limit, once where
+        several came together.
     """
     u = u.copy()
     straight = problem.straight[:, None]
     active = np.ones(len(limit), dtype=bool)
     good = np.zeros(len(limit), dtype=bool)
     normal = np.zeros_like(u)
-    for _ in range(ITERATIONS):
+    for _ in range(_ITERATIONS):
         lanes = np.flatnonzero(active)
         if not lanes.size:
             break
@@ -309,32 +299,32 @@ def descend(
         before = 0.5 * (at**2).sum(axis=0) + weight * np.abs(g)
         trial = at + step
         merit = _merit(problem, trial, limit[lanes], scale, weight)
-        far = np.linalg.norm(step, axis=0) >= SHORT * (1 + np.linalg.norm(at, axis=0))
+        far = np.linalg.norm(step, axis=0) >= _SHORT_STEP * (1 + np.linalg.norm(at, axis=0))
         # A whole step that gains little swings about the nearest point.
-        worse = np.flatnonzero(~(merit < np.where(far, GAIN, 1.0) * before))
+        worse = np.flatnonzero(~(merit < np.where(far, _LITTLE_GAIN, 1.0) * before))
         if worse.size:
-            shorter = at[:, None, worse] + FRACTIONS[:, None] * step[:, None, worse]
-            often = np.tile(worse, len(FRACTIONS))
+            shorter = at[:, None, worse] + _FRACTIONS[:, None] * step[:, None, worse]
+            often = np.tile(worse, len(_FRACTIONS))
             merits = _merit(problem, shorter.reshape(len(at), -1), limit[lanes[often]], scale, weight[often])
-            merits = merits.reshape(len(FRACTIONS), -1)
+            merits = merits.reshape(len(_FRACTIONS), -1)
             best, k = np.argmin(merits, axis=0), np.arange(len(worse))
             nearer = merits[best, k] < merit[worse]
             worse, best, k = worse[nearer], best[nearer], k[nearer]
             merit[worse], trial[:, worse] = merits[best, k], shorter[:, best, k]
         done = ~far | ~(merit < before)
-        good[lanes[done]] = np.abs(g[done]) < ZERO
+        good[lanes[done]] = np.abs(g[done]) < _ZERO_MARGIN
         active[lanes[done]] = False
         better = merit < before
         u[:, lanes[better]] = trial[:, better]
         for i, lane in enumerate(lanes if together else ()):
             others = lanes[:i][active[lanes[:i]] | good[lanes[:i]]]
-            if active[lane] and any(limit[lane] == limit[o] and alike(problem, u[:, lane], u[:, o]) for o in others):
+            if active[lane] and any(limit[lane] == limit[o] and _alike(problem, u[:, lane], u[:, o]) for o in others):
                 active[lane] = False
     # Those that came near in the time that they had are good enough to sample about.
     lanes = np.flatnonzero(active)
     if lanes.size:
         margins = problem.margins(u[:, lanes])
-        good[lanes] = np.abs(margins[limit[lanes], np.arange(len(lanes))] / scale[limit[lanes]]) < ZERO
+        good[lanes] = np.abs(margins[limit[lanes], np.arange(len(lanes))] / scale[limit[lanes]]) < _ZERO_MARGIN
     return u, normal, good
 
 
@@ -345,10 +335,10 @@ def _merit(problem: Problem, u: Floats, limit: Ints, scale: Floats, weight: Floa
     return np.asarray(np.where(np.isfinite(merit), merit, np.inf))
 
 
-def alike(problem: Problem, one: Floats, other: Floats) -> bool:
+def _alike(problem: Problem, one: Floats, other: Floats) -> bool:
     """Whether two points are one."""
     gap = one - other
-    if (np.hypot(*gap[problem.circles.T]) > APART).any():
+    if (np.hypot(*gap[problem.circles.T]) > _DIRECTIONS_APART).any():
         return False
     size, straight = float(np.linalg.norm(gap[problem.normals])), float(np.linalg.norm(one[problem.normals]))
     return size < 0.3 or size < 0.2 * straight

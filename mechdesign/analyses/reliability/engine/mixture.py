@@ -13,20 +13,18 @@ import numpy as np
 from mechdesign.analyses.reliability.engine.problem import Problem
 from mechdesign.numerics.arrays import Floats
 
-# A learned density is what it would be if so many samples a dimension of the law itself had been seen too.
-PRIOR = 0.25
+# Samples of the law itself, a dimension, that a learned density counts besides those seen.
+_PRIOR_SAMPLES = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """Weighted parts, and beside them the law itself where normal variables are farther than `beyond` from their mean.
+    """Weighted parts, and the law itself where normal variables are farther than `beyond` from their mean.
 
     Parameters
     ----------
-    problem : Problem
-        Tells which variables are normal and which directions.
     weight : ndarray, shape (parts,)
-        What they lack to 1 is the weight of what is beyond.
+        The law beyond has the rest to 1.
     centre : ndarray, shape (parts, normal variables)
     root : ndarray, shape (parts, normal variables, normal variables)
         Cholesky factors of the covariances.
@@ -107,8 +105,8 @@ class Mixture:
         with np.errstate(over="ignore"):
             return np.asarray(np.exp(-most) / np.exp(logs - most).sum(axis=0))
 
-    def beside(self, other: Mixture, share: float) -> Mixture:
-        """Both, `other` with this share."""
+    def joined(self, other: Mixture, share: float) -> Mixture:
+        """Both mixtures, the other with this share."""
         return replace(
             self, weight=np.concatenate([(1 - share) * self.weight, share * other.weight]),
             centre=np.concatenate([self.centre, other.centre]), root=np.concatenate([self.root, other.root]),
@@ -123,13 +121,7 @@ class Mixture:
         )  # fmt: skip
 
     def fitted(self, u: Floats, worth: Floats, least: float) -> Mixture:
-        """Parts with the moments of the points that are theirs; parts of less weight than `least` end.
-
-        Parameters
-        ----------
-        u : ndarray, shape (dimension, n)
-        worth : ndarray, shape (n,)
-        """
+        """Parts with the moments of their own points `u`, shape (dimension, n); those below a share `least` end."""
         logs = self.logs(u)
         share = np.exp(logs - logs.max(axis=0, initial=-np.inf))
         share *= worth / share.sum(axis=0)
@@ -144,7 +136,7 @@ class Mixture:
             centre = normal @ own / mass
             apart = normal - centre[:, None]
             covariance = (own * apart) @ apart.T / mass
-            prior = PRIOR * self.problem.dimension
+            prior = _PRIOR_SAMPLES * self.problem.dimension
             covariance = (effective * covariance + prior * np.eye(d)) / (effective + prior)
             weight.append(mass)
             centres.append(centre)

@@ -1,4 +1,7 @@
-"""What fails where: margins over the space of independent standard normal variables."""
+"""Limit states over independent standard normal variables; probabilities of failure and their 99.7 % intervals.
+
+An interval is three standard deviations of a normal estimate [S2, eq. 15].
+"""
 
 from __future__ import annotations
 
@@ -8,29 +11,98 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.intervals import binomial
 from mechdesign.numerics.arrays import Flags, Floats
 
-# Step of a difference quotient of margins, in standard deviations: the third root of what rounding leaves in doubt.
-_STEP = 1e-4
-# Points evaluated at once: what is computed of each then stays in the cache.
-BLOCK = 20_000
+# Of all intervals.
+CONFIDENCE = 0.997
+# Half the width of such an interval in standard errors.
+WIDTH = 2.97
+
+
+@dataclass(frozen=True)
+class Precision:
+    """How wide the 99.7 % interval may be: half of it, or the standard error as a share of the failure probability."""
+
+    relative: float | None
+    half_width: float | None
+
+    def _half(self, value: float) -> float:
+        return self.half_width if self.half_width is not None else WIDTH * (self.relative or 0.0) * value
+
+    def reached(self, value: float, low: float, high: float) -> bool:
+        """Whether an interval is narrow enough."""
+        return 0.5 * (high - low) <= self._half(value)
+
+    def needed(self, value: float, variance: float) -> float:
+        """Samples that reach it, from the value and the variance of one sample."""
+        half = self._half(value)
+        return WIDTH**2 * variance / half**2 if half > 0 else float("inf")
+
+
+def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Clopper-Pearson interval of the probability of an event that was seen `events` times in `samples`."""
+    from scipy.special import betaincinv
+
+    if samples == 0:
+        return float("nan"), float("nan")
+    tail = 0.5 * (1.0 - confidence)
+    low = betaincinv(events, samples - events + 1, tail) if events else 0.0
+    high = betaincinv(events + 1, samples - events, 1.0 - tail) if events < samples else 1.0
+    return float(low), float(high)
+
+
+def weighted(total: float, squares: float, most: float, samples: int) -> tuple[float, float]:
+    """Interval of the mean of positive weights, many of them zero, from their sum, sum of squares and the largest.
+
+    That of a gamma law with the mean's moments, for the upper end with one more of the largest weight. [Fay & Feuer,
+    Confidence intervals for directly standardized rates, 1997.]
+    """
+    mean = total / samples
+    if mean <= 0:
+        return 0.0, 1.0
+    variance = max(squares / samples - mean * mean, 0.0) / max(samples - 1, 1)
+    one, tail = most / samples, 0.5 * (1.0 - CONFIDENCE)
+    low = _gamma(mean, variance, tail)
+    high = _gamma(mean + one, variance + one * one, 1.0 - tail)
+    return min(low, 1.0), min(high, 1.0)
+
+
+def _gamma(mean: float, variance: float, share: float) -> float:
+    """Quantile of a gamma law."""
+    from scipy.special import gammaincinv
+
+    # Below the rounding of the sums the law is its mean.
+    if variance <= 1e-20 * mean * mean:
+        return mean
+    return float(gammaincinv(mean * mean / variance, share)) * variance / mean
+
+
+def replicated(means: Floats) -> tuple[float, float]:
+    """Student's interval of the mean of independent estimates."""
+    from mechdesign.numerics.statistics import student
+
+    count = len(means)
+    half = student(count - 1, CONFIDENCE) * float(np.std(means, ddof=1)) / float(np.sqrt(count))
+    mean = float(np.mean(means))
+    return max(mean - half, 0.0), min(mean + half, 1.0)
+
+
+# Step of a difference quotient of margins, in standard deviations: the third root of their rounding.
+_MARGIN_STEP = 1e-4
+# Points evaluated at once: their intermediate values then stay in the cache.
+POINTS_TOGETHER = 20_000
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A probability of failure by one method.
+    """A probability of failure by one method, and its interval at 99.7 %, of no width where none is claimed.
 
     Parameters
     ----------
-    failure, low, high : float
-        Value and interval at 99.7 %; all three alike where the method claims no interval.
     evaluations : int
-        Points at which margins were evaluated, all told.
+        Points at which margins were evaluated in all.
     samples : int
         Those that the value is a mean over; 0 where it is none.
-    failures : int
-        Samples that failed.
     invalid : int
         Samples without margins; they are failures.
     """
@@ -57,12 +129,10 @@ def counted(failures: int, samples: int, invalid: int, evaluations: int) -> Esti
 
 
 class Problem:
-    """Limit states, and how often they were evaluated.
+    """Limit states over `dimension` independent standard normal variables, and how often they were evaluated.
 
     Parameters
     ----------
-    dimension : int
-        Number of independent standard normal variables.
     margins : callable
         From points, shape (dimension, n), to margins, shape (limits, n). A limit is broken where its margin is
         negative; nan is a failure of its own kind (what cannot be assembled has no margins).
@@ -109,7 +179,7 @@ class Problem:
     def margins(self, u: Floats) -> Floats:
         """Margins at points `u` of shape (dimension, n): shape (limits, n)."""
         self.evaluations += u.shape[1]
-        parts = [self._margins(u[:, k : k + BLOCK]) for k in range(0, u.shape[1], BLOCK)]
+        parts = [self._margins(u[:, k : k + POINTS_TOGETHER]) for k in range(0, u.shape[1], POINTS_TOGETHER)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
     def gradients(self, u: Floats) -> tuple[Floats, Floats]:
@@ -117,7 +187,7 @@ class Problem:
         if self._gradients is not None:
             self.evaluations += u.shape[1]
             return self._gradients(u)
-        return self.margins(u), slopes(self.margins, u, _STEP)
+        return self.margins(u), slopes(self.margins, u, _MARGIN_STEP)
 
 
 def slopes(function: Callable[[Floats], Floats], u: Floats, step: float) -> Floats:

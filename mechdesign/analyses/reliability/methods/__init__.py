@@ -14,7 +14,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
 from mechdesign.study.schema.methods import METHODS
 
-# Streams of random numbers, beside those of the chunks of plain samples.
+# Streams of random numbers, besides those of the plain samples.
 SEARCH, QUASI = 1, 2
 
 

@@ -9,17 +9,17 @@ from importlib import import_module
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
-from mechdesign.analyses.reliability.engine.intervals import Precision
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Precision, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, pose_by_pose
 from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 
 # Plain samples that every rung is checked with, and up to how many of them need no other method.
-PILOT, FEW = 4000, 40_000
-# So many failures tell their probability well enough to plan by.
-MANY = 30
+PILOT = 4000
+FEW = 40_000
+# Failures from which on their share is known well enough to plan by.
+_ENOUGH_FAILURES = 30
 # A step beyond plain samples: from the problem, its design points, a generator, the most samples and the precision.
 # None says nothing; an estimate without samples claims no interval, and checks those that do.
 Rung = Callable[[Problem, DesignPoints, np.random.Generator, int, Precision], Estimate | None]
@@ -51,7 +51,7 @@ def run(task: Task) -> MethodResult:
             plain(min(FEW, task.most))
             return MethodResult("auto", sums={setting.pose: Sums.total(drawn)})
         rng = generator(task.seed, setting.pose, SEARCH, 2)
-        # Where nothing else helps, plain samples are as many all told.
+        # Where nothing else helps, plain samples are as many in all.
         problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
         estimate, used, said = climb(problem, task.precision, plain, steps, rng, task.most, shared)
         pose = setting.pose
@@ -74,20 +74,16 @@ def climb(
     Parameters
     ----------
     plain : callable
-        Monte Carlo with so many samples all told; keeps what it has drawn before.
+        Monte Carlo with so many samples in all; keeps what it has drawn before.
     rungs : mapping of str to Rung
-        The methods that are tried in this order where plain samples do not do.
+        The methods that are tried in this order where plain samples do not suffice.
     most, most_plain : int
         Samples that are drawn at most by any method, and by Monte Carlo.
 
     Returns
     -------
-    estimate : Estimate
-        Its evaluations are those of all rungs.
-    used : str
-        The method that it comes from.
-    said : dict of str to Estimate
-        What each method that was tried says.
+    estimate, used, said
+        The estimate, with the evaluations of all rungs; the method that it comes from; those of all methods tried.
     """
     said = {"monte_carlo": plain(min(PILOT, most, most_plain))}
 
@@ -99,8 +95,8 @@ def climb(
         return precision.reached(estimate.failure, estimate.low, estimate.high)
 
     def enough(estimate: Estimate) -> float:
-        # Few failures say little about how many there are; the interval's end leaves their number in doubt no longer.
-        share = estimate.failure if estimate.failures >= MANY else estimate.high
+        # Of few failures the interval's end is the safe number to plan with.
+        share = estimate.failure if estimate.failures >= _ENOUGH_FAILURES else estimate.high
         return 1.1 * precision.needed(share, share * (1.0 - share))
 
     found, used = said["monte_carlo"], "monte_carlo"
@@ -120,7 +116,7 @@ def climb(
                 if precise(tried):
                     break
         if not any(map(precise, candidates.values())):
-            found = plainly(enough(found) if found.failures >= MANY else np.inf)
+            found = plainly(enough(found) if found.failures >= _ENOUGH_FAILURES else np.inf)
         for name, tried in candidates.items():
             if precise(tried) or tried.high - tried.low < found.high - found.low:
                 found, used = tried, name

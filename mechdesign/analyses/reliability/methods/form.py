@@ -15,21 +15,25 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints, descend, find, sizes
-from mechdesign.analyses.reliability.engine.intervals import Precision
 from mechdesign.analyses.reliability.engine.mixture import Mixture
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Precision, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
 from mechdesign.analyses.reliability.probability import half_spaces
 from mechdesign.analyses.reliability.simulation import Setting, generator, problem_of
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 
-# Directions that are drawn to learn which ones count, how often, and for the value; design points that each begins at.
-CHOICES, ROUNDS, VALUED, BEGUN = 96, 2, 384, 8
-# Share of the directions that are drawn from all alike, and points that each choice's half-spaces are drawn with.
-ALL, DRAWN = 0.1, 16
-# Density of a part that ends.
-LEAST = 0.02
+# Directions drawn in each round of learning which ones count, and for the value.
+_LEARNING_CHOICES = 96
+_LEARNING_ROUNDS = 2
+_VALUE_CHOICES = 384
+# Design points that each choice begins at, and points drawn for its half-spaces.
+_POINTS_BEGUN = 8
+_POINTS_DRAWN = 16
+# Share of the directions that are drawn from all alike.
+_UNIFORM_SHARE = 0.1
+# Least share of a part of the mixture.
+_LEAST_SHARE = 0.02
 
 
 def run(task: Task) -> MethodResult:
@@ -51,10 +55,8 @@ def rung(
 
 
 def form(problem: Problem, points: DesignPoints) -> Estimate:
-    """Probability that any tangent half-space is entered; no interval is claimed.
+    """Probability that any tangent half-space is entered.
 
-    Notes
-    -----
     Where no design point was found nothing breaks a limit within reach, and the value is 0; nan if samples fail all the
     same, for example by limits that nothing random moves.
     """
@@ -71,33 +73,33 @@ def _mean(problem: Problem, points: DesignPoints) -> float:
     """Mean over directions, which are drawn where they count."""
     rng = np.random.Generator(np.random.SFC64(0))
     count, d = len(points.u), len(problem.normals)
-    ones = np.full(count, (1.0 - ALL) / count)
+    ones = np.full(count, (1.0 - _UNIFORM_SHARE) / count)
     mixture = Mixture(problem, ones, np.zeros((count, d)), np.repeat(np.eye(d)[None], count, axis=0), points.pull, 0.0)
     drawn, worth = np.zeros((problem.dimension, 0)), np.zeros(0)
-    for _ in range(ROUNDS):
-        u = mixture.draw(rng, CHOICES)
+    for _ in range(_LEARNING_ROUNDS):
+        u = mixture.draw(rng, _LEARNING_CHOICES)
         drawn = np.concatenate([drawn, u], axis=1)
         worth = np.append(worth, mixture.worth(u) * _chances(problem, points, u, rng))
         if not worth.any():
             continue
-        parts = mixture.fitted(drawn, worth, LEAST)
+        parts = mixture.fitted(drawn, worth, _LEAST_SHARE)
         count = len(parts.weight)
         mixture = replace(
-            parts, weight=(1.0 - ALL) * parts.weight / parts.weight.sum(), centre=np.zeros((count, d)),
+            parts, weight=(1.0 - _UNIFORM_SHARE) * parts.weight / parts.weight.sum(), centre=np.zeros((count, d)),
             root=np.repeat(np.eye(d)[None], count, axis=0),
         )  # fmt: skip
-    u = mixture.draw(rng, VALUED)
+    u = mixture.draw(rng, _VALUE_CHOICES)
     return min(float(np.mean(mixture.worth(u) * _chances(problem, points, u, rng))), 1.0)
 
 
 def _chances(problem: Problem, points: DesignPoints, u: Floats, rng: np.random.Generator) -> Floats:
     """Probability of failure by tangents at the directions of `u`, shape (dimension, n): shape (n,)."""
-    count, begun = u.shape[1], points.u[:BEGUN]
-    limit = points.limit[:BEGUN]
+    count, begun = u.shape[1], points.u[:_POINTS_BEGUN]
+    limit = points.limit[:_POINTS_BEGUN]
     starts = np.where(problem.straight[:, None, None], begun.T[:, :, None], u[:, None])
     at_mean = problem.margins(np.where(problem.straight[:, None], 0.0, u))
-    normal = np.repeat(points.normal[:BEGUN].T[:, :, None], count, axis=2)
-    distance = np.repeat(points.distance[:BEGUN, None], count, axis=1)
+    normal = np.repeat(points.normal[:_POINTS_BEGUN].T[:, :, None], count, axis=2)
+    distance = np.repeat(points.distance[:_POINTS_BEGUN, None], count, axis=1)
     sloped = limit >= 0
     found, normals, good = descend(
         problem, np.repeat(limit[sloped], count), starts[:, sloped].reshape(len(u), -1), sizes(problem), together=False
@@ -111,12 +113,12 @@ def _chances(problem: Problem, points: DesignPoints, u: Floats, rng: np.random.G
     total = chance.sum(axis=0)
     # As in `half_spaces`, for each choice.
     share = np.cumsum(chance / np.where(total > 0, total, 1.0), axis=0)
-    half = np.minimum((rng.random((DRAWN, 1, count)) > share).sum(axis=1), len(share) - 1)
+    half = np.minimum((rng.random((_POINTS_DRAWN, 1, count)) > share).sum(axis=1), len(share) - 1)
     lanes = np.arange(count)
     own = normal[:, half, lanes]
-    z = rng.standard_normal((len(u), DRAWN, count)) * problem.straight[:, None, None]
+    z = rng.standard_normal((len(u), _POINTS_DRAWN, count)) * problem.straight[:, None, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        depth = -ndtri(chance[half, lanes] * (1.0 - rng.random((DRAWN, count))))
+        depth = -ndtri(chance[half, lanes] * (1.0 - rng.random((_POINTS_DRAWN, count))))
         z += own * np.nan_to_num(depth - (own * z).sum(axis=0))
         held = (np.einsum("dhn,dmn->hmn", normal, z) > distance[:, None]).sum(axis=0)
     return np.asarray(np.minimum(total * (1.0 / np.maximum(held, 1)).mean(axis=0), 1.0))

@@ -11,32 +11,53 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.design_points import EXPLORED, MOST, DesignPoints, explored_weights, find
-from mechdesign.analyses.reliability.engine.intervals import Precision, weighted
+from mechdesign.analyses.reliability.engine.design_points import (
+    EXPLORED,
+    MAX_POINTS,
+    DesignPoints,
+    explored_weights,
+    find,
+)
 from mechdesign.analyses.reliability.engine.mixture import Mixture
-from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate, Problem, failed
+from mechdesign.analyses.reliability.engine.problem import (
+    POINTS_TOGETHER,
+    Estimate,
+    Precision,
+    Problem,
+    failed,
+    weighted,
+)
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
 from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 
-# Points farther than the nearest one by this many standard deviations bring nothing.
-FAR = 4.0
-# Rounds of learning, and their samples a dimension and at least. All rounds' failures are learned from together.
-ROUNDS, SAMPLES, LEAST = 6, 40, 1600
+# Design points farther than the nearest one by this many standard deviations bring nothing.
+_FARTHEST = 4.0
+# Rounds of learning, from all failures so far, and their samples a dimension and at least.
+_ROUNDS = 6
+_ROUND_SAMPLES = 40
+_ROUND_LEAST = 1600
 # Learned enough where the relative variance of a round's weights is below this.
-GOOD = 2.0
-# A part more, of this weight, where a failure adds so much to that variance and lacks so many times its samples; before
-# the first round where explored failures are worth so many.
-ADDED, LACKING, MANY = 0.05, (0.1, 10.0), 5
+_GOOD_VARIANCE = 2.0
+# A part more, of this weight, where a failure adds so much to that variance and lacks so many times its samples.
+_PART_WEIGHT = 0.05
+_PART_VARIANCE = 0.1
+_PART_LACK = 10.0
+# Explored failures, by their weights, from which on they add parts before the first round.
+_EXPLORED_MANY = 5
 # Share of the samples that stay with the design points, and with the least of them.
-FIXED, SMALLEST = 0.1, 0.02
+_FIXED_SHARE = 0.1
+_LEAST_SHARE = 0.02
 # Share of these beyond so much of the distance of the nearest design point: what was not found lies there too.
-BEYOND, NEAREST = 0.2, 0.9
-# First samples of the value, by which the rest is planned; so much more than what they ask for.
-FIRST, MARGIN = 3000, 1.1
-# Beyond any density that counts, and the logarithm of such a one.
-TINY, MUCH = 1e-200, 600.0
+_BEYOND_SHARE = 0.2
+_BEYOND_FROM = 0.9
+# First samples of the value, by which the rest is planned, and how many times those needed are drawn.
+_FIRST_SAMPLES = 3000
+_MARGIN = 1.1
+# Least density that counts, and the largest logarithm of a density.
+_LEAST_DENSITY = 1e-200
+_MAX_LOG_DENSITY = 600.0
 
 
 def run(task: Task) -> MethodResult:
@@ -63,28 +84,18 @@ def importance_sampling(
     samples: int,
     precision: Precision | None = None,
 ) -> Estimate:
-    """Probability of failure.
+    """Probability of failure; 0 with the interval [0, 1] where no failure was seen, or no design point is known.
 
-    Parameters
-    ----------
-    samples : int
-        At most so many for the value, beside those that the mixture learns from.
-    precision : Precision, optional
-        Where it ends; left out, all samples are drawn.
-
-    Returns
-    -------
-    Estimate
-        With failure 0 and the interval [0, 1] where no failure was seen, or no design point is known.
+    Besides those that the mixture learns from at most `samples` are drawn, all of them where no precision is given.
     """
     if not len(points.u):
         return Estimate(0.0, 0.0, 1.0, problem.evaluations)
     mixture = _learned(problem, points, rng)
     total = squares = most = 0.0
     done = failures = invalid = 0
-    wanted = samples if precision is None else min(FIRST, samples)
+    wanted = samples if precision is None else min(_FIRST_SAMPLES, samples)
     while done < wanted:
-        count = min(BLOCK, wanted - done)
+        count = min(POINTS_TOGETHER, wanted - done)
         u = mixture.draw(rng, count)
         margins = problem.margins(u)
         broken = failed(margins)
@@ -96,7 +107,7 @@ def importance_sampling(
         if done == wanted < samples and precision is not None and total > 0:
             mean = total / done
             if not precision.reached(mean, *weighted(total, squares, most, done)):
-                more = MARGIN * precision.needed(mean, squares / done - mean * mean)
+                more = _MARGIN * precision.needed(mean, squares / done - mean * mean)
                 wanted = int(min(samples, max(1.2 * done, more)))
     low, high = weighted(total, squares, most, done)
     # Weights are 1 on the average only.
@@ -110,16 +121,16 @@ def _about(problem: Problem, points: DesignPoints) -> Mixture:
     """Parts about the design points, weighted by the tangents' probabilities, and what is beyond the nearest one."""
     from scipy.special import i0e, log_ndtr
 
-    near = points.distance <= points.distance.min() + FAR
+    near = points.distance <= points.distance.min() + _FARTHEST
     # A mean that fails itself is where most of the failures are.
     centre = np.where(points.distance[near, None] > 0, points.u[near][:, problem.normals], 0.0)
     logs = log_ndtr(-points.distance[near]) + np.log(i0e(np.linalg.norm(points.pull[near], axis=2))).sum(axis=1)
     weight = np.exp(logs - logs.max())
-    weight = np.maximum(weight / weight.sum(), SMALLEST)
+    weight = np.maximum(weight / weight.sum(), _LEAST_SHARE)
     d = len(problem.normals)
     return Mixture(
-        problem, (1.0 - BEYOND) * weight / weight.sum(), centre, np.broadcast_to(np.eye(d), (len(centre), d, d)),
-        points.pull[near], NEAREST * _least(np.concatenate([centre.T, points.seen[problem.normals]], axis=1)),
+        problem, (1.0 - _BEYOND_SHARE) * weight / weight.sum(), centre, np.broadcast_to(np.eye(d), (len(centre), d, d)),
+        points.pull[near], _BEYOND_FROM * _least(np.concatenate([centre.T, points.seen[problem.normals]], axis=1)),
     )  # fmt: skip
 
 
@@ -131,55 +142,51 @@ def _least(normal: Floats) -> float:
 def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> Mixture:
     """The mixture nearest to the failures, beside the fixed one: one step of expectation and maximisation a round."""
     fixed = _about(problem, points)
-    parts = replace(fixed, weight=(1.0 - SMALLEST) * fixed.weight / fixed.weight.sum())
+    parts = replace(fixed, weight=(1.0 - _LEAST_SHARE) * fixed.weight / fixed.weight.sum())
     explored = explored_weights(problem, points.seen)
     # Where many of them count, the samples that starts were taken from know of places without a design point.
-    if float(explored.sum()) ** 2 > MANY * float(explored @ explored):
+    if float(explored.sum()) ** 2 > _EXPLORED_MANY * float(explored @ explored):
         parts = _covering(fixed, parts, points.seen, explored, EXPLORED)
-    count = max(LEAST, SAMPLES * problem.dimension)
+    count = max(_ROUND_LEAST, _ROUND_SAMPLES * problem.dimension)
     seen, known = [], []
-    for rounds in range(1, ROUNDS + 1):
-        mixture = parts.beside(fixed, FIXED)
+    for rounds in range(1, _ROUNDS + 1):
+        mixture = parts.joined(fixed, _FIXED_SHARE)
         u = mixture.draw(rng, count)
         u = u[:, failed(problem.margins(u))]
         weights = mixture.worth(u)
         # What is nearer than the nearest design point was not found before.
-        beyond = min(fixed.beyond, NEAREST * _least(u[problem.normals]))
+        beyond = min(fixed.beyond, _BEYOND_FROM * _least(u[problem.normals]))
         fixed, parts = replace(fixed, beyond=beyond), replace(parts, beyond=beyond)
         seen.append(u)
         known.append(weights)
         failures, worth = np.concatenate(seen, axis=1), np.concatenate(known)
         if worth.sum() > 0:
-            parts = _covering(fixed, parts.fitted(failures, worth, SMALLEST), failures, worth, rounds * count)
-        if count * float(weights @ weights) < (1.0 + GOOD) * float(weights.sum()) ** 2:
+            parts = _covering(fixed, parts.fitted(failures, worth, _LEAST_SHARE), failures, worth, rounds * count)
+        if count * float(weights @ weights) < (1.0 + _GOOD_VARIANCE) * float(weights.sum()) ** 2:
             break
     if worth.sum() > 0:
-        parts = parts.fitted(failures, worth, SMALLEST)
-    return parts.beside(fixed, FIXED)
+        parts = parts.fitted(failures, worth, _LEAST_SHARE)
+    return parts.joined(fixed, _FIXED_SHARE)
 
 
 def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: int) -> Mixture:
-    """`parts`, and more of them where failures are that both mixtures have far too few samples of.
+    """`parts`, and more of them about failures, shape (dimension, n), that both mixtures have far too few samples of.
 
-    Parameters
-    ----------
-    u : ndarray, shape (dimension, n)
-        Failures that were seen among `drawn` samples.
-    worth : ndarray, shape (n,)
-        Their weights when they were drawn.
+    `worth` are the weights of the failures when they were seen among `drawn` samples.
     """
     total = float(worth.sum())
     if not total > 0:
         return parts
-    held, own = (np.exp(np.minimum(each.logs(u), MUCH)).sum(axis=0) for each in (fixed, parts))
-    while len(parts.weight) < MOST:
+    held, own = (np.exp(np.minimum(each.logs(u), _MAX_LOG_DENSITY)).sum(axis=0) for each in (fixed, parts))
+    while len(parts.weight) < MAX_POINTS:
         # Density of failures over that of the mixture: its mean over failures is 1 and the weights' relative variance.
-        lack = drawn / (total * np.maximum(FIXED * held + (1 - FIXED) * own, TINY))
+        density = _FIXED_SHARE * held + (1 - _FIXED_SHARE) * own
+        lack = drawn / (total * np.maximum(density, _LEAST_DENSITY))
         adds = lack * worth / total
         worst = int(np.argmax(adds))
-        if adds[worst] < LACKING[0] or lack[worst] < LACKING[1]:
+        if adds[worst] < _PART_VARIANCE or lack[worst] < _PART_LACK:
             break
         part = parts.about(u[:, worst])
-        own = (1 - ADDED) * own + ADDED * np.exp(np.minimum(part.logs(u)[0], MUCH))
-        parts = parts.beside(part, ADDED)
+        own = (1 - _PART_WEIGHT) * own + _PART_WEIGHT * np.exp(np.minimum(part.logs(u)[0], _MAX_LOG_DENSITY))
+        parts = parts.joined(part, _PART_WEIGHT)
     return parts

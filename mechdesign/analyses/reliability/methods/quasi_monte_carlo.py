@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.intervals import binomial, replicated
-from mechdesign.analyses.reliability.engine.problem import BLOCK, Estimate
+from mechdesign.analyses.reliability.engine.problem import POINTS_TOGETHER, Estimate, binomial, replicated
 from mechdesign.analyses.reliability.methods import QUASI, pose_by_pose
 from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, sums_of
 from mechdesign.analyses.reliability.task import MethodResult, Task
@@ -20,9 +19,8 @@ from mechdesign.numerics.arrays import Floats
 
 NAME = "quasi_monte_carlo"
 REPLICATES = 16
-# Beyond so few failures the means of the replicates are far from normal, and the interval is that of plain samples,
-# which is wider: the variance of a scrambled net is hardly ever above theirs.
-FEW = 200
+# Of fewer failures the means of the replicates are far from normal, and the interval is the wider one of plain samples.
+_FEW_FAILURES = 200
 
 
 def run(task: Task) -> MethodResult:
@@ -50,7 +48,7 @@ def run(task: Task) -> MethodResult:
 
 
 def replicates(samples: int) -> list[int]:
-    """Points of each replicate: powers of two, about as many as asked all told."""
+    """Points of each replicate: powers of two, about as many as asked in all."""
     each = max(1, round(np.log2(max(samples / REPLICATES, 2))))
     return [2**each] * REPLICATES
 
@@ -61,15 +59,15 @@ def points(dimension: int, count: int, seed: int) -> Iterator[Floats]:
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(seed))
-    for begin in range(0, count, BLOCK):
+    for begin in range(0, count, POINTS_TOGETHER):
         # The scrambling leaves points at 0 a chance of one in 2^30.
-        yield ndtri(np.clip(sequence.random(min(BLOCK, count - begin)), 2.0**-32, 1 - 2.0**-32)).T
+        yield ndtri(np.clip(sequence.random(min(POINTS_TOGETHER, count - begin)), 2.0**-32, 1 - 2.0**-32)).T
 
 
 def estimate(broken: Sequence[int], count: int, invalid: int) -> Estimate:
     """Estimate from the failures of each replicate of `count` points."""
     failures, total = sum(broken), count * len(broken)
-    if failures < FEW or total - failures < FEW:
+    if failures < _FEW_FAILURES or total - failures < _FEW_FAILURES:
         low, high = binomial(failures, total)
     else:
         low, high = replicated(np.array(broken) / count)

@@ -20,22 +20,21 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.parallel import map_chunks
 
-# Longest and shortest steps of the differences, as a part of the mechanism's size or in radians, and between them as a
-# part of the standard deviation: the longest is the fourth root of rounding, at which a second derivative has about
-# seven digits; what is made finely is often small itself, so that a shorter step is needed, and fewer digits count.
-_LONGEST, _SHORTEST, _PART = 1e-4, 1e-6, 0.3
+# Longest step of the differences, as a part of the mechanism's size or in radians: the fourth root of rounding, at
+# which a second derivative has about seven digits.
+_LONGEST = 1e-4
+# Shortest step likewise; of finely made mechanisms fewer digits count.
+_SHORTEST = 1e-6
+# Step between these, as a part of the standard deviation.
+_PART = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Cumulants:
     """Joint cumulants of the components: the scalars, then x and y of each pin's offset.
 
-    Parameters
-    ----------
-    mean : ndarray, shape (components,)
-    covariance : ndarray, shape (components, components)
-    third, fourth : (ndarray of int, shape (terms, 3 or 4), ndarray, shape (terms,))
-        Cumulants that are not zero, with their components; every order of unlike components is a term.
+    Of third and fourth order those that are not zero: components, shape (terms, order), and values; every order of
+    unlike components is a term.
     """
 
     mean: Floats
@@ -46,14 +45,7 @@ class Cumulants:
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
-    """Errors of all channels as quadratic functions of the components that vary.
-
-    Parameters
-    ----------
-    value : ndarray, shape (channels,)
-    gradient : ndarray, shape (channels, components)
-    hessian : ndarray, shape (channels, components, components)
-    """
+    """Errors of all channels as quadratic functions of the components: each array has the channels first."""
 
     value: Floats
     gradient: Floats

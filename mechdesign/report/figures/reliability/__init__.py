@@ -11,11 +11,15 @@ from mechdesign.analyses.poses import pose_in_words
 from mechdesign.report.figures.panels import along
 from mechdesign.report.figures.planes import plane
 from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
-from mechdesign.report.figures.reliability.densities import density_figures
 from mechdesign.report.figures.reliability.errors import map_figures, sweep_figures
-from mechdesign.report.figures.reliability.estimates import MOST_LISTED, estimate_figure
+from mechdesign.report.figures.reliability.estimates import MAX_LISTED, estimate_figure
 from mechdesign.report.figures.reliability.looks import Sampled, look
-from mechdesign.report.figures.reliability.simulations import convergence_figure, histogram_figure, trend_figure
+from mechdesign.report.figures.reliability.samples import (
+    convergence_figure,
+    density_figures,
+    histogram_figure,
+    trend_figure,
+)
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -25,13 +29,13 @@ from mechdesign.study.poses import Poses
 def figures(study: Study, result: Result) -> Gallery:
     """Whatever the result holds enough of to draw."""
     poses, tables = result.drawn["poses"], result.tables
-    swept, over = along(study, poses), plane(study, poses, study.reliability)
+    swept, over = along(study, poses), plane(study, poses)
     found = Gallery()
     if swept is not None:
         found.add("of errors along the motion", sweep_figures, study, tables["moments"], swept)
     if over is not None:
         found.add("of errors over the poses", map_figures, study, result, over)
-    few = poses.listed or (over is None and poses.count <= MOST_LISTED)
+    few = poses.listed or (over is None and poses.count <= MAX_LISTED)
     if "reliability" in tables and (few or swept is not None):
         found.add("reliability", estimate_figure, study, tables["reliability"], poses, swept)
     found.add("of samples", _sampled, study, result, poses)

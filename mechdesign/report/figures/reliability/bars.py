@@ -9,42 +9,52 @@ from matplotlib.figure import Figure
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.panels import MOST_PANELS, legend_below, title
-from mechdesign.report.figures.reliability.looks import heading, select
+from mechdesign.report.figures.panels import MAX_PANELS, legend_below, title
+from mechdesign.report.figures.reliability.looks import heading
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
-MOST_SOURCES = 16
-MOST_TOLERANCES = 20
-MOST_POSES = 4
+MAX_SOURCES = 16
+MAX_TOLERANCES = 20
+MAX_POSE_BARS = 4
 # Columns of bars, in words and colours.
 _SOBOL = {
     "share": ("first-order share", style.BLUE),
     "sobol_first": ("Sobol index, alone", style.ORANGE),
     "sobol_total": ("Sobol index, with all interactions", style.GREEN),
 }
-# Inches: a source, below a panel and above the next, and the least width of its bars.
-_LINE, _APART, _NARROWEST = 0.24, 0.94, 1.9
-_TOLERANCE = 0.36  # inches, both bars of a tolerance
+# Inches.
+_SOURCE_HEIGHT = 0.24
+_TOLERANCE_HEIGHT = 0.36  # of both bars
+_PANEL_GAP = 0.94
+_MIN_WIDTH = 1.9  # of a panel
 
 
 def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
     """A panel an output and order; a bar a pose where a few are listed, their average otherwise, or three indices."""
-    pairs = list(dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), strict=True)))[:MOST_PANELS]
+    pairs = list(dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), strict=True)))[:MAX_PANELS]
     names = list(dict.fromkeys(table["source"].tolist()))
     margin = 0.3 + 0.072 * max(len(name) for name in names)
-    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, int(style.WIDTH / (margin + _NARROWEST))))
+    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, int(style.WIDTH / (margin + _MIN_WIDTH))))
     sobol = _sobol_pose(table, poses, len(names))
-    each = sobol is None and poses.listed and poses.count <= MOST_POSES
+    each = sobol is None and poses.listed and poses.count <= MAX_POSE_BARS
     bars = 3 if sobol is not None else poses.count if each else 1
-    tall = (0.15 + min(len(names), MOST_SOURCES)) * max(_LINE, 0.1 * bars + 0.06)
+    tall = (0.15 + min(len(names), MAX_SOURCES)) * max(_SOURCE_HEIGHT, 0.1 * bars + 0.06)
     bottom = 0.55 + 0.2 * (0 if bars == 1 else 1 if bars < 3 else 2)
     figure, grid = style.page(
-        len(pairs), columns, tall, left=margin, right=0.15, top=0.75, bottom=bottom, across=margin + 0.1, down=_APART
+        len(pairs),
+        columns,
+        tall,
+        left=margin,
+        right=0.15,
+        top=0.75,
+        bottom=bottom,
+        across=margin + 0.1,
+        down=_PANEL_GAP,
     )
     for k, (axis, (output, order)) in enumerate(zip(grid, pairs, strict=True)):
-        rows = select(table, output=output, order=order)
+        rows = table.where(output=output, order=order)
         if sobol is not None:
             _indices(axis, table, rows, names, sobol)
         else:
@@ -80,7 +90,7 @@ def _sobol_pose(table: Table, poses: Poses, sources: int) -> int | None:
 def _shares(study: Study, axis: Axes, shares: Floats, names: list[str], poses: Poses, each: bool) -> None:
     known = shares[np.isfinite(shares).all(axis=1)]
     average = known.mean(axis=0) if len(known) else np.zeros(len(names))
-    ranked = np.argsort(-average, kind="stable")[:MOST_SOURCES]
+    ranked = np.argsort(-average, kind="stable")[:MAX_SOURCES]
     shown = 100.0 * (shares[:, ranked] if each else average[None, ranked])
     height = 0.8 / len(shown)
     for k, values in enumerate(shown):
@@ -97,7 +107,7 @@ def _indices(axis: Axes, table: Table, rows: Flags, names: list[str], pose: int)
     own = np.flatnonzero(rows)[pose * len(names) : (pose + 1) * len(names)]
     # Correlated sources have no indices of their own: they are ranked by their share.
     largest = np.fmax(table["sobol_total"][own], table["share"][own])
-    ranked = own[np.argsort(-np.nan_to_num(largest), kind="stable")[:MOST_SOURCES]]
+    ranked = own[np.argsort(-np.nan_to_num(largest), kind="stable")[:MAX_SOURCES]]
     height = 0.8 / len(_SOBOL)
     for k, (column, (words, color)) in enumerate(_SOBOL.items()):
         values, reach = 100.0 * table[column][ranked], None
@@ -123,12 +133,12 @@ def allocation_figure(study: Study, table: Table) -> Figure:
     assert section.allocate is not None
     total = [float(np.nansum(table[name])) for name in ("cost_given", "cost_allocated")]
     note = f"cost {total[0]:.4g} as given, {total[1]:.4g} allocated ({100 * (total[1] / total[0] - 1):+.1f} %)"
-    table = table.take(np.arange(len(table))[:MOST_TOLERANCES])
+    table = table.take(np.arange(len(table))[:MAX_TOLERANCES])
     names = [f"{row['source']}" + f" ({row['kind']})" * (row["kind"] != "tolerance") for row in table.rows()]
     units = table["unit"].tolist()
     margin = 0.35 + 0.075 * max(len(name) for name in names)
     figure, (one, two) = style.page(
-        2, 2, _TOLERANCE * len(table), left=margin, right=0.2, top=0.8, bottom=1.05,
+        2, 2, _TOLERANCE_HEIGHT * len(table), left=margin, right=0.2, top=0.8, bottom=1.05,
         across=0.45 * (style.WIDTH - margin - 0.2) / 2.45, sharey=True,
     )  # fmt: skip
     alike, given, allocated = len(set(units)) == 1, table["given"], table["allocated"]

@@ -11,7 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.report.figures import style
-from mechdesign.report.figures.panels import BARE, MOST_PANELS, WITH_LEGEND, Along, legend_below, stack, tick_abscissa
+from mechdesign.report.figures.panels import (
+    BELOW_BARE,
+    BELOW_WITH_LEGEND,
+    MAX_PANELS,
+    Along,
+    legend_below,
+    stack,
+    tick_abscissa,
+)
 from mechdesign.report.figures.planes import Plane, map_sheet
 from mechdesign.report.figures.reliability.looks import (
     Look,
@@ -23,15 +31,14 @@ from mechdesign.report.figures.reliability.looks import (
     heading,
     look,
     methods,
-    select,
 )
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
-MOST_OUTPUTS = 7
-MOST_MAPS = 4
-# A limit so many times as far out as all errors is told and not drawn.
-_FAR = 3.0
+MAX_OUTPUTS = 7
+MAX_MAPS = 4
+# A limit so many times as far out as all errors is named and not drawn.
+_FAR_FROM_ERRORS = 3.0
 
 
 def sweep_figures(study: Study, moments: Table, swept: Along) -> dict[str, Figure]:
@@ -47,7 +54,7 @@ def sweep_figures(study: Study, moments: Table, swept: Along) -> dict[str, Figur
 
 def _bands(study: Study, moments: Table, swept: Along) -> Figure:
     """Mean error and three standard deviations to both sides: computed ones as a band, simulated ones as dots."""
-    shown = channels(moments)[:MOST_PANELS]
+    shown = channels(moments)[:MAX_PANELS]
     known = methods(moments)
     figure, axes = stack(len(shown), "Errors of made mechanisms: mean \N{PLUS-MINUS SIGN} 3 standard deviations",
                          swept.label)  # fmt: skip
@@ -57,7 +64,7 @@ def _bands(study: Study, moments: Table, swept: Along) -> Figure:
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
         axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
         for method in known:
-            drawn, rows = look(method), select(moments, output=output, order=order, method=method)
+            drawn, rows = look(method), moments.where(output=output, order=order, method=method)
             mean = moments["mean"][rows] - moments["nominal"][rows]
             reach = 3.0 * moments["sigma"][rows]
             if method == filled:
@@ -68,7 +75,7 @@ def _bands(study: Study, moments: Table, swept: Along) -> Figure:
                 continue
             for value in (mean - reach, mean, mean + reach):
                 (entries[drawn.words],) = axis.plot(swept.values, value, linewidth=1.2, markersize=2.8, **_line(drawn))
-        reach = _FAR * np.abs(axis.get_ylim()).max()
+        reach = _FAR_FROM_ERRORS * np.abs(axis.get_ylim()).max()
         near, far = apart(error_limits(study, output, order), -reach, reach)
         for limit in near:
             entries["limit of the error"] = axis.axhline(
@@ -92,7 +99,7 @@ def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
         for output, color in zip(outputs, style.PALETTE, strict=False):
             for method in known:
-                rows = select(moments, output=output, order=order, unit=unit, method=method)
+                rows = moments.where(output=output, order=order, unit=unit, method=method)
                 shown = _line(look(method)) | ({} if single else {"color": color})
                 axis.plot(swept.values, moments[column][rows], markersize=3.2, **shown)
         _name_outputs(axis, outputs, [style.INK] if single else style.PALETTE)
@@ -115,17 +122,17 @@ def _difference(moments: Table, swept: Along, reference: str, computed: Sequence
     panels = _grouped(moments)
     figure, axes = stack(
         len(panels), f"Standard deviation less that of {look(reference).words}, in per cent of it", swept.label,
-        note="in brackets: how far apart on average", bottom=WITH_LEGEND if len(computed) > 1 else BARE,
+        note="in brackets: how far apart on average", bottom=BELOW_WITH_LEGEND if len(computed) > 1 else BELOW_BARE,
     )  # fmt: skip
     tick_abscissa(axes[-1], swept)
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
         axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
         named = []
         for output, color in zip(outputs, style.PALETTE, strict=False):
-            true = moments["sigma"][select(moments, output=output, order=order, unit=unit, method=reference)]
+            true = moments["sigma"][moments.where(output=output, order=order, unit=unit, method=reference)]
             apart = []
             for method in computed:
-                rows = select(moments, output=output, order=order, unit=unit, method=method)
+                rows = moments.where(output=output, order=order, unit=unit, method=method)
                 with np.errstate(invalid="ignore", divide="ignore"):
                     percent = 100.0 * (moments["sigma"][rows] / true - 1.0)
                 mean = np.nanmean(np.abs(percent)) if np.isfinite(percent).any() else np.nan
@@ -156,7 +163,7 @@ def _grouped(table: Table) -> list[tuple[str, str, list[str]]]:
     panels: dict[tuple[str, str], list[str]] = {}
     for output, order, unit in channels(table):
         panels.setdefault((order, unit), []).append(output)
-    return [(*key, outputs[:MOST_OUTPUTS]) for key, outputs in list(panels.items())[:MOST_PANELS]]
+    return [(*key, outputs[:MAX_OUTPUTS]) for key, outputs in list(panels.items())[:MAX_PANELS]]
 
 
 def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
@@ -165,15 +172,15 @@ def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
     method = best_moments(moments)
     shown = [channel for channel in channels(moments) if channel[1] == "position"] or channels(moments)
     parts = []
-    for output, order, unit in shown[:MOST_MAPS]:
-        rows = select(moments, output=output, order=order, method=method)
+    for output, order, unit in shown[:MAX_MAPS]:
+        rows = moments.where(output=output, order=order, method=method)
         parts.append((style.axis_label(output, unit), moments["sigma"][rows].reshape(over.x.shape)))
     note = f"by {look(method).words}; the error is that of made mechanisms at this pose"
     found = {"deviation_map": map_sheet(study, over, parts, "Standard deviation of the error", note)}
     if "reliability" in result.tables:
         table = result.tables["reliability"]
         method = best_probability(table)
-        rows = select(table, method=method, scope="pose")
+        rows = table.where(method=method, scope="pose")
         failure = table["failure"][rows].reshape(over.x.shape)
         found["failure_map"] = map_sheet(
             study, over, [("", failure)], "Probability that an error leaves its limits", f"by {look(method).words}",

@@ -12,19 +12,22 @@ from mechdesign.analyses.poses import pose_in_words
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import Along, fitting, legend_below, number, tick_abscissa, title
-from mechdesign.report.figures.reliability.looks import look, methods, select
+from mechdesign.report.figures.reliability.looks import look, methods
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS
 
 # Listed poses whose names fit below a picture.
-MOST_LISTED = 12
+MAX_LISTED = 12
 # Values that are written beside their marks.
-MOST_WRITTEN = 8
-_LEFT, _ABOVE, _TALL = 0.95, 0.7, 2.7  # inches
-# Values farther apart than this are drawn on a logarithmic scale.
-_WIDE = 8.0
+MAX_WRITTEN = 8
+# Inches.
+_LEFT = 0.95
+_ABOVE = 0.7
+_HEIGHT = 2.7
+# Values whose ratio is larger than this are drawn on a logarithmic scale.
+_MAX_LINEAR_RATIO = 8.0
 # Handles by their words; error bars are no artists.
 Legend = dict[str, Any]
 
@@ -32,19 +35,19 @@ Legend = dict[str, Any]
 def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | None) -> Figure:
     """Failure by every method, over what a sweep runs over or beside the words for each listed pose."""
     known, unseen = methods(table), _unseen(table)
-    count = poses.count if swept is not None else min(poses.count, MOST_LISTED)
+    count = poses.count if swept is not None else min(poses.count, MAX_LISTED)
     values = np.arange(count, dtype=np.float64) if swept is None else swept.values
-    written = swept is None and count * len(known) <= MOST_WRITTEN
+    written = swept is None and count * len(known) <= MAX_WRITTEN
     # Methods stand beside each other at a listed pose; of a sweep those that are simulated, a little.
     beside = known if swept is None else [method for method in known if look(method).simulated]
     step = min(0.3 if written else 0.14, 0.8 / len(known)) if swept is None else 0.2 * np.ptp(values) / count
     lines = 1 if swept is not None else min(len(poses.names), 4)
-    figure, (axes,) = style.page(1, 1, _TALL, left=_LEFT, right=0.15, top=_ABOVE, bottom=1.0)
+    figure, (axes,) = style.page(1, 1, _HEIGHT, left=_LEFT, right=0.15, top=_ABOVE, bottom=1.0)
     axes.set_ylabel("failure probability")
     floor = _scale(axes, table)
     entries: Legend = {}
     for method in known:
-        rows, drawn = np.flatnonzero(select(table, method=method, scope="pose"))[:count], look(method)
+        rows, drawn = np.flatnonzero(table.where(method=method, scope="pose"))[:count], look(method)
         at = values + (beside.index(method) - (len(beside) - 1) / 2) * step if method in beside else values
         value = table["failure"][rows]
         if drawn.simulated:
@@ -67,7 +70,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
         words = [pose_in_words(study, poses, row).replace(", ", "\n") for row in range(count)]
         axes.set_xticks(values, words, fontsize=8 if count <= 8 else 6.5)
         axes.set_xlim(-0.6, count - 0.4)
-        heading += f" (first {MOST_LISTED} of {poses.count} poses)" if poses.count > MOST_LISTED else ""
+        heading += f" (first {MAX_LISTED} of {poses.count} poses)" if poses.count > MAX_LISTED else ""
     else:
         axes.set_xlabel(swept.label)
         tick_abscissa(axes, swept)
@@ -75,7 +78,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
     for method in known:
         _cycle(axes, table, method, entries)
     bottom = 0.45 + 0.15 * lines + 0.2 * -(-len(entries) // fitting(list(entries)))
-    height = _ABOVE + _TALL + bottom
+    height = _ABOVE + _HEIGHT + bottom
     figure.set_figheight(height)
     figure.subplots_adjust(bottom=bottom / height, top=1 - _ABOVE / height)
     notes = ["whiskers: 99.7 % intervals"] * any(look(method).simulated for method in known)
@@ -89,7 +92,7 @@ def _scale(axes: Axes, table: Table) -> float:
     """Set the axis, logarithmic where values lie far apart; returns its floor, 0 where it is linear."""
     value = np.concatenate([table["failure"], table["failure_high"][_unseen(table)]])
     positive = value[np.isfinite(value) & (value > 0)]
-    if len(positive) and positive.max() > _WIDE * positive.min():
+    if len(positive) and positive.max() > _MAX_LINEAR_RATIO * positive.min():
         axes.set_yscale("log")
         floor = 10.0 ** np.floor(np.log10(max(0.5 * positive.min(), 1e-300)))
         axes.set_ylim(floor, min(1.0, 3.0 * float(np.nanmax(table["failure_high"]))))
@@ -125,7 +128,7 @@ def _dots(axes: Axes, table: Table, rows: Ints, at: Floats, asked: str, floor: f
 def _cycle(axes: Axes, table: Table, method: str, entries: Legend) -> None:
     """The whole cycle across the picture: its value, and the bounds or the interval about it."""
     drawn = look(method)
-    for row in np.flatnonzero(select(table, method=method, scope="cycle")):
+    for row in np.flatnonzero(table.where(method=method, scope="cycle")):
         low, high, value = (float(table[name][row]) for name in ("failure_low", "failure_high", "failure"))
         between = axes.axhspan(max(low, axes.get_ylim()[0]), high, color=drawn.color, alpha=0.15, linewidth=0)
         if table["used"][row] == "bounds":

@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from mechdesign.analyses.reliability.first_order import ORDERS
-from mechdesign.numerics.arrays import Flags
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -64,11 +63,6 @@ def best_moments(table: Table) -> str:
         return method.errors, not method.precise, method.accuracy
 
     return max(methods(table), key=rank)
-
-
-def select(table: Table, **chosen: str) -> Flags:
-    """Rows in which columns have these values."""
-    return np.asarray(np.logical_and.reduce([table[name] == value for name, value in chosen.items()]))
 
 
 def channels(table: Table) -> list[tuple[str, str, str]]:

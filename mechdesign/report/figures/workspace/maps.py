@@ -12,23 +12,23 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
-from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.workspace.regions import Grid, Region, sheet, some
+from mechdesign.report.figures.workspace.regions import Grid, Region, grids, sheet, some
 from mechdesign.study import Study
 
 Extend = Literal["neither", "max"]
 # Columns of the table that are no indices, beside the held coordinates.
 _NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node", "piece")
 # An index whose largest values are a thin tail is cut off above this share of the area, which the bar shows.
-_TAIL = 0.96
+_SHOWN_AREA = 0.96
 # Points on paper between the name of a level and lines of other levels, and other names.
-CLEAR = (5.0, 18.0)
+CLEAR_OF_LINES = 5.0
+CLEAR_OF_NAMES = 18.0
 
 
 def map_figures(study: Study, found: Sequence[Region]) -> Gallery:
@@ -60,25 +60,25 @@ def _map(study: Study, found: Sequence[Region], column: str) -> Figure:
         study, places, [region.title for region in found], f"{name} at point {point}: {told.meaning}", bar=True
     )
     for axes, region in zip(page.axes, found, strict=True):
-        contours(axes, list(region.grids(column)), levels, norm, extend, labels=len(found) == 1)
+        contours(axes, list(grids(region.local, column)), levels, norm, extend, labels=len(found) == 1)
     page.ends(found)
     page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, told.unit), ticks=levels)
     return page.figure
 
 
 def contours(
-    axes: Axes, grids: Sequence[Grid], levels: Floats, norm: BoundaryNorm, extend: Extend, *, labels: bool
+    axes: Axes, patches: Sequence[Grid], levels: Floats, norm: BoundaryNorm, extend: Extend, *, labels: bool
 ) -> None:
     """Filled contours over the patches of a region, each level named once, where its line is longest."""
     drawn = []
-    for x, y, z in grids:
+    for x, y, z in patches:
         # Beyond the last level is where an index grows without bounds, on singularities.
         over = levels[-1] + (levels[-1] - levels[0])
         shown = np.where(np.isfinite(z), np.minimum(z, over), over if extend == "max" else levels[0])
         axes.contourf(x, y, shown, levels=levels, cmap=style.COLORMAP, norm=norm, extend=extend)
         drawn.append(axes.contour(x, y, shown, levels=levels[1:], colors="white", linewidths=0.5, alpha=0.7))
     if labels:
-        edges = [np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]]) for z in (x + 1j * y for x, y, _ in grids)]
+        edges = [np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]]) for z in (x + 1j * y for x, y, _ in patches)]
         label_levels(axes, drawn, levels, norm, _on_paper(axes, np.concatenate(edges)))
 
 
@@ -86,7 +86,10 @@ def label_levels(
     axes: Axes, drawn: Sequence[QuadContourSet], levels: Floats, norm: BoundaryNorm, blocked: Complexes
 ) -> None:
     """Name each level once on one of its lines, far from other lines and names; or not at all."""
-    lines = [[part for contour in drawn for part in _parts(axes, contour, k)] for k in range(len(levels) - 1)]
+    parts_of = [contour.allsegs for contour in drawn]
+    lines = [
+        [_on_paper(axes, part @ [1, 1j]) for parts in parts_of for part in parts[k]] for k in range(len(levels) - 1)
+    ]
     every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]
     taken = np.zeros(0, dtype=complex)
     for k, level in enumerate(levels[1:]):
@@ -96,7 +99,7 @@ def label_levels(
             continue
         at, along = np.array(places).T
         others = np.concatenate([*every[:k], *every[k + 1 :], blocked])
-        room = np.minimum(_nearest(at, others) / CLEAR[0], _nearest(at, taken) / CLEAR[1])
+        room = np.minimum(_nearest(at, others) / CLEAR_OF_LINES, _nearest(at, taken) / CLEAR_OF_NAMES)
         # Where there is room, upright names read best.
         best = int(np.argmax(np.minimum(room, 2.0) + np.abs(along.real) / np.abs(along)))
         if room[best] < 1:
@@ -112,14 +115,6 @@ def label_levels(
         )  # fmt: skip
 
 
-def _parts(axes: Axes, contour: QuadContourSet, level: int) -> list[Complexes]:
-    path = contour.get_paths()[level]
-    if path.codes is None:
-        return []
-    corners = np.split(np.asarray(path.vertices), np.flatnonzero(path.codes == Path.MOVETO)[1:])
-    return [_on_paper(axes, part @ np.array([1, 1j])) for part in corners]
-
-
 def _on_paper(axes: Axes, places: Complexes) -> Complexes:
     """Places in points on paper."""
     return np.asarray(paper(axes, places) @ np.array([1, 1j]))
@@ -133,14 +128,14 @@ def _nearest(places: Complexes, others: Complexes) -> Floats:
 
 def _levels(found: Sequence[Region], column: str) -> tuple[Floats, Extend]:
     """Round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
-    grids = [grid for region in found for grid in region.grids(column)]
-    values = np.concatenate([z.ravel() for _, _, z in grids])
-    areas = np.concatenate([_areas(x, y).ravel() for x, y, _ in grids])
+    patches = [patch for region in found for patch in grids(region.local, column)]
+    values = np.concatenate([z.ravel() for _, _, z in patches])
+    areas = np.concatenate([_areas(x, y).ravel() for x, y, _ in patches])
     finite = np.isfinite(values)
     values, areas = values[finite], areas[finite]
     order = np.argsort(values)
     share = np.cumsum(areas[order]) / areas.sum()
-    high = float(values[order[min(int(np.searchsorted(share, _TAIL)), len(order) - 1)]])
+    high = float(values[order[min(int(np.searchsorted(share, _SHOWN_AREA)), len(order) - 1)]])
     low, top = float(values.min()), float(values.max())
     tail = top > 1.4 * high + 1e-12
     if not tail:

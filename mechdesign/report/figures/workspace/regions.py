@@ -39,28 +39,25 @@ LOOKS: Mapping[str, tuple[str, Any, float, str]] = {
 # Of the region itself; opaque, so that patches leave no seams.
 PALE = "#D5EBF8"
 LEFT_OUT = "#ECECEC"
-# Inches: a bar of colours with its numbers, the legend, above a panel, above all of them, and between two rows.
-_BAR, _LEGEND, _ABOVE, _TOP, _DOWN = 0.95, 0.24, 0.34, 0.4, 0.28
-_TALLEST = 6.5
-# Regions that a picture shows side by side.
-MOST = 6
+MAX_REGIONS = 6  # that a picture shows side by side
 # Free room around what is shown, as a share of its size; with a mechanism there are symbols that reach beyond points.
-_PAD, ROOM = 0.03, 0.07
+_PAD = 0.03
+ROOM = 0.07
+# Inches.
+_BAR = 0.95  # of a bar of colours with its numbers
+_LEGEND = 0.24
+_PANEL_TITLE = 0.34
+_TITLE = 0.4
+_ROW_GAP = 0.28
+_MAX_HEIGHT = 6.5
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The region for one value of each held coordinate.
+    """The region for one value of each held coordinate: its row of the table of indices, and its part of the others.
 
-    Parameters
-    ----------
-    title : str
-        ``platform.angle = 15 deg``; empty where nothing is held.
-    held : mapping of str to float
-    row : int
-        Its row of the table of indices.
-    others : (Table, Table) or None
-        Grids and boundary of pieces that are left out.
+    The title is ``platform.angle = 15 deg``, empty where nothing is held; `others` are grids and boundary of the pieces
+    that are left out.
     """
 
     title: str
@@ -71,17 +68,14 @@ class Region:
     singularities: Table | None
     others: tuple[Table, Table] | None = None
 
-    def grids(self, column: str) -> Iterator[Grid]:
-        """x, y and a column of each patch, shape (rays, nodes)."""
-        return _grids(self.local, column)
-
     def places(self) -> Complexes:
         """Every place of the region's grid and outline, and of what is left out."""
         found = [table["x"] + 1j * table["y"] for table in (self.local, self.boundary, *(self.others or ()))]
         return np.concatenate(found)
 
 
-def _grids(local: Table, column: str) -> Iterator[Grid]:
+def grids(local: Table, column: str) -> Iterator[Grid]:
+    """x, y and a column of each patch, shape (rays, nodes)."""
     for patch in np.unique(local["patch"]):
         rows = local["patch"] == patch
         shape = (int(local["ray"][rows].max()) + 1, int(local["node"][rows].max()) + 1)
@@ -96,7 +90,8 @@ def regions(study: Study, result: Result) -> list[Region]:
     found = []
     for row in range(len(indices)):
         values = {name: float(indices[name][row]) for name in held}
-        local = pick(result.tables["local"], values)
+        local = result.tables["local"]
+        local = local.take(local.where(**values))
         if not len(local):
             continue
         lines = result.tables.get("singularities")
@@ -104,21 +99,14 @@ def regions(study: Study, result: Result) -> list[Region]:
             f"{name} = {value:g} {study.units.label(study.mechanism.quantity(name))}".strip()
             for name, value in values.items()
         )
-        boundary, others = pick(result.tables["boundary"], values), None
+        boundary, others = result.tables["boundary"], None
+        boundary = boundary.take(boundary.where(**values))
         if study.workspace is not None and study.workspace.assembly == "same" and (local["piece"] > 1).any():
             others = local.take(local["piece"] > 1), boundary.take(boundary["piece"] > 1)
             local, boundary = local.take(local["piece"] == 1), boundary.take(boundary["piece"] == 1)
-        loci = pick(lines, values) if lines is not None and len(lines) else None
+        loci = lines.take(lines.where(**values)) if lines is not None and len(lines) else None
         found.append(Region(title, values, row, local, boundary, loci, others))
     return found
-
-
-def pick(table: Table, values: Mapping[str, float]) -> Table:
-    """Rows of a table in which columns have these values."""
-    rows = np.ones(len(table), dtype=bool)
-    for name, value in values.items():
-        rows &= table[name] == value
-    return table.take(rows)
 
 
 def fate(kind: str, at: str) -> str:
@@ -136,8 +124,7 @@ def outline(axes: Axes, region: Region) -> set[str]:
     seen = outline_of(axes, region.boundary)
     if region.others is not None:
         local, boundary = region.others
-        for x, y, _ in _grids(local, "det_J"):
-            axes.fill(*_edge(x, y), color=LEFT_OUT, linewidth=0, antialiased=False, zorder=0.9)
+        _fill(axes, local, LEFT_OUT, zorder=0.9)
         for rows in curves(boundary):
             axes.plot(boundary["x"][rows], boundary["y"][rows], color=style.FAINT, linewidth=0.8, zorder=2.8)
         seen.add("other")
@@ -186,13 +173,14 @@ def loci(axes: Axes, region: Region) -> set[str]:
 
 def fill(axes: Axes, region: Region) -> None:
     """Fill the region in a pale colour."""
-    for x, y, _ in region.grids("det_J"):
-        axes.fill(*_edge(x, y), color=PALE, linewidth=0, antialiased=False)
+    _fill(axes, region.local, PALE)
 
 
-def _edge(x: Floats, y: Floats) -> list[Floats]:
-    """Coordinates along both curves of a patch."""
-    return [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
+def _fill(axes: Axes, local: Table, color: str, **look: Any) -> None:
+    """Fill what lies between both curves of each patch."""
+    for x, y, _ in grids(local, "det_J"):
+        edge = [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
+        axes.fill(*edge, color=color, linewidth=0, antialiased=False, **look)
 
 
 def coloured(axes: Axes, z: Complexes, values: Floats, norm: Normalize, width: float = 3.5) -> LineCollection:
@@ -206,7 +194,7 @@ def coloured(axes: Axes, z: Complexes, values: Floats, norm: Normalize, width: f
 
 def some(found: Sequence[Region]) -> list[Region]:
     """Of many regions a few, spread evenly."""
-    return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST)).astype(int))]
+    return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MAX_REGIONS)).astype(int))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,13 +231,13 @@ def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *,
     room = style.WIDTH - RIGHT - (_BAR if bar else 0.0)
     middle, wide, tall = extent(places)
     wide, tall = wide + 2 * pad * max(wide, tall), tall + 2 * pad * max(wide, tall)
-    scale = min((room - LEFT * columns) / columns / wide, (_TALLEST if rows == 1 else 7.5 / rows) / tall)
-    window, above, down = Window(middle, scale, scale * wide, scale * tall), 0.0, _DOWN
+    scale = min((room - LEFT * columns) / columns / wide, (_MAX_HEIGHT if rows == 1 else 7.5 / rows) / tall)
+    window, above, down = Window(middle, scale, scale * wide, scale * tall), 0.0, _ROW_GAP
     if number > 1:
-        above, down = _ABOVE, _ABOVE + _DOWN
+        above, down = _PANEL_TITLE, _PANEL_TITLE + _ROW_GAP
     figure, panels = windows(
         window, study.units.label("length"), number, columns, gap=(room - LEFT) / columns - window.width, above=down,
-        top=_TOP + above - down, below=BELOW + _LEGEND,
+        top=_TITLE + above - down, below=BELOW + _LEGEND,
     )  # fmt: skip
     outer = figure.get_figheight()
     for axes, name in zip(panels, titles, strict=True):

@@ -1,7 +1,8 @@
-"""Curves of a motion over the sweep or along the path, with the limits of motion."""
+"""Pictures of a motion: curves over the sweep, the mechanism in several poses, and its other assemblies."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -11,26 +12,60 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, extent, fit, framed, scale_of, windows
 from mechdesign.report.figures.panels import abscissa, moving_names, tick_abscissa
-from mechdesign.report.figures.sweep import ranks
+from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.scene import Sweep, link_points, ranks
 from mechdesign.results import Column, Result
 from mechdesign.study import Study, Units
 
 # More curves than this in one panel cannot be told apart.
-MOST_CURVES = 7
-MOST_PANELS = 12
+MAX_CURVES = 7
+MAX_CURVE_PANELS = 12
 _COLORS = (*style.PALETTE[:6], style.INK)  # yellow is lost on white
 _ORDERS = ("velocity", "acceleration", "error", "effort")
-_RANKS = ("position", "velocity", "acceleration", "error", "effort", "det_J", "inverse_condition")
-_MANY = 7  # panels from which on they are lower
-_LETTERS = 26  # longest name in a legend
+_RANKS = ("position", *_ORDERS, "det_J", "inverse_condition")
+_MAX_TALL_PANELS = 7  # more panels are lower
+_LEGEND_LETTERS = 26  # of the longest name in a legend
 _STILL = 1e-9  # part of its size by which a column changes that does not change
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
-_TAIL, _PEAK = 4, 6  # per cent of the poses left out at both ends, and how many times their range makes a peak
-_LIMITS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
+_TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
+_PEAK_RATIO = 6  # of the whole range to that of the other poses
+_LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
+# Largest number of moving links, and for it the number of ghosts and their share of colour.
+_GHOSTS = ((3, 7, 0.42), (5, 6, 0.38), (8, 4, 0.32), (10**6, 2, 0.3))
+# Line width and share of colour of a path by the rank of its point.
+_PATH_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
+HEIGHT = 5.6  # inches, of a mechanism along its motion at most
+# Of the panels of assemblies: their number side by side, inches, and the size of symbols in small ones.
+_MAX_COLUMNS = 4
+_MAX_HEIGHT = 4.0
+_MIN_HEIGHT = 1.2
+_PANEL_TITLE = 0.3
+_NOTE = 0.3
+_GAP = 0.12
+_SMALL_SYMBOLS = 0.6
+
+
+def figures(study: Study, result: Result) -> Gallery:
+    """``motion`` (curves of a sweep or path), ``paths`` (poses and point paths) and ``modes`` (every assembly).
+
+    Lists and grids of poses have neither curves nor paths.
+    """
+    found = Gallery()
+    if result.drawn["poses"].motion:
+        found.add("motion", curves_figure, study, result)
+        sweep = Sweep.of(result.drawn["motion"])
+        if len(sweep.valid):
+            found.add("paths", paths_figure, sweep)
+    if "modes" in result.tables:
+        found.add("modes", modes_figure, study, result)
+    return found
 
 
 class _Curve(NamedTuple):
@@ -55,9 +90,9 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     if limits is not None and swept in limits:
         marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
-    longest = min(max(len(curve.of) for panel in panels for curve in panel[:MOST_CURVES]), _LETTERS)
+    longest = min(max(len(curve.of) for panel in panels for curve in panel[:MAX_CURVES]), _LEGEND_LETTERS)
     figure, axes = style.page(
-        len(panels), 1, 1.57 if len(panels) <= _MANY else 1.23, left=1.0, right=0.6 + 0.08 * longest,
+        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=1.0, right=0.6 + 0.08 * longest,
         top=0.4 if marks else 0.15, bottom=0.5, down=0.2, sharex=True,
     )  # fmt: skip
     colors: dict[tuple[str, str], str] = {}
@@ -74,7 +109,7 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
 
 
 def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
-    """Columns by kind and unit, in the order of `_RANKS`, what tells most first."""
+    """Columns by kind and unit, in the order of `_RANKS`, the most informative first."""
     section = study.kinematics
     asked = section.outputs if section is not None and section.outputs is not None else ()
     values = {column.name: column.values for column in columns}
@@ -95,15 +130,15 @@ def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[
         position = values.get(of, column.values)
         if order in _RANKS[:3] and swept and _still(position - x, float(np.ptp(x))):
             continue  # the sweep over itself
-        # Of what stands still only the place is told, and only where it is asked for.
+        # Of what stands still only the position is drawn, and only where it is an output.
         told = order in ("error", "effort") or (order == "position" and asked and of not in study.mechanism.drives)
         if not told and _still(position, sizes.get(unit_of.get(of, ""), 1.0)):
             continue
         curve = _Curve(column, of, order)
         panels.setdefault((order, column.unit), []).append(curve)
-    found = sorted(panels.values(), key=lambda panel: _RANKS.index(panel[0].order))[:MOST_PANELS]
+    found = sorted(panels.values(), key=lambda panel: _RANKS.index(panel[0].order))[:MAX_CURVE_PANELS]
     for panel in found:
-        if len(panel) > MOST_CURVES:
+        if len(panel) > MAX_CURVES:
             panel.sort(key=lambda curve: -rank.get(curve.of.rpartition(".")[0], 1))
     return found
 
@@ -135,12 +170,16 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
 
 def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
     shown: list[Floats] = []
-    for curve in panel[:MOST_CURVES]:
+    for curve in panel[:MAX_CURVES]:
         values = curve.column.values
         # A name keeps its colour from its position to its acceleration.
         color = colors.setdefault((curve.of, "" if curve.order in _RANKS[:4] else curve.order), _COLORS[len(shown)])
         hidden = any(_coincide(values, other) for other in shown)
-        label = curve.of if len(curve.of) <= _LETTERS else f"{curve.of[: _LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+        label = (
+            curve.of
+            if len(curve.of) <= _LEGEND_LETTERS
+            else f"{curve.of[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+        )
         axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=label)
         shown.append(values)
     first = panel[0]
@@ -158,8 +197,8 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
         middle = float(known.mean())
         axis.set_ylim(middle - max(0.1 * abs(middle), 0.1), middle + max(0.1 * abs(middle), 0.1))
     elif first.order != "position":
-        low, high = np.percentile(known, (_TAIL, 100 - _TAIL))
-        if np.ptp(known) > _PEAK * (high - low) > 0:
+        low, high = np.percentile(known, (_TAIL_PERCENT, 100 - _TAIL_PERCENT))
+        if np.ptp(known) > _PEAK_RATIO * (high - low) > 0:
             # Near a dead centre rates grow without bound: what they are elsewhere stays legible.
             axis.set_ylim(low - 0.5 * (high - low), high + 0.5 * (high - low))
     if len(panel) > 1 or first.of != first.order:
@@ -171,7 +210,8 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
 def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, str]], shaded: bool) -> None:
     kinds = list(dict.fromkeys(kind for _, kind in marks))
     looks: dict[str, dict[str, Any]] = {
-        kind: {"color": _LIMITS[k % len(_LIMITS)], "linestyle": (0, (6, 2 + k))} for k, kind in enumerate(kinds)
+        kind: {"color": _LIMIT_COLORS[k % len(_LIMIT_COLORS)], "linestyle": (0, (6, 2 + k))}
+        for k, kind in enumerate(kinds)
     }
     for axis in axes:
         for value, kind in marks:
@@ -185,3 +225,97 @@ def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, 
             handles=handles, loc="lower left", ncols=len(handles), borderaxespad=0.0,
             bbox_to_anchor=(axes[0].get_position().x0, 1 - 0.34 / height),
         )  # fmt: skip
+
+
+def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
+    """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
+
+    `above` it, inches are left for a title.
+    """
+    wanted = [
+        target.table[:, -2] + 1j * target.table[:, -1]
+        for target in sweep.study.targets.values()
+        if target.table is not None and len(target.coordinates) == 2
+    ]
+    places = np.concatenate([sweep.extent, *wanted])
+    figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
+    for path in wanted:
+        axes.plot(
+            path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,
+            zorder=3.7,
+        )  # fmt: skip
+    count = len(sweep.mechanism.description.links) - 1
+    _, ghosts, share = next(entry for entry in _GHOSTS if count <= entry[0])
+    # A closed motion ends where it begins: its last ghost would hide the first.
+    some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
+    for index in np.unique(some[1 : -1 if sweep.closed else None]):
+        draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index), share=share)
+    draw_paths(axes, sweep)
+    first = int(sweep.valid[0])
+    draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
+    return figure
+
+
+def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
+    """Draw the path of every moving point, bold ones for outputs and coupler points, as `ranks` has them."""
+    section = sweep.study.kinematics
+    asked = section.outputs if section is not None and section.outputs is not None else ()
+    ranked = ranks(sweep.mechanism, tuple(asked))
+    # Where all points are of a low rank, none is thin.
+    lift = 2 - max(ranked.values(), default=2)
+    colors = link_colors(sweep.mechanism)
+    owners: dict[str, str] = {}
+    for name, link in sweep.mechanism.description.links.items():
+        if name != GROUND:
+            for point in link_points(link):
+                owners.setdefault(point, name)
+    for point, path in sweep.places.items():
+        if sweep.closed and sweep.poses.closed:
+            # A closed path is listed without its begin at its end.
+            path = np.append(path, path[0])
+        line, share = _PATH_LOOKS[min(ranked[point] + lift, 2)]
+        axes.plot(
+            path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,
+            zorder=2.5 + 0.1 * ranked[point], solid_joinstyle="round",
+        )  # fmt: skip
+
+
+def modes_figure(study: Study, result: Result) -> Figure:
+    """A panel an assembly that has a valid pose, as many as the result carries, on one scale."""
+    shown = [(title, Sweep.of(each)) for title, each in result.drawn["modes"].items()]
+    found = result.counts["modes"]
+    moving = int((result.tables["modes"]["valid"].reshape(found, -1) > 0).any(axis=1).sum())
+    notes = []
+    if moving > len(shown):
+        notes.append(f"{len(shown)} of {moving} assemblies")
+    if found > moving:
+        notes.append(f"{found - moving} of {found} assemblies have no valid pose")
+    places = np.concatenate([sweep.extent for _, sweep in shown])
+    _, wide, tall = extent(places)
+    columns = max(
+        range(1, min(len(shown), _MAX_COLUMNS) + 1),
+        key=lambda count: scale_of(wide, tall, *_room(count, math.ceil(len(shown) / count)), _pad(count)),
+    )
+    window = fit(places, *_room(columns, math.ceil(len(shown) / columns)), _pad(columns))
+    unit, top = study.units.label("length"), _NOTE if notes else 0.0
+    figure, grid = windows(window, unit, len(shown), columns, gap=_GAP, above=_PANEL_TITLE, top=top)
+    for axes, (title, sweep) in zip(grid, shown, strict=True):
+        axes.set_title(title, loc="left", fontsize=10)
+        draw_paths(axes, sweep, width=0.8)
+        draw_mechanism(
+            axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=columns == 1, drives=False,
+            travel=sweep.travel, size=_SMALL_SYMBOLS if columns > 1 else 1.0,
+        )  # fmt: skip
+    figure.text(LEFT / style.WIDTH, 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
+    return figure
+
+
+def _pad(columns: int) -> float:
+    """Inches around what a panel shows."""
+    return 0.4 if columns == 1 else 0.2
+
+
+def _room(columns: int, rows: int) -> tuple[float, float]:
+    """Largest width and height of a panel, inches: all of them on about one screen."""
+    width = (style.WIDTH - LEFT - RIGHT - _GAP * (columns - 1)) / columns
+    return width, min(max(8.0 / rows, _MIN_HEIGHT), _MAX_HEIGHT)

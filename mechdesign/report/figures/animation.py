@@ -18,13 +18,16 @@ from PIL import Image
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import TITLE, framed
-from mechdesign.report.figures.kinematics.paths import TALLEST, draw_paths
-from mechdesign.report.figures.sweep import Sweep
+from mechdesign.report.figures.kinematics import HEIGHT, draw_paths
+from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Result
 
 FRAMES = 60
-_COLORS, _WHITE = 128, 244
-_CYCLE, _SHORTEST, _LONGEST = 3600, 50, 160  # milliseconds: of the whole, and of a frame
+_COLORS = 128
+_WHITE = 244  # brightness of 255 from which on a colour is white
+_CYCLE = 3600  # milliseconds, of the whole
+_MIN_FRAME = 50  # milliseconds
+_MAX_FRAME = 160  # milliseconds
 _DPI = 80  # 640 pixels wide
 
 
@@ -43,14 +46,14 @@ def gif(sweep: Sweep) -> bytes:
     # A closed motion begins again with its last pose; another shows its inner poses twice.
     most = FRAMES + 1 if closed else FRAMES // 2 + 1
     some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
-    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=TALLEST, above=TITLE)
+    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=HEIGHT, above=TITLE)
     figure.set_dpi(_DPI)
     draw_paths(axes, sweep)
     pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)
     pictures = pictures if closed else pictures + pictures[-2:0:-1]
     palette = _palette(pictures)
     frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    pause = min(max(_CYCLE // len(frames), _SHORTEST), _LONGEST) // 10 * 10
+    pause = min(max(_CYCLE // len(frames), _MIN_FRAME), _MAX_FRAME) // 10 * 10
     stream = io.BytesIO()
     frames[0].save(stream, format="GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0)
     return stream.getvalue()

@@ -1,0 +1,378 @@
+"""Pictures of a stiffness: equivalent springs [S4, Fig. 6], directions, curves or maps, deflections, free motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from mechdesign.analyses.poses import pose_in_words
+from mechdesign.analyses.stiffness.analysis import Drawn
+from mechdesign.analyses.stiffness.elements import course_of
+from mechdesign.analyses.stiffness.network import NetworkEdge
+from mechdesign.mechanism import Configuration
+from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_mechanism, link_colors, name_labels
+from mechdesign.report.figures.framing import MAX_HEIGHT, TITLE, framed
+from mechdesign.report.figures.labels import Label, covered, place_labels
+from mechdesign.report.figures.panels import along
+from mechdesign.report.figures.planes import Plane, map_sheet, plane
+from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.results import Result
+from mechdesign.study import Poses, Study
+
+MAX_DIRECTIONS = 4
+MAX_LOADS = 4
+_COIL_LENGTH = 0.17  # over the size of the mechanism
+_COIL_SWING = 0.12  # half the width of a coil over its length
+_COIL_TURNS = 7
+_COIL_ORDER = 5.0
+_LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
+# Shape functions of a deflected beam, cubic between its ends as bending makes it, at these parts of its length.
+_ALONG = np.linspace(0.0, 1.0, 25)
+_CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _ALONG**3,
+                   3 * _ALONG**2 - 2 * _ALONG**3, _ALONG**3 - _ALONG**2])  # fmt: skip
+
+
+def figures(study: Study, result: Result) -> Gallery:
+    """``springs`` (first pose), ``directions`` (a few poses), and over many poses ``stiffness``, curves or a map."""
+    found = Gallery()
+    drawn, poses = result.drawn, result.drawn["poses"]
+    if "first" in drawn:
+        found.add("springs", _springs, study, poses, drawn["first"])
+        found.add("deflections", deflections, study, poses, drawn["first"])
+    if "loose" in drawn:
+        found.add("free", free_motion, study, result, drawn["loose"])
+    found.add("directions", _directions, study, result)
+    if not poses.listed and poses.count > 2:
+        over = plane(study, poses)
+        if over is not None:
+            found.add("stiffness", _map, study, result, over)
+        if len(poses.grid) == 1:
+            found.add("stiffness", _curves, study, result)
+    return found
+
+
+def _springs(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
+    scene = pose(study.mechanism, drawn.configuration)
+    coils = _coils(study, drawn, scene) if scene is not None else []
+    if scene is None or not coils:
+        return None
+    places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
+    figure, axes = posed(study, poses, drawn, places, "equivalent springs", labels=False, drives=False)
+    draw_coils(axes, coils)
+    points = [label for label in name_labels(scene, link_colors(study.mechanism), ()) if not label.italic]
+    place_labels(axes, coil_labels(coils) + points, covered(axes), order=8)
+    return figure
+
+
+def _coils(study: Study, drawn: Drawn, scene: Scene) -> list[Coil]:
+    legs, length = drawn.body.legs or (), _COIL_LENGTH * scene.span
+    coils, own = [], drawn.springs
+    columns = (own.leg, own.place, own.angle, own.stiffness)
+    for k, place, angle, stiffness in zip(*(column.tolist() for column in columns), strict=True):
+        if np.isnan(angle):
+            continue
+        leg, along = legs[k], complex(np.exp(1j * angle))
+        base, tip = scene.points[leg.base], scene.points[leg.tip]
+        inward = ((base - place) * along.conjugate()).real
+        grounded = abs(inward) > length and abs(base - place - inward * along) < 1e-6 * scene.span
+        if grounded:
+            anchor = base
+        else:
+            # Its line passes the leg's base: away from the body.
+            body = scene.points[drawn.body.section.at]
+            anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
+        text = quantity(stiffness, study.units.label("stiffness"))
+        coils.append(Coil(text, place, anchor, tip, length, grounded))
+    return coils
+
+
+def _directions(study: Study, result: Result) -> Figure | None:
+    """Stiffness to a force, over the direction of the force, with its principal values marked."""
+    table, soft = result.tables["stiffness"], result.tables["compliance"]
+    known = np.flatnonzero(np.isfinite(soft["C11"]) & np.isfinite(table["k_max"]))
+    if not len(known):
+        return None
+    rows = known[np.unique(np.linspace(0, len(known) - 1, MAX_DIRECTIONS).astype(int))]
+    unit, poses, factor = study.units.label("stiffness"), result.drawn["poses"], study.units.angle_factor
+    figure = style.new_figure(4.2)
+    axes = figure.add_subplot()
+    for k, row in enumerate(rows):
+        color, angle = style.PALETTE[k], float(table["k_angle"][row])
+        # A sharp peak lies between the points of an even grid: the principal directions are among them.
+        principal = np.mod([angle * factor, angle * factor + np.pi / 2], np.pi)
+        turns = np.sort(np.append(np.linspace(0, np.pi, 721), principal))
+        xx, xy, yy = (float(soft[name][row]) for name in ("C11", "C12", "C22"))
+        moved = xx * np.cos(turns) ** 2 + 2 * xy * np.cos(turns) * np.sin(turns) + yy * np.sin(turns) ** 2
+        axes.plot(turns / factor, 1 / moved, color=color, label=pose_in_words(study, poses, int(row)))
+        softest = np.mod(angle + np.pi / 2 / factor, np.pi / factor)
+        axes.plot([angle, softest], [table["k_max"][row], table["k_min"][row]], "o", color=color, markersize=5)
+    if table["k_max"][rows].max() > 4 * table["k_min"][rows].min():
+        axes.set_yscale("log")
+    axes.set_xlim(0, np.pi / factor)
+    axes.set_xticks(np.linspace(0, np.pi, 7) / factor)
+    axes.set_xlabel(style.axis_label("direction of the force", study.units.label("angle")))
+    axes.set_ylabel(style.axis_label("stiffness (dots: k_min, k_max)", unit))
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    return figure
+
+
+def _curves(study: Study, result: Result) -> Figure | None:
+    """Stiffnesses to a force and to a moment along a path; what is rigid or free everywhere has no curve."""
+    table, poses, units = result.tables["stiffness"], result.drawn["poses"], study.units
+    over = along(study, poses)
+    assert over is not None
+    forces = {"k_x": ("-", None), "k_y": ("-", None), "k_min": ("--", style.INK), "k_max": (":", style.INK)}
+    moments = {"k_phi": ("-", style.GREEN)}
+    panels: list[tuple[str, str, dict[str, Any]]] = [
+        ("stiffness to a force", "stiffness", forces),
+        ("to a moment", "rotational_stiffness", moments),
+    ]
+    panels = [each for each in panels if any(name in table and np.isfinite(table[name]).any() for name in each[2])]
+    if not panels:
+        return None
+    figure = style.new_figure(5.2 if len(panels) > 1 else 3.4)
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (about, kind, looks) in zip(axes, panels, strict=True):
+        for name, (look, color) in looks.items():
+            values = np.where(np.isfinite(table[name]), table[name], np.nan)
+            axis.plot(over.values, values, look, label=name, color=color)
+        axis.set_ylabel(style.axis_label(about, units.label(kind)))
+        axis.set_yscale("log")
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes[-1].set_xlabel(over.label)
+    figure.align_ylabels(axes)
+    return figure
+
+
+def _map(study: Study, result: Result, over: Plane) -> Figure:
+    """k_min over the poses, and k_max beside it."""
+    table, unit = result.tables["stiffness"], study.units.label("stiffness")
+    parts = []
+    for name in ("k_min", "k_max"):
+        values = np.where(np.isfinite(table[name]) & (table[name] > 0), table[name], np.nan)
+        parts.append((style.axis_label(name, unit), values.reshape(over.x.shape)))
+    about = f"at point {study.stiffness.at}" if study.stiffness is not None else ""
+    return map_sheet(study, over, parts, "Stiffness to a force in the softest and the stiffest direction", about,
+                     logarithmic=True)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Coil:
+    """A spring from the point where it holds to its anchor; `tip` is the end of its leg, `length` of its coiled middle.
+
+    The anchor of a grounded one is a joint of the ground, which the mechanism's drawing shows already.
+    """
+
+    text: str
+    place: complex
+    anchor: complex
+    tip: complex
+    length: float
+    grounded: bool
+
+    @property
+    def path(self) -> Complexes:
+        """The drawn line."""
+        span = self.anchor - self.place
+        share = np.linspace(0, 1, 600)
+        part = min(0.7, self.length / abs(span))
+        inside = np.clip((share - 0.5) / part + 0.5, 0, 1)
+        wave = _COIL_SWING * self.length * np.sin(2 * np.pi * _COIL_TURNS * inside)
+        return self.place + span * (share + 1j * wave / abs(span))
+
+
+def quantity(value: float, unit: str) -> str:
+    """A stiffness with three digits: ``3.74e+07 N/m`` as 3.74·10⁷ N/m."""
+    if np.isinf(value):
+        return "rigid"
+    if 1e-2 <= value < 1e5:
+        return f"{value:.3g} {unit}" if value < 1e3 else f"{value:.0f} {unit}"
+    return f"{style.in_powers(value)} {unit}"
+
+
+def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:
+    """Coil springs along their lines, each with a hatched anchor, and a dashed line to where the leg ends."""
+    for coil in coils:
+        if abs(coil.place - coil.tip) > 1e-3 * abs(coil.anchor - coil.place):
+            _line(axes, np.array([coil.tip, coil.place]), 1.1, 0.0, linestyle=(0, (4, 3)))
+        _line(axes, coil.path, 3.6, 0.05, color="white")
+        _line(axes, coil.path, 1.5, 0.1)
+        axes.plot(
+            [coil.place.real], [coil.place.imag], "o", markersize=5, color=style.VERMILION, markeredgecolor="white",
+            zorder=_COIL_ORDER + 0.3,
+        )  # fmt: skip
+        if coil.grounded:
+            continue
+        along = coil.length * (coil.anchor - coil.place) / abs(coil.anchor - coil.place)
+        bar = 0.2j * along
+        _line(axes, np.array([coil.anchor - bar, coil.anchor + bar]), 1.6, 0.1)
+        for foot in coil.anchor + np.linspace(-1, 1, 6) * bar:
+            _line(axes, np.array([foot, foot + (0.1 + 0.07j) * along]), 1.0, 0.1)
+
+
+def coil_labels(coils: Sequence[Coil]) -> list[Label]:
+    """The stiffness of each spring, beside its middle."""
+    labels = []
+    for coil in coils:
+        span = coil.anchor - coil.place
+        anchors = tuple(coil.place + share * span for share in (0.5, 0.56, 0.44, 0.62, 0.38))
+        heading = float(np.angle(1j * span if (1j * span).real > 0 else -1j * span))
+        labels.append(Label(coil.text, anchors, style.VERMILION, 11, heading, 9.5))
+    return labels
+
+
+def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: object) -> None:
+    options: dict[str, Any] = {"color": style.VERMILION, "solid_capstyle": "round", "solid_joinstyle": "round"} | look
+    axes.add_line(Line2D(places.real, places.imag, lw=width, zorder=_COIL_ORDER + lift, **options))
+
+
+def posed(study: Study, poses: Poses, drawn: Drawn, places: Complexes, what: str, **look: Any) -> tuple[Figure, Axes]:
+    """The mechanism in a pose, in a window that holds these places, too."""
+    figure, axes = framed(places, study.units.label("length"), height=MAX_HEIGHT, above=TITLE)
+    axes.set_title(f"{what} at {pose_in_words(study, poses, drawn.row)}", loc="left")
+    draw_mechanism(axes, study.mechanism, drawn.configuration, **look)
+    return figure, axes
+
+
+def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
+    """The whole mechanism where each load moves it."""
+    scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
+    if scene is None or not drawn.twists:
+        return None
+    shapes = _shapes(drawn, scene)
+    loads = np.array(asked.section.loads[:MAX_LOADS])[:, : asked.size]
+    sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
+    if not np.isfinite(sizes).all():
+        return None
+    scales = [round_down(_LARGEST_MOVE * scene.span / max(size, 1e-300)) for size in sizes]
+    bent = [[rest + scale * move[:, k] for rest, move in shapes] for k, scale in enumerate(scales)]
+    places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
+    figure, axes = posed(study, poses, drawn, places, "deflections, enlarged,", faint=True)
+    for color, lines, each, scale in zip(style.PALETTE, bent, loads, scales, strict=False):
+        for line in lines:
+            axes.plot(line.real, line.imag, color=color, linewidth=1.8, zorder=5)
+        axes.plot([], [], color=color, linewidth=1.8, label=_in_words(study, tuple(each), scale))
+        # The asked point begins the first line.
+        axes.plot([lines[0][0].real], [lines[0][0].imag], "o", color=color, zorder=6)
+    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
+    return figure
+
+
+def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:
+    """Lines of all links at rest, shape (n,), and their displacements by each load, shape (n, loads).
+
+    The first begins at the asked point.
+    """
+    network, at, moved = drawn.body.network, scene.points[drawn.body.section.at], drawn.twists
+
+    def shift(vertex: str, place: complex) -> Complexes:
+        dx, dy, turn = moved[vertex]
+        return np.asarray(dx + 1j * dy + 1j * turn * (place - at))
+
+    shapes = [(np.array([at]), shift(network.asked, at)[None])]
+    bent = set()
+    for ways in network.ways_along_beams:
+        bent.add(network.edges[ways[0]].name)
+        shapes += _bent([network.edges[k] for k in ways], drawn.configuration, moved, shift)
+    for link, points in network.points.items():
+        borne = [(scene.points[name], vertex) for name, vertex in points if vertex in moved]
+        if link in bent or len(borne) < 2:
+            continue
+        where = dict(borne)
+        corners = hull(list(where))
+        outline = [*corners, corners[0]] if len(corners) > 2 else corners
+        shapes.append((np.array(outline), np.array([shift(where[place], place) for place in outline])))
+    return shapes
+
+
+def _bent(
+    ways: Sequence[NetworkEdge], configuration: Configuration, moved: Mapping[str, Floats],
+    shift: Callable[[str, complex], Complexes],
+) -> list[tuple[Complexes, Complexes]]:  # fmt: skip
+    """The beams of an elastic link between the places where something sits, and its brackets."""
+    beam = ways[0].beam
+    assert beam is not None
+    course = course_of(beam.beams, configuration)
+    sitting = [(ways[0].a, beam.beams.corners[0]), *((edge.b, edge.point) for edge in ways)]
+    feet = [float(course.foot(point, configuration.point(point))[0]) for _, point in sitting]
+    bases = [complex(course.place(np.array([foot]))[0]) for foot in feet]
+    order = sorted(range(len(feet)), key=feet.__getitem__)
+    shapes = []
+    for one, other in pairwise(order):
+        (first, last), (tail, head) = (sitting[one][0], sitting[other][0]), (bases[one], bases[other])
+        shapes.append(_beam(tail, head, shift(first, tail), shift(last, head), moved[first][2], moved[last][2]))
+    for (vertex, point), base in zip(sitting, bases, strict=True):
+        bracket = np.array([base, complex(configuration.point(point)[0])])
+        shapes.append((bracket, np.array([shift(vertex, place) for place in bracket])))
+    return shapes
+
+
+def _beam(
+    tail: complex, head: complex, start: Complexes, end: Complexes, turn_start: Floats,
+    turn_end: Floats,
+) -> tuple[Complexes, Complexes]:  # fmt: skip
+    """A beam at rest and its displacements: along itself linear, across itself cubic."""
+    span = head - tail
+    length = abs(span)
+    along = span / length if length > 0 else 1.0 + 0j
+    one, other = start * np.conj(along), end * np.conj(along)
+    straight = np.outer(1 - _ALONG, one.real) + np.outer(_ALONG, other.real)
+    across = (
+        np.outer(_CUBIC[0], one.imag) + np.outer(_CUBIC[1], length * turn_start)
+        + np.outer(_CUBIC[2], other.imag) + np.outer(_CUBIC[3], length * turn_end)
+    )  # fmt: skip
+    return np.asarray(tail + _ALONG * span, dtype=np.complex128), np.asarray((straight + 1j * across) * along)
+
+
+def free_motion(study: Study, result: Result, drawn: Drawn) -> Figure | None:
+    """The asked body moved both ways along its free twist, at the first pose that has one."""
+    table, section, row = result.tables["stiffness"], drawn.body.section, drawn.row
+    scene = pose(study.mechanism, drawn.configuration)
+    if scene is None:
+        return None
+    at = scene.points[section.at]
+    body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
+    turn = float(table["free_phi"][row]) if "free_phi" in table else 0.0
+    rest = np.array([*body[1:], *body[1:2]] if len(body) > 1 else body)
+    shift = complex(table["free_x"][row], table["free_y"][row])
+    move = shift + 1j * turn * (rest - at)
+    scale = _LARGEST_MOVE * scene.span / max(float(np.abs(move).max()), 1e-300)
+    if turn:
+        # Turned about its instantaneous centre, so that it keeps its shape.
+        centre = at + 1j * shift / turn
+        ways = [centre + (rest - centre) * np.exp(1j * way * scale * turn) for way in (1, -1)]
+    else:
+        ways = [rest + way * scale * move for way in (1, -1)]
+    places = np.concatenate([[*scene.points.values()], *ways])
+    figure, axes = posed(study, result.drawn["poses"], drawn, places, "free motion")
+    for line, dash in zip(ways, ("-", "--"), strict=True):
+        axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
+                  marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
+    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
+    return figure
+
+
+def round_down(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
+
+
+def _in_words(study: Study, load: tuple[float, ...], scale: float) -> str:
+    units = [study.units.label(kind) for kind in ("force", "force", "moment")]
+    parts = [
+        f"{name} = {value:g} {unit}"
+        for name, value, unit in zip(("fx", "fy", "mz"), load, units, strict=False)
+        if value
+    ]
+    return f"{', '.join(parts) or 'no load'} (x {scale:g})"
