@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from inspect import Parameter, Signature
 from typing import Annotated, Any
 
@@ -68,11 +67,14 @@ def _add(name: str, takes: Sequence[Parameter], short: str, told: str) -> None:
 
     def command(**said: Any) -> None:
         with _guard():
-            from mechdesign.cli import batch
-            from mechdesign.cli.execution import ask
+            study, options = said.pop("study"), Options(**said)
+            if name in COMMANDS:
+                from mechdesign.cli.execution import ask
 
-            run = {"run": batch.run, "check": batch.check}.get(name) or partial(ask, name)
-            raise typer.Exit(run(said.pop("study"), Options(**said)))
+                raise typer.Exit(ask(name, study, options))
+            from mechdesign.cli import batch
+
+            raise typer.Exit((batch.check if name == "check" else batch.run)(study, options))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
     app.command(name, short_help=short, help=told)(command)
