@@ -124,8 +124,8 @@ CURES = {
     "mapping, not 'angle:crank'; a ':' needs a space after it"),
     "no brace": ("{r: 30}", "{r: 30", "2:15: is not YAML: this '{' is not closed where line 3 goes on; '}' or a comma is "
     "missing"),
-    "no ground": ("ground: {O", "base: {O", "4:5: mechanism.links: there is no 'ground', the fixed link whose frame is the "
-    "world; rename the link that does not move (is it 'base'?)"),
+    "no ground": ("ground: {O", "base: {O", "4:5: mechanism.links: there is no 'ground', the fixed link whose frame is "
+    "the world; rename the link that does not move (is it 'base'?)"),
     "no sketch": ("  sketch: {A: [0, 30], B: [75, 55]}\n", "", "1:1: mechanism.sketch: points 'A', 'B' are needed to "
     "choose the assembly; add them to the sketch"),
 }  # fmt: skip
