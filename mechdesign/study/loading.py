@@ -91,7 +91,7 @@ class Study:
         """Files that the study reads: the keys of their names, the file, and what it holds."""
         folder = self.path.parent if self.path is not None else pathlib.Path()
         for keys, value in leaves(self.resolved):
-            if isinstance(value, str) and ("path" in keys[:-1] or "targets" in keys[:-1]):
+            if isinstance(value, str) and ({"path", "targets"}.intersection(keys[:-1]) or keys[-1] == "measured"):
                 try:
                     content = (folder / value).read_text(encoding="utf-8-sig")
                 except (OSError, ValueError):
@@ -226,7 +226,7 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(context.parameters, formulas)
-    parts = _checked(Checker(builder, parameters, parts), folder)
+    parts = _checked(Checker(builder, parameters, parts, folder))
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
@@ -318,13 +318,13 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
     return parts
 
 
-def _checked(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
+def _checked(checker: Checker) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
     found = dict(checker.parts)
     found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
-    found["targets"] = targets.check(checker, checker.mechanism.targets, folder)
+    found["targets"] = targets.check(checker, checker.mechanism.targets)
     return found
 
 

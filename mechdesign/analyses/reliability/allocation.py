@@ -178,7 +178,7 @@ def _allocation(last: _Round) -> Table:
     columns = (
         Column("source", np.array([tolerance.name for tolerance in found]), meaning="what varies"),
         Column("kind", np.array([tolerance.kind for tolerance in found]),
-               meaning="tolerance: half its width; sigma; clearance: its mean radial clearance"),
+               meaning="tolerance: half its width; sigma; measured: the values' sigma; clearance: its mean radial one"),
         Column("given", np.array(given), meaning="as the study gives it, in `unit`"),
         Column("allocated", np.array(sizes), meaning="the cheapest, in `unit`"),
         Column("unit", np.array([tolerance.unit for tolerance in found]), meaning="unit of the two columns before"),

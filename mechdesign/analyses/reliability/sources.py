@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from pathlib import Path
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from mechdesign.analyses.reliability.laws import PIN_LAWS, Correlation, Marginal, marginal
+from mechdesign.analyses.reliability.laws import PIN_LAWS, Correlation, Marginal, Measured, marginal
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names
@@ -27,12 +28,15 @@ class Scalar:
     """A dimension that varies: by `kind` a ``parameter`` (in its own unit), a ``place``, a ``drive`` or a ``load``.
 
     `moves` has the derivative of each place, drive or load that it changes (radians, lengths), and its quantity.
+    `factor` are radians, lengths or loads in one `unit` of the study, which of a parameter may be unknown.
     """
 
     name: str
     kind: str
     law: Marginal
     moves: Mapping[str, tuple[float, str]]
+    factor: float = 1.0
+    unit: str = ""
 
     @property
     def directions(self) -> list[dict[str, float]]:
@@ -64,6 +68,8 @@ class Pin:
     analytic: str
     sampled: str
     places: tuple[str, ...]
+    unit: str
+    factor: ClassVar[float] = 1.0
 
     @property
     def moments(self) -> tuple[float, float, float, float]:
@@ -245,13 +251,29 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
                 warnings += _twice(study, name, section.dimensions)
         moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
         turned = kind != "parameter" and moves[name][1] == "angle"
-        law = marginal(dimension, nominal, study.units.angle_factor if turned else 1.0)
-        scalars.append(Scalar(name, kind, law, moves))
+        factor = study.units.angle_factor if turned else 1.0
+        if dimension.measured is not None:
+            folder = study.path.parent if study.path is not None else Path()
+            law: Marginal = Measured.of(factor * dimension.deviations(nominal / factor, folder), nominal)
+        else:
+            law = marginal(dimension, nominal, factor)
+        scalars.append(Scalar(name, kind, law, moves, factor, _unit(study, name, moves)))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
-    pins = tuple(_pin(point, clearance) for point, clearance in section.clearances.items())
+    pins = tuple(_pin(point, clearance, study.units.label("length")) for point, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))
     _check_sizes(sources)
     return sources, warnings
+
+
+def _unit(study: Study, name: str, moves: Mapping[str, tuple[float, str]]) -> str:
+    """Unit of a dimension; of a parameter where a number of the geometry is the parameter itself."""
+    value, factors = study.parameters.nominal.get(name), study.parameters.factors
+    units = [
+        study.units.label(quantity)
+        for place, (slope, quantity) in moves.items()
+        if value is None or (slope == factors[place] and study.mechanism.nominal[place] == value * slope)
+    ]
+    return units[0] if units else ""
 
 
 def _quantity(mechanism: Mechanism, name: str) -> str:
@@ -298,7 +320,7 @@ def _correlation(study: Study, scalars: Sequence[Scalar]) -> Correlation | None:
     return Correlation.of([scalar.law for scalar in scalars], pairs)
 
 
-def _pin(point: str, clearance: Clearance) -> Pin:
+def _pin(point: str, clearance: Clearance, unit: str) -> Pin:
     link = clearance.link
     if link is None:
         raise StudyError(f"reliability.clearances.{point}: name the 'link' whose pin moves")
@@ -306,7 +328,7 @@ def _pin(point: str, clearance: Clearance) -> Pin:
     return Pin(
         point, clearance.radius, None if spread is None else marginal(spread, clearance.radius),
         clearance.pin.analytic, clearance.pin.monte_carlo,
-        (f"{link}.length",) if clearance.effect == "length" else offset_names(link, point),
+        (f"{link}.length",) if clearance.effect == "length" else offset_names(link, point), unit,
     )  # fmt: skip
 
 
