@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -222,7 +223,7 @@ def _spread(mechanism: Mechanism, network: Network) -> float:
     return max((abs(place - places[0]) for place in places), default=0.0) or mechanism.size or 1.0
 
 
-def hold(body: Body, configuration: Configuration) -> tuple[Held, list[Springs]]:
+def hold(body: Body, configuration: Configuration) -> tuple[Held, Iterable[Springs]]:
     """Stiffness and springs in a batch of assembled poses of shape (n,).
 
     By the reciprocal wrenches of its legs where these hold the body in closed form (six times as fast), else by the
@@ -237,13 +238,13 @@ def hold(body: Body, configuration: Configuration) -> tuple[Held, list[Springs]]
     return held, springs
 
 
-def evaluate(body: Body, configuration: Configuration) -> tuple[Held, list[Springs], Effects | None]:
+def evaluate(body: Body, configuration: Configuration) -> tuple[Held, Iterable[Springs], Effects | None]:
     """As `hold`, and what the study's loads do."""
     section = body.section
     if not section.loads:
         return *hold(body, configuration), None
     loaded = _loaded(body, configuration)
-    held, springs = (loaded.held, []) if body.legs is None else hold(body, configuration)
+    held, springs = (loaded.held, ()) if body.legs is None else hold(body, configuration)
     return held, springs, effects_of(body.network, loaded, section.at, configuration, section.loads)
 
 

@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to, poses_by
+from mechdesign.analyses.stiffness.compliance import REGULAR, Held, inverses, moved_to, poses_by, stiffness_of
 from mechdesign.analyses.stiffness.elements import bending, course_of, freedoms, looked_at_from
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import RANK, RIGID
@@ -216,7 +216,7 @@ class _Statics:
         n, rows, columns = unit.shape
         inverse, regular = np.zeros((n, columns, rows)), np.zeros(n, dtype=bool)
         if rows == columns:
-            inverse, regular = _inverses(unit)
+            inverse, regular = inverses(unit, REGULAR)
         margin, stress, lost = np.full(n, np.inf), None, None
         rest = np.flatnonzero(~regular)
         if len(rest):
@@ -224,8 +224,8 @@ class _Statics:
             keep = values > RANK
             margin[rest] = np.where(keep, values, np.inf).min(axis=1, initial=np.inf)
             upright, count = right.swapaxes(1, 2), values.shape[1]
-            inverses = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
-            inverse[rest] = (upright[:, :, :count] * inverses[:, None]) @ left[:, :, :count].swapaxes(1, 2)
+            upside = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
+            inverse[rest] = (upright[:, :, :count] * upside[:, None]) @ left[:, :, :count].swapaxes(1, 2)
             stresses, idle = (_unkept(vectors, keep) for vectors in (left, upright))
             if stresses.any():
                 stress = np.zeros((n, rows, rows))
@@ -236,19 +236,6 @@ class _Statics:
         return _Statics(
             inverse / norm.swapaxes(1, 2), inverse.swapaxes(1, 2) @ along.swapaxes(1, 2), stress, lost, margin
         )
-
-
-def _inverses(matrix: Floats) -> tuple[Floats, Flags]:
-    """Inverses, and where the smallest singular value is certainly above `REGULAR`."""
-    n, size, _ = matrix.shape
-    inverse, regular = np.zeros((n, size, size)), np.ones(n, dtype=bool)
-    try:
-        inverse[:] = np.linalg.inv(matrix)
-    except np.linalg.LinAlgError:
-        # Some pose is exactly singular; the answers of the others are not to hang on the company they are in.
-        regular = np.linalg.det(matrix) != 0
-        inverse[regular] = np.linalg.inv(matrix[regular])
-    return inverse, regular & ((inverse**2).sum(axis=(1, 2)) < 1 / REGULAR**2)
 
 
 def _unkept(vectors: Floats, keep: Flags) -> Floats:
@@ -299,14 +286,13 @@ def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> He
     for count, rows in poses_by(freedom):
         basis = axes[rows][:, :, : size - count]
         inner = basis.swapaxes(1, 2) @ compliance[rows] @ basis
-        values, vectors = np.linalg.eigh(inner)
-        soft = (values > RIGID * values[:, -1:]).all(axis=1) & (values > 0).all(axis=1)
+        inverse = stiffness_of(inner)
+        soft = np.isfinite(inverse).all(axis=(1, 2))
         # What is rigid in some direction is so in a corner of the matrix: rounding there is no softness.
         stiff = rows[~soft]
         largest = np.abs(compliance[stiff]).max(axis=(1, 2), keepdims=True, initial=0.0)
         compliance[stiff] = np.where(np.abs(compliance[stiff]) > RIGID * largest, compliance[stiff], 0.0)
-        turned = basis[soft] @ vectors[soft]
-        stiffness[rows[soft]] = (turned / values[soft][:, None]) @ turned.swapaxes(1, 2)
+        stiffness[rows[soft]] = basis[soft] @ inverse[soft] @ basis[soft].swapaxes(1, 2)
         if count:
             compliance[rows] = np.nan
             twist[rows] = axes[rows][:, :, -1]
