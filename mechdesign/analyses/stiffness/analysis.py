@@ -16,7 +16,7 @@ from mechdesign.analyses.stiffness.compliance import Held, put
 from mechdesign.analyses.stiffness.elements import Guide, Hinge, beams_of
 from mechdesign.analyses.stiffness.force_method import Effects, Loaded, effects_of, load, twists_of
 from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
-from mechdesign.analyses.stiffness.network import Network, build_network, carrying_edges
+from mechdesign.analyses.stiffness.network import Network, build_network
 from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,
@@ -212,8 +212,8 @@ def ask(study: Study) -> Body:
         link = bearers[0]
     standing = build_bodies(mechanism, link, section.at, section)
     pinned = build_bodies(mechanism, None, section.at, section) if condensed else standing
-    legs = find_legs(carrying_edges(mechanism, standing, section), standing, list(mechanism.description.links))
-    network = build_network(mechanism, pinned, section)
+    legs = find_legs(standing, list(mechanism.description.links))
+    network = build_network(pinned)
     return Body(section, legs, network, 2 if section.link is None else 3, condensed, _spread(mechanism, network))
 
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.bodies import Bodies
+from mechdesign.analyses.stiffness.bodies import Bodies, NetworkEdge, is_pin, link_of
 from mechdesign.analyses.stiffness.compliance import Held, by_wrenches, poses_by, stiffness_of
 from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, looked_at_from
-from mechdesign.analyses.stiffness.network import NetworkEdge
+from mechdesign.analyses.stiffness.network import carrying
 from mechdesign.analyses.stiffness.screws import (
     LegScrews,
     constraint_compliance,
@@ -43,20 +43,20 @@ class Leg:
     elements: tuple[Element, ...]
 
 
-def find_legs(edges: Sequence[NetworkEdge], bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
-    """The legs among the edges that carry, in the order of their `links`; None where they are not serial chains."""
+def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
+    """The legs among what carries, in the order of their `links`; None where they are not serial chains."""
     found: list[tuple[int, Leg]] = []
-    for piece in _pieces(edges, bodies.asked):
+    for piece in _pieces(carrying(bodies), bodies.asked):
         ends = {end for edge in piece for end in (edge.a, edge.b)}
         if not {GROUND, bodies.asked} <= ends:
             continue
         path = _path(piece, bodies.asked)
         if path is None or any(isinstance(element, Shift) for edge in piece for element in edge.elements):
             return None
-        names = [name for end in path[1:-1] if (name := bodies.link_of(end.split("@")[0]))]
+        names = [name for end in path[1:-1] if (name := link_of(end.split("@")[0]))]
         first = min(map(links.index, names), default=len(links))
         name = "+".join(dict.fromkeys(names)) or piece[0].name
-        found.append((first, Leg(name, piece[0].point, piece[-1].point, tuple(_elements(piece, path, bodies)))))
+        found.append((first, Leg(name, piece[0].point, piece[-1].point, tuple(_elements(piece, path)))))
     return tuple(leg for _, leg in sorted(found, key=lambda each: each[0]))
 
 
@@ -89,14 +89,14 @@ def _path(piece: list[NetworkEdge], asked: str) -> list[str] | None:
     return None if left else path
 
 
-def _elements(edges: Sequence[NetworkEdge], path: Sequence[str], bodies: Bodies) -> Iterator[Element]:
+def _elements(edges: Sequence[NetworkEdge], path: Sequence[str]) -> Iterator[Element]:
     """What gives along a path: of an elastic link its beams from the one joint to the other."""
     entry: str | None = None
     for k, (edge, vertex) in enumerate(zip(edges, path, strict=False)):
         beam = edge.beam
         if beam is None:
             # The two hinges of a massless pin are one.
-            yield from (e for e in edge.elements if not (bodies.is_pin(vertex) and isinstance(e, Hinge)))
+            yield from (e for e in edge.elements if not (is_pin(vertex) and isinstance(e, Hinge)))
             continue
         tail, head = (beam.tail, beam.head) if edge.a == vertex else (beam.head, beam.tail)
         entry = entry or tail
