@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins, turning_point
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
 from mechdesign.numerics.roots import bracketed_roots, lowest
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -62,7 +61,7 @@ class ChangePoint:
 
 
 @dataclass(frozen=True, eq=False)
-class _Parts:
+class _Parts(Lanes):
     """Parts of the steps of a sweep; `step` is the step of each, shape (n,).
 
     Of both ends the place, whether it is valid, shape (2, n), the margins, and their slopes times the length of the
@@ -74,14 +73,6 @@ class _Parts:
     valid: Flags
     values: Floats
     rises: Floats
-
-    def take(self, index: Ints | Flags) -> _Parts:
-        return _Parts(*(getattr(self, name)[..., index] for name in self.__dataclass_fields__))
-
-    @staticmethod
-    def joined(parts: Sequence[_Parts]) -> _Parts:
-        names = _Parts.__dataclass_fields__
-        return _Parts(*(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names))
 
 
 def boundaries(margins: SweepMargins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint]]:

@@ -12,7 +12,7 @@ from mechdesign.analyses.kinematics.lines import STILL, PoseLine
 from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
 from mechdesign.numerics.roots import bracketed_roots, lowest
 from mechdesign.results import Column, Table
 
@@ -29,7 +29,7 @@ LOOKS = np.array([0.25, 0.5, 0.75])
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class Places(Lanes):
     """Places on a line: function, the poses of the line on both sides, swept coordinate, and value there.
 
     `sign` is 1 where the function is smallest beside the place, -1 where it is largest, 0 where it is zero.
@@ -41,15 +41,6 @@ class Places:
     place: Floats
     value: Floats
     sign: Ints
-
-    def take(self, index: Ints | Flags) -> Places:
-        """Some of them."""
-        return Places(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
-
-    @staticmethod
-    def joined(*parts: Places) -> Places:
-        """All of several."""
-        return Places(*(np.concatenate([getattr(p, name) for p in parts]) for name in Places.__dataclass_fields__))
 
     def position(self, line: PoseLine) -> Floats:
         """Place along the sweep in rows."""
@@ -97,23 +88,17 @@ def turns(line: PoseLine, rows: Ints, wanted: Wanted) -> Places:
     slopes = line.slopes[rows]
     place = _roots(
         lambda lane, x: line.sample(begin[lane], x)[1][rows[function[lane]], np.arange(len(lane))],
-        (line.place[begin], line.place[end]), (slopes[function, begin], slopes[function, end]),
+        line.place[begin], slopes[function, begin], line.place[end], slopes[function, end],
     )  # fmt: skip
     value = line.sample(begin, place)[0][rows[function], np.arange(len(place))]
     known = np.isfinite(value)
     return Places(function, begin, end, place, value, sign).take(known)
 
 
-def _roots(
-    evaluate: Callable[[Ints, Floats], Floats], at: tuple[Floats, Floats], ends: tuple[Floats, Floats]
-) -> Floats:
-    """Roots between places `at`, with values `ends` of opposite signs there."""
-    rising = np.where(ends[0] > 0, -1.0, 1.0)
-    none = np.full(len(rising), np.nan)
-    return bracketed_roots(
-        lambda lane, x: rising[lane] * evaluate(lane, x),
-        at[0], rising * ends[0], at[1], rising * ends[1], none, none, PLACE_PRECISION * np.abs(at[1] - at[0]),
-    )  # fmt: skip
+def _roots(evaluate: Along, low: Floats, at_low: Floats, high: Floats, at_high: Floats) -> Floats:
+    """Roots between places with values of opposite signs."""
+    none = np.full(len(low), np.nan)
+    return bracketed_roots(evaluate, low, at_low, high, at_high, none, none, PLACE_PRECISION * np.abs(high - low))
 
 
 def zeros(line: PoseLine, rows: Ints, at_pose: float, touching: float) -> Places:
@@ -144,11 +129,11 @@ def zeros(line: PoseLine, rows: Ints, at_pose: float, touching: float) -> Places
         found: Floats = line.sample(begin[lane], x)[0][rows[function[lane]], np.arange(len(lane))]
         return found
 
-    place = _roots(value, (low, high), (at_low, at_high))
+    place = _roots(value, low, at_low, high, at_high)
     found = value(np.arange(len(function)), place)
     crossed = Places(function, begin, end, place, found, 0 * begin)
     # A function that jumps from side to side is not zero between.
-    return Places.joined(at_nodes, crossed.take(np.abs(found) <= touching), touched)
+    return Places.joined([at_nodes, crossed.take(np.abs(found) <= touching), touched])
 
 
 def peaks(line: PoseLine, rows: Ints, still: Floats, *, all_poses: bool = False) -> tuple[Peak, Peak]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
 from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held, put
-from mechdesign.analyses.stiffness.elements import Guide, Hinge, beams_of
+from mechdesign.analyses.stiffness.elements import Guide, Hinge, corners_of
 from mechdesign.analyses.stiffness.force_method import Effects, Loaded, effects_of, load, twists_of
 from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
 from mechdesign.analyses.stiffness.network import Network, build_network
@@ -138,7 +138,10 @@ def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
     for name, pose in (("first", solved.first), ("loose", solved.loose)):
         if pose is not None:
             row, configuration = pose
-            twists = dict(zip(body.network.paths, solved.effects.twists[row], strict=True)) if solved.effects else {}
+            moved = _loaded(body, configuration).displacements if body.section.loads else {}
+            twists = {
+                vertex: (each @ np.array(body.section.loads)[:, : body.size].T)[0] for vertex, each in moved.items()
+            }
             drawn[name] = Drawn(body, row, configuration, solved.springs.take(solved.springs.row == row), twists)
     return drawn
 
@@ -258,7 +261,7 @@ def _cautions(study: Study, poses: Poses, body: Body, held: Held) -> list[str]:
     cautions = [
         f"link '{name}' has a single point, and so no beam: it is rigid, though 'elastic' names it; give it two ends"
         for name in body.section.elastic
-        if len(beams_of(links[name]).corners) < 2
+        if len(corners_of(links[name])) < 2
     ]
     loose = np.flatnonzero(known & (held.rank < body.size))
     if len(loose):

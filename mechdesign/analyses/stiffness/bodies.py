@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mechdesign.analyses.stiffness.elements import Beam, Bearing, Element, Guide, Hinge, Shift, beams_of
+from mechdesign.analyses.stiffness.elements import Beam, Bearing, Element, Guide, Hinge, Shift, corners_of
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Drive, Fixed, Prismatic
@@ -176,14 +176,14 @@ class _Builder:
     def beams(self, name: str) -> None:
         """From the beginning of a link's beams to its other points and to what slides on it."""
         link = self.mechanism.description.links[name]
-        beams, body = beams_of(link), rod_of(name) if link.telescopic else name
-        sitting = {point: point for point in beams.corners}
+        body = rod_of(name) if link.telescopic else name
+        sitting = {point: point for point in corners_of(link)}
         if not link.telescopic:
             sitting |= {point: point for point in link.points} | self.riding.get(name, {})
         root, *others = sitting
         section = self.section.elastic[name]
         for seat in others:
-            beam = Beam(beams, root, sitting[seat], section)
+            beam = Beam(link, root, sitting[seat], section)
             self.edges.append(NetworkEdge(f"{body}@{root}", f"{body}@{seat}", (beam,), name, sitting[seat]))
 
     def points(self) -> dict[str, tuple[tuple[str, str], ...]]:

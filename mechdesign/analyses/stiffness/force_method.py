@@ -142,7 +142,7 @@ def _beam_freedoms(
     What slides changes its order along the beams from pose to pose: the parts are sorted in each.
     """
     beams = [beam for k in ways if (beam := network.edges[k].beam)]
-    course = course_of(beams[0].beams, configuration)
+    course = course_of(beams[0].link, configuration)
     feet = np.array([course.foot(beam.head, configuration.point(beam.head)) for beam in beams])
     cuts = np.sort(np.concatenate([np.zeros((1, feet.shape[1])), feet]), axis=0)
     for low, high in pairwise(cuts):
@@ -313,35 +313,21 @@ class Effects:
     ----------
     forces : ndarray, shape (n, joints, loads, 3)
         Force and moment about the joint's place, on the first body by the second, in the order of `joints_of`.
-    twists : ndarray, shape (n, vertices, 3, loads)
-        How the vertices of `Network.paths` shift and turn, about the asked point.
     places : complex ndarray, shape (n, points)
         Where the points that `points_of` names are without a load.
-    origin : complex ndarray, shape (n,)
-        Where the asked point is.
+    moves : complex ndarray, shape (n, points, loads)
+        Their displacements.
     """
 
     forces: Floats
-    twists: Floats
     places: Complexes
-    origin: Complexes
+    moves: Complexes
 
     @staticmethod
     def unknown(network: Network, poses: int, loads: int) -> Effects:
         """Room for effects, all nan."""
-        joints, points = len(joints_of(network)), len(points_of(network))
-        return Effects(
-            np.full((poses, joints, loads, 3), np.nan),
-            np.full((poses, len(network.paths), 3, loads), np.nan),
-            np.full((poses, points), complex(np.nan, np.nan)),
-            np.full(poses, complex(np.nan, np.nan)),
-        )
-
-    def moved(self, network: Network) -> Complexes:
-        """Displacements of the points that `points_of` names, shape (n, points, loads)."""
-        vertices = list(network.paths)
-        dx, dy, turn = np.moveaxis(self.twists[:, [vertices.index(v) for _, _, v in points_of(network)]], 2, 0)
-        return np.asarray(dx + 1j * dy + 1j * turn * (self.places - self.origin[:, None])[:, :, None])
+        nowhere = np.full((poses, len(points_of(network)), loads), complex(np.nan, np.nan))
+        return Effects(np.full((poses, len(joints_of(network)), loads, 3), np.nan), nowhere[:, :, 0].copy(), nowhere)
 
 
 def joints_of(network: Network) -> list[int]:
@@ -362,14 +348,13 @@ def effects_of(
     applied = np.array(loads)[:, :size].T
     origin = configuration.point(at)
     effects = Effects.unknown(network, len(origin), len(loads))
-    effects.origin[:] = origin
     for row, k in enumerate(joints_of(network)):
         wrench = loaded.wrenches[:, k] @ applied
         arm = (configuration.point(network.edges[k].point) - origin)[:, None]
         moment = wrench[:, 2] - (arm.real * wrench[:, 1] - arm.imag * wrench[:, 0])
         effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
-    for row, vertex in enumerate(network.paths):
-        effects.twists[:, row] = loaded.displacements[vertex] @ applied
-    for row, (_, point, _) in enumerate(points_of(network)):
+    for row, (_, point, vertex) in enumerate(points_of(network)):
+        dx, dy, turn = np.moveaxis(loaded.displacements[vertex] @ applied, 1, 0)
         effects.places[:, row] = configuration.point(point)
+        effects.moves[:, row] = dx + 1j * dy + 1j * turn * (effects.places[:, row] - origin)[:, None]
     return effects

@@ -101,7 +101,7 @@ def _elements(edges: Sequence[NetworkEdge], path: Sequence[str]) -> Iterator[Ele
         tail, head = (beam.tail, beam.head) if edge.a == vertex else (beam.head, beam.tail)
         entry = entry or tail
         if edges[k + 1].name != edge.name or not edges[k + 1].beam:
-            yield Beam(beam.beams, entry, head, beam.section)
+            yield Beam(beam.link, entry, head, beam.section)
             entry = None
 
 

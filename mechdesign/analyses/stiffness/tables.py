@@ -12,14 +12,14 @@ from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.stiffness.compliance import Held, directional, principal
 from mechdesign.analyses.stiffness.force_method import Effects, joints_of, points_of
 from mechdesign.analyses.stiffness.network import Network
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, Lanes
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 
 @dataclass(frozen=True, eq=False)
-class Springs:
+class Springs(Lanes):
     """Rows of the table of springs."""
 
     row: Ints
@@ -28,16 +28,11 @@ class Springs:
     place: Complexes
     angle: Floats
 
-    def take(self, rows: Ints | Flags) -> Springs:
-        """Some of them."""
-        return Springs(*(values[rows] for values in vars(self).values()))
-
     @staticmethod
     def sorted(parts: Sequence[Springs]) -> Springs:
         """All together, by pose and leg."""
         none = Springs(*(np.zeros(0, dtype) for dtype in (np.intp, np.intp, float, complex, float)))
-        each = zip(*(vars(part).values() for part in (none, *parts)), strict=True)
-        whole = Springs(*(np.concatenate(values) for values in each))
+        whole = Springs.joined([none, *parts])
         return whole.take(np.lexsort((whole.leg, whole.row)))
 
 
@@ -180,9 +175,8 @@ def forces_table(study: Study, poses: Poses, network: Network, effects: Effects)
 def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
     """``displacements.csv``: where every point goes, a row a pose, load and point of a link."""
     points = points_of(network)
-    moves = effects.moved(network)
-    count, number, loads = moves.shape
-    moved = moves.swapaxes(1, 2).ravel()
+    count, number, loads = effects.moves.shape
+    moved = effects.moves.swapaxes(1, 2).ravel()
     places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
     length = study.units.label("length")
     columns = _of_loads(study, poses, loads, number)
