@@ -232,35 +232,33 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     """
     study, poses, outputs = motion.question.study, motion.question.poses, motion.question.outputs
     mechanism = study.mechanism
-    shape = (poses.designs, poses.count // poses.designs)
+    each = poses.count // poses.designs
     curves = {output.name: (output.quantity, motion.arrays[output.name]) for output in outputs}
     curves |= {error.name: (error.quantity, error.values) for error in motion.errors}
-    at = poses.values[swept] if swept is not None else np.tile(np.arange(shape[1], dtype=float), shape[0])
+    at = poses.values[swept] if swept is not None else np.tile(np.arange(each, dtype=float), poses.designs)
     turn = 2 * np.pi / study.units.angle_factor
     sizes = {"length": mechanism.size, "angle": turn}
-    # Of both ends: value and place, and the pose; shape (designs, names).
-    found, row = np.full((2, 2, shape[0], len(curves)), np.nan), np.zeros((2, shape[0], len(curves)), dtype=np.intp)
-    still, first_row = np.zeros((shape[0], len(curves))), np.arange(shape[0]) * shape[1]
-    for k, (quantity, curve) in enumerate(curves.values()):
-        values, known = curve.reshape(shape), (motion.valid & np.isfinite(curve)).reshape(shape)
-        some = known.any(axis=1)
-        every = known.all()
-        row[0, :, k] = first_row + (values if every else np.where(known, values, np.inf)).argmin(axis=1)
-        row[1, :, k] = first_row + (values if every else np.where(known, values, -np.inf)).argmax(axis=1)
-        low, high = (values.ravel()[row[end, :, k]] for end in (0, 1))
-        still[:, k] = STILL * np.fmax(np.fmax(np.abs(low), np.abs(high)), sizes.get(quantity, 0.0))
-        # A curve that stands still has both extremes at its first pose.
-        stands = some & ~(high - low > still[:, k])
-        row[:, stands, k] = (first_row + known.argmax(axis=1))[stands]
-        found[:, 0, some, k], found[:, 1, some, k] = values.ravel()[row[:, some, k]], at[row[:, some, k]]
+    # By curve and design; of both ends the pose, and value and place.
+    table = np.stack([values for _, values in curves.values()])
+    known = (motion.valid & np.isfinite(table)).reshape(len(table), poses.designs, each)
+    begin, lane = np.arange(poses.designs) * each, np.arange(len(table))[:, None]
+    row = begin + np.stack([
+        np.where(known, sign * table.reshape(known.shape), np.inf).argmin(axis=2) for sign in (1, -1)
+    ])  # fmt: skip
+    low, high = table[lane, row]
+    size = np.array([sizes.get(quantity, 0.0) for quantity, _ in curves.values()])[:, None]
+    still = STILL * np.fmax(np.fmax(np.abs(low), np.abs(high)), size)
+    # A curve that stands still has both extremes at its first pose.
+    row = np.where(high - low > still, row, begin + known.argmax(axis=2))
+    found = np.where(known.any(axis=2), np.stack([table[lane, row], at[row]], axis=1), np.nan)
     moving = np.asarray(found[1, 0] - found[0, 0] > still)
     if line is not None:
         _between(motion, line, names, found, row, still, moving)
     (low, low_at), (high, high_at) = found
-    timed = np.zeros(shape[0], dtype=bool)
+    timed = np.zeros(poses.designs, dtype=bool)
     if line is not None and mechanism.quantity(line.swept) == "angle" and np.ptp(at) >= turn * (1 - 1e-9):
-        timed = motion.valid.reshape(shape).all(axis=1) & ~line.torn & (not line.ends)
-    part = np.where(timed[:, None] & moving, (high_at - low_at) % turn, np.nan)
+        timed = motion.valid.reshape(-1, each).all(axis=1) & ~line.torn & (not line.ends)
+    part = np.where(timed & moving, (high_at - low_at) % turn, np.nan)
     with np.errstate(divide="ignore"):
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
     ratio[~np.isfinite(ratio)] = np.nan
@@ -270,59 +268,53 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     return Table(
         "extremes",
         (
-            Column("output", np.tile(np.array(list(curves)), shape[0]), "", "output or error, in its own unit"),
-            Column("min", low.ravel(), "", "smallest value over the motion, in `unit`"),
-            Column("min_at", low_at.ravel(), unit, f"{where} smallest value"),
-            Column("max", high.ravel(), "", "largest value over the motion, in `unit`"),
-            Column("max_at", high_at.ravel(), unit, f"{where} largest value"),
-            Column("range", (high - low).ravel(), "", "max - min, in `unit`"),
-            Column("time_ratio", ratio.ravel(), "", "longer over shorter time between the extremes, constant speed"),
-            Column("unit", np.tile(np.array(units, dtype=str), shape[0]), "", "unit of min, max and range"),
+            Column("output", np.tile(np.array(list(curves)), poses.designs), "", "output or error, in its own unit"),
+            Column("min", low.T.ravel(), "", "smallest value over the motion, in `unit`"),
+            Column("min_at", low_at.T.ravel(), unit, f"{where} smallest value"),
+            Column("max", high.T.ravel(), "", "largest value over the motion, in `unit`"),
+            Column("max_at", high_at.T.ravel(), unit, f"{where} largest value"),
+            Column("range", (high - low).T.ravel(), "", "max - min, in `unit`"),
+            Column("time_ratio", ratio.T.ravel(), "", "longer over shorter time between the extremes, constant speed"),
+            Column("unit", np.tile(np.array(units, dtype=str), poses.designs), "", "unit of min, max and range"),
         ),
         "extremes of the outputs over the motion",
     )
 
 
 def _between(
-    motion: Motion,
-    line: PoseLine,
-    names: Collection[str] | None,
-    found: Floats,
-    row: Ints,
-    still: Floats,
+    motion: Motion, line: PoseLine, names: Collection[str] | None, found: Floats, row: Ints, still: Floats,
     moving: Flags,
-) -> None:
+) -> None:  # fmt: skip
     """Put better extremes than those of the poses into `found`: from between the poses, and at limits of the motion.
 
-    `found` has value and place of the smallest and the largest, shape (2, 2, designs, names), `row` their poses; of
-    shape (designs, names) are `still`, rounding, and `moving`, where those found to move are added.
+    `found` has value and place of the smallest and the largest, shape (2, 2, names, designs), `row` their poses; of
+    shape (names, designs) are `still`, rounding, and `moving`, where those found to move are added.
     """
     study, outputs = motion.question.study, motion.question.outputs
     swept = study.mechanism.coordinate(line.swept)
 
     def take(peak: Peak, end: int, which: Sequence[int], exact: bool) -> None:
         sign = 1 - 2 * end
-        value = np.where(np.isnan(found[end, 0][:, which]), np.inf, sign * found[end, 0][:, which])
-        new, place, rounding = sign * peak.value.T, in_study_units(study, swept, peak.place.T), still[:, which]
-        away = np.abs(peak.position.T - row[end][:, which])
+        value = np.where(np.isnan(found[end, 0, which]), np.inf, sign * found[end, 0, which])
+        away, rounding = np.abs(peak.position - row[end, which]), still[which]
         with np.errstate(invalid="ignore"):
             # Better, or that pose's own extreme, but beside it.
-            beside = (np.abs(sign * new - value) <= rounding) & (away < 1) & (away > 1e-9) & moving[:, which] & exact
-            lower = sign * new < value - rounding
-        for part, table in enumerate((new, place)):
-            found[end, part][:, which] = np.where(lower | beside, table, found[end, part][:, which])
-        moving[:, which] |= lower
+            beside = (np.abs(peak.value - value) <= rounding) & (away < 1) & (away > 1e-9) & moving[which] & exact
+            lower = peak.value < value - rounding
+        for part, new in enumerate((sign * peak.value, in_study_units(study, swept, peak.place))):
+            found[end, part, which] = np.where(lower | beside, new, found[end, part, which])
+        moving[which] |= lower
 
     mine = [k for k, output in enumerate(outputs) if names is None or output.name in names]
     rows = np.array([line.rows[outputs[k].name] for k in mine], dtype=np.intp)
-    for end, peak in enumerate(peaks(line, rows, still.T[mine])):
+    for end, peak in enumerate(peaks(line, rows, still[mine])):
         take(peak, end, mine, True)
-    wrong = list(range(len(outputs), still.shape[1]))
+    wrong = list(range(len(outputs), len(still)))
     if any(names is None or error.name in names for error in motion.errors):
         for end, sign in enumerate((1, -1)):
             along = _errors(motion, line, sign)
             every = np.arange(len(line.row))
-            take(searched(line, along, along(every, line.place), still.T[wrong]), end, wrong, False)
+            take(searched(line, along, along(every, line.place), still[wrong]), end, wrong, False)
 
 
 def _errors(motion: Motion, line: PoseLine, sign: int) -> Along:
