@@ -37,6 +37,8 @@ CHANGE_AT_POSE = 1e-6
 GAP_PROBE = 1e-5
 # A change point this near to zero, as a part of the sweep, is there.
 CHANGE_AT_ZERO = 1e-7
+# A value of the swept coordinate at which two assemblies of a group meet and the motion goes on.
+ChangePoint = tuple[float, Cause]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +52,6 @@ class Boundary:
     place: float
     cause: Cause
     configuration: Configuration | None
-
-
-@dataclass(frozen=True)
-class ChangePoint:
-    """A value of the swept coordinate at which two assemblies of a group meet and the motion goes on."""
-
-    place: float
-    cause: Cause
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,7 +289,7 @@ class _Search:
             beside = beside[np.abs(beside - place[k]) <= CHANGE_AT_POSE * self.length[step[k]]]
             at = float(np.clip(beside[0], *sorted(self.at[[1, -2]]))) if len(beside) else float(place[k])
             found.setdefault((int(function[k]), round(at / (CHANGE_AT_POSE * self.length[step[k]]))),
-                             ChangePoint(at, self.margins.causes[function[k]]))  # fmt: skip
+                             (at, self.margins.causes[function[k]]))  # fmt: skip
         return list(found.values())
 
 
@@ -358,11 +352,11 @@ def _hidden(swept: str, unit: str, places: Floats, ends: list[Boundary], valid: 
 def _warnings(study: Study, margins: SweepMargins, swept: str, changes: list[ChangePoint]) -> list[str]:
     unit = study.units.label(study.mechanism.quantity(swept))
     places: dict[str, dict[str, None]] = {}
-    for change in sorted(changes, key=lambda change: change.place):
+    for at, cause in sorted(changes, key=lambda change: change[0]):
         # The smallest value of a smooth function is found to the root of rounding.
-        at = change.place if abs(change.place) > CHANGE_AT_ZERO * np.ptp(margins.at) else 0.0
-        place = f"{in_study_units(study, margins.coordinate, at):.6g} {unit}".rstrip()
-        places.setdefault(place, {})[change.cause.joint] = None
+        near = at if abs(at) > CHANGE_AT_ZERO * np.ptp(margins.at) else 0.0
+        place = f"{in_study_units(study, margins.coordinate, near):.6g} {unit}".rstrip()
+        places.setdefault(place, {})[cause.joint] = None
     return [
         f"change point at {swept} = {place} (joints {'; '.join(joints)}): two assemblies meet there, and branch 'side' "
         "keeps each joint on its side of the line, where a made mechanism may cross it"

@@ -125,18 +125,6 @@ def inverses(matrix: Floats, limit: float) -> tuple[Floats, Flags]:
     return inverse, regular
 
 
-def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
-    """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi)."""
-    mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
-    radius = np.hypot(half, soft[:, 0, 1])
-    with np.errstate(divide="ignore"):
-        stiffest = mean - radius
-        high = np.where(stiffest > 1e-13 * mean, 1 / stiffest, np.where(np.isnan(mean), np.nan, np.inf))
-        low = 1 / (mean + radius)
-    angle = np.mod(np.arctan2(soft[:, 0, 1], half) / 2 + np.pi / 2, np.pi)
-    return low, high, angle
-
-
 def directional(soft: Floats, direction: float) -> Floats:
     """Stiffness to a force in a direction (radians), the displacement counted along it."""
     along = np.array([np.cos(direction), np.sin(direction)])
