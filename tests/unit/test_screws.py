@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mechdesign.analyses.stiffness.bodies import NetworkEdge
 from mechdesign.analyses.stiffness.compliance import Held, by_wrenches
 from mechdesign.analyses.stiffness.force_method import Twists, load
-from mechdesign.analyses.stiffness.network import Network
+from mechdesign.analyses.stiffness.network import Network, NetworkEdge
 from mechdesign.analyses.stiffness.screws import (
     LegScrews,
     constraint_compliance,

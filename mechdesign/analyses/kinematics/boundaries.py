@@ -31,8 +31,6 @@ ROOT_PRECISION = 1e-13
 AT_END = 1e-9
 # Ends within this part of the sweep's size are one.
 SAME_END = 1e-11
-# A change point within this part of a step of a pose is at it.
-CHANGE_AT_POSE = 1e-6
 # The motion has no gap at a single place if it is valid this far to both sides, as a part of the step.
 GAP_PROBE = 1e-5
 # A change point this near to zero, as a part of the sweep, is there.
@@ -283,14 +281,8 @@ class _Search:
         place, value = lowest(closure, low, high)
         side = GAP_PROBE * self.length[step]
         some = (value <= touch[function, 0]) & (closure(place - side) > value) & (closure(place + side) > value)
-        found: dict[tuple[int, float], ChangePoint] = {}
-        for k in np.flatnonzero(some & self._goes_on(step, place)).tolist():
-            beside = self.at[step[k] : step[k] + 2]
-            beside = beside[np.abs(beside - place[k]) <= CHANGE_AT_POSE * self.length[step[k]]]
-            at = float(np.clip(beside[0], *sorted(self.at[[1, -2]]))) if len(beside) else float(place[k])
-            found.setdefault((int(function[k]), round(at / (CHANGE_AT_POSE * self.length[step[k]]))),
-                             (at, self.margins.causes[function[k]]))  # fmt: skip
-        return list(found.values())
+        gone_through = np.flatnonzero(some & self._goes_on(step, place)).tolist()
+        return [(float(place[k]), self.margins.causes[function[k]]) for k in gone_through]
 
 
 def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Boundary]]:

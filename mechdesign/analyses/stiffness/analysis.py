@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
-from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held, put
 from mechdesign.analyses.stiffness.elements import Guide, Hinge, corners_of
 from mechdesign.analyses.stiffness.force_method import Effects, Loaded, effects_of, load, twists_of
 from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
-from mechdesign.analyses.stiffness.network import Network, build_network
+from mechdesign.analyses.stiffness.network import Network, build_bodies, build_network
 from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,

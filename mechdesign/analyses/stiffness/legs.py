@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.bodies import Bodies, NetworkEdge, is_pin, link_of
 from mechdesign.analyses.stiffness.compliance import Held, by_wrenches, poses_by, stiffness_of
 from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, looked_at_from
-from mechdesign.analyses.stiffness.network import carrying
+from mechdesign.analyses.stiffness.network import Bodies, NetworkEdge, carrying, is_pin, link_of
 from mechdesign.analyses.stiffness.screws import (
     LegScrews,
     constraint_compliance,

@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
-from mechdesign.analyses.stiffness.bodies import NetworkEdge
 from mechdesign.analyses.stiffness.elements import corners_of, course_of
+from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
