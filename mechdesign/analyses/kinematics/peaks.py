@@ -24,8 +24,6 @@ Along = Callable[[Ints, Floats], Floats]
 
 # Error of the place of an extreme or a zero, as a part of its segment.
 PLACE_PRECISION = 1e-13
-# Parts of a segment that may hold an extreme at which poses are added first.
-LOOKS = np.array([0.25, 0.5, 0.75])
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,22 +65,13 @@ def turns(line: PoseLine, rows: Ints, wanted: Wanted) -> Places:
     """Places between the poses of a line at which slopes of functions (rows of its values) change their sign.
 
     A segment cannot hold a value below both its ends by more than half its length times its largest slope: links
-    hardly turn within it. Wanted segments are divided where their slope does not change evenly, so that it might be
-    zero twice: by its parabola, in the middle by a quarter of its larger end.
+    hardly turn within it, and functions hardly bend.
     """
-    some: list[Flags] = []
-    for looks in (LOOKS, None):
-        values, slopes = (table[rows][:, np.stack([line.begin, line.end])] for table in (line.values, line.slopes))
-        slopes = slopes * (line.place[line.end] - line.place[line.begin])
-        steep = np.fmax(np.abs(slopes[:, 0]), np.abs(slopes[:, 1]))
-        drop = np.nan_to_num(steep) / 2
-        some = [wanted(sign, sign * values, drop) for sign in (1, -1)]
-        if looks is not None:
-            with np.errstate(invalid="ignore"):
-                bent = ~(6 * np.abs(values[:, 1] - values[:, 0] - slopes.mean(axis=1)) <= steep)
-            line.divide(np.flatnonzero(((some[0] | some[1]) & bent).any(axis=0)), looks)
+    values, slopes = (table[rows][:, np.stack([line.begin, line.end])] for table in (line.values, line.slopes))
+    slopes = slopes * (line.place[line.end] - line.place[line.begin])
+    drop = np.nan_to_num(np.fmax(np.abs(slopes[:, 0]), np.abs(slopes[:, 1]))) / 2
     which, function, segment = np.nonzero([
-        flags & (sign * slopes[:, 0] < 0) & (sign * slopes[:, 1] > 0) for sign, flags in zip((1, -1), some, strict=True)
+        wanted(sign, sign * values, drop) & (sign * slopes[:, 0] < 0) & (sign * slopes[:, 1] > 0) for sign in (1, -1)
     ])  # fmt: skip
     begin, end, sign = line.begin[segment], line.end[segment], 1 - 2 * which
     slopes = line.slopes[rows]
