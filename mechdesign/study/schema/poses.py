@@ -16,7 +16,7 @@ from mechdesign.study.text.fields import failure
 
 
 def _range(raw: list[Any] | str) -> str:
-    """What a range is in this format that is written as ``[0, 360, 5]``, ``0..360`` or ``0:5:360``; nothing of others."""
+    """The keys of a range that is written as ``[0, 360, 5]``, ``0..360`` or ``0:5:360``; nothing of what is none."""
     parts = raw if isinstance(raw, list) else re.split(r"\s*(?:\.\.+|:|\s+to\s+)\s*", raw)
     if isinstance(raw, str) and len(parts) == 3:
         parts = [parts[0], parts[2], parts[1]]
