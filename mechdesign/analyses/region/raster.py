@@ -35,24 +35,27 @@ class Raster:
 
     Parameters
     ----------
+    designs : Designs
     low, cell : ndarray of complex, shape (designs,)
         Lower left corner of the box, and width and height of a cell.
     inside : ndarray of bool, shape (designs, rows, columns)
         Whether a cell's centre lies in the region.
     """
 
+    designs: Designs
     low: Complexes
     cell: Complexes
     inside: Flags
 
     @staticmethod
-    def of(designs: Designs, cells: int, scan: tuple[float, float]) -> Raster:
-        """Look at `cells` times `cells` places of each design, those within the scan."""
+    def of(designs: Designs) -> Raster:
+        """Look at places of each design, as many as the effort says each way, those within the scan."""
+        cells, (begin, end) = designs.effort.cells, designs.scan
         low, high, bounded = _box(designs)
         for _ in range(DOUBLINGS):
-            found = Raster(low, (high - low) / cells, np.zeros((designs.count, cells, cells), dtype=bool))
+            found = Raster(designs, low, (high - low) / cells, np.zeros((designs.count, cells, cells), dtype=bool))
             for some, z in found._centres(np.arange(designs.count)):
-                inside = designs.inside(z, some) & (ray_through(z - designs.about, scan[0]) <= scan[1])
+                inside = designs.inside(z, some) & (ray_through(z - designs.about, begin) <= end)
                 found.inside[some] = inside.T.reshape(-1, cells, cells)
             rim = found.inside.copy()
             rim[:, 1:-1, 1:-1] = False
@@ -76,23 +79,24 @@ class Raster:
             edge[tuple(other)] |= change
         return inside.sum(axis=(1, 2)) * one, EDGE * edge.sum(axis=(1, 2)) * one
 
-    def reach(self, about: complex) -> Floats:
-        """Distance from a point to the farthest corner of each box."""
+    @property
+    def reach(self) -> Floats:
+        """Distance from the centre of the rays to the farthest corner of each box."""
         size = self.inside.shape[1] * self.cell
         corners = self.low + np.stack([0 * size, size.real + 0j, 1j * size.imag, size])
-        return np.asarray(np.abs(corners - about).max(axis=0))
+        return np.asarray(np.abs(corners - self.designs.about).max(axis=0))
 
-    def farthest(self, about: complex) -> Floats:
-        """Distance from a point within which all cells inside lie, shape (designs,); 0 where there is none."""
+    @property
+    def farthest(self) -> Floats:
+        """Distance from the centre within which all cells inside lie, shape (designs,); 0 where there is none."""
         found = np.zeros(len(self.low))
         for some, z in self._centres(np.arange(len(self.low))):
-            distance = np.where(self.inside[some].reshape(len(some), -1).T, np.abs(z - about), 0.0).max(axis=0)
+            inside = self.inside[some].reshape(len(some), -1).T
+            distance = np.where(inside, np.abs(z - self.designs.about), 0.0).max(axis=0)
             found[some] = np.where(distance > 0, distance + np.abs(self.cell[some]), 0.0)
         return found
 
-    def hidden(
-        self, some: Ints, about: complex, scan: tuple[float, float], design: Ints, angle: Floats, intervals: Intervals
-    ) -> tuple[Ints, Floats]:
+    def hidden(self, some: Ints, design: Ints, angle: Floats, intervals: Intervals) -> tuple[Ints, Floats]:
         """Design and angle of further rays, to what rays have passed by: pieces and holes between two of them.
 
         Parameters
@@ -102,19 +106,19 @@ class Raster:
         design, angle, intervals
             The rays, ascending by both; for each design at least those at both ends of the scan.
         """
-        every = np.arange(len(self.low) + 1)
+        every, (begin, end) = np.arange(len(self.low) + 1), self.designs.scan
         first, ends = np.searchsorted(design, every), intervals.by_ray(intervals.inner, intervals.outer)
         owners, angles = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
         for block, z in self._centres(some):
             inside = self.inside[block].reshape(len(block), -1).T
-            way = z - about
-            theta, radius = ray_through(way, scan[0]), np.abs(way)
+            way = z - self.designs.about
+            theta, radius = ray_through(way, begin), np.abs(way)
             at = np.empty(z.shape, dtype=np.intp)
             for lane, k in enumerate(block):
                 rays = angle[first[k] : first[k + 1]]
                 at[:, lane] = first[k] + np.clip(np.searchsorted(rays, theta[:, lane]) - 1, 0, len(rays) - 2)
             before, after = _hold(ends, at, radius), _hold(ends, at + 1, radius)
-            passed = np.where(inside, ~before & ~after, before & after) & (theta < scan[1]) & (theta > scan[0])
+            passed = np.where(inside, ~before & ~after, before & after) & (theta < end) & (theta > begin)
             if not passed.any():
                 continue
             # Of the places between the same two rays the one farthest from both: a piece, and a hole.

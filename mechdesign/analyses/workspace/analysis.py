@@ -10,8 +10,7 @@ import numpy as np
 from mechdesign.analyses.columns import SHARED, shared
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
-from mechdesign.analyses.region.panels import SINGLE, Effort
-from mechdesign.analyses.region.rays import Designs
+from mechdesign.analyses.region.rays import SINGLE, Designs, Effort
 from mechdesign.analyses.region.regions import RAYS
 from mechdesign.analyses.workspace.index import Local, determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
@@ -99,7 +98,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             warnings += _doubts(question, given)
         answers.append(given)
         if given.panels.closes[0]:
-            found, columns = _pieces(study, question, given, SINGLE, warnings)
+            found, columns = _pieces(study, question, given, warnings)
             pieces.append(columns)
             local.append(_local(study, question, found))
             counted = [patch for patch in found if patch.piece == 1 or not question.field.same_assembly]
@@ -130,12 +129,12 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 
 def _pieces(
-    study: Study, question: Question, given: Evaluation, effort: Effort, warnings: list[str]
+    study: Study, question: Question, given: Evaluation, warnings: list[str]
 ) -> tuple[list[Patch], list[Column]]:
     """Patches and pieces of a region, and a warning where pieces are left out."""
     assert given.pieces is not None
-    found = patches_of_pieces(given.pieces, question.rays or RAYS, effort.samples)
-    areas, drawn = areas_of_pieces(question, given, effort), bool(given.pieces.drawn[0])
+    found = patches_of_pieces(given.pieces, question.rays or RAYS)
+    areas, drawn = areas_of_pieces(question, given), bool(given.pieces.drawn[0])
     if len(areas) > 1 and question.field.same_assembly:
         warnings.append(left_out(study, question, areas, drawn))
     return found, piece_columns(study, question, found, areas, drawn)
@@ -271,7 +270,7 @@ def reachable(study: Study, progress: Progress) -> Result:
         given = answer(question, {}, 1, OVER_RANGE)
         answers.append(given)
         if given.panels.closes[0]:
-            found, columns = _pieces(study, question, given, OVER_RANGE, warnings)
+            found, columns = _pieces(study, question, given, warnings)
             pieces.append(columns)
             boundaries.append(_outline(study, question, name, found))
         progress.update(1)
