@@ -194,9 +194,8 @@ class Pieces:
         return found
 
     def of_intervals(self, design: Ints, theta: Floats, found: Intervals) -> Ints:
-        """The piece of each interval of rays of designs with several pieces; -1 where it has no area."""
-        panel = self._panel_at(design, theta)
-        piece = self._of_counted(panel, found)
+        """The piece of each interval of rays; -1 where it has no area, 0 for all of a design of one piece."""
+        piece = np.where(self.number[design[found.ray]] > 1, self._of_counted(design, theta, found), 0)
         # Rays through the end of a panel, or through a single point that divides them, are compared with two beside.
         for step in BESIDE:
             left = np.unique(found.ray[piece == UNKNOWN])
@@ -208,7 +207,7 @@ class Pieces:
                 turned = begin + (turned - begin) % (2 * np.pi)
             owner = np.tile(design[left], 2)
             beside = self.panels.trace(owner, turned)
-            names = self._of_counted(self._panel_at(owner, turned), beside)
+            names = self._of_counted(owner, turned, beside)
             some = np.flatnonzero(np.isin(found.ray, left))
             at = np.searchsorted(left, found.ray[some])
             ends = beside.by_ray(beside.inner, beside.outer, names)
@@ -220,18 +219,15 @@ class Pieces:
                 piece[some] = np.where(np.isinf(overlap[best]), UNKNOWN, told[best])
         return piece
 
-    def _of_counted(self, panel: Ints, found: Intervals) -> Ints:
-        """The piece of each interval of rays within panels; unknown where a ray has more or fewer than its panel."""
-        plain = (found.counts == self.counts[panel]) & (panel >= 0)
+    def _of_counted(self, design: Ints, theta: Floats, found: Intervals) -> Ints:
+        """The piece of each interval of rays; unknown where a ray has more or fewer of them than its panel."""
+        panels = self.panels
+        # NumPy orders complex numbers by both parts.
+        panel = np.searchsorted(panels.design + 1j * panels.low, design + 1j * theta, side="right") - 1
+        plain = (panel >= 0) & (panels.design[panel] == design) & (theta <= panels.high[panel])
+        plain &= found.counts == self.counts[panel]
         slot = np.minimum(found.slot, self.piece.shape[1] - 1)
         return np.where(plain[found.ray], self.piece[panel[found.ray], slot], UNKNOWN)
-
-    def _panel_at(self, design: Ints, theta: Floats) -> Ints:
-        """Panel of each ray; -1 where there is none. NumPy orders complex numbers by both parts."""
-        panels = self.panels
-        at = np.searchsorted(panels.design + 1j * panels.low, design + 1j * theta, side="right") - 1
-        inside = (at >= 0) & (panels.design[at] == design) & (theta <= panels.high[at])
-        return np.where(inside, at, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,19 +239,9 @@ class _OnePiece(Panels):
 
     def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
         """As `Panels.trace`."""
-        pieces, found = self.pieces, super().trace(design, theta, slack)
-        rays = np.flatnonzero(pieces.number[design] > 1)
-        if not rays.size:
-            return found
-        some = np.flatnonzero(np.isin(found.ray, rays))
-        part = replace(
-            found, ray=np.searchsorted(rays, found.ray[some]), inner=found.inner[some], outer=found.outer[some],
-            beyond=found.beyond[rays],
-        )  # fmt: skip
-        piece = pieces.of_intervals(design[rays], theta[rays], part)
-        keep = np.ones(len(found.ray), dtype=bool)
-        keep[some] = (piece == self.piece) | ((piece == UNKNOWN) & (self.piece == 0))
-        return found.kept(keep)
+        found = super().trace(design, theta, slack)
+        piece = self.pieces.of_intervals(design, theta, found)
+        return found.kept((piece == self.piece) | ((piece == UNKNOWN) & (self.piece == 0)))
 
 
 def _doubtful(panels: Panels) -> Flags:

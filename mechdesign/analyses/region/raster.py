@@ -173,33 +173,24 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
     # Steps from one node to another: the least and largest in x and y.
     steps: list[tuple[int, int, Floats, Floats]] = []
     for edge, w, d in zip(graph.edges, vectors.w, vectors.d, strict=True):
-        least, most = (np.full(count, np.inf * sign) for sign in (-1, 1))
+        stroke = np.zeros((2, 1, count))
         if edge.slide is not None:
-            for end, term in zip((least, most), strokes.get(edge.slide, (None, None)), strict=True):
+            stroke += [[[0.0 if edge.slide in graph.telescopic else -np.inf]], [[np.inf]]]
+            for end, term in zip(stroke, strokes.get(edge.slide, (None, None)), strict=True):
                 if term is not None:
-                    end[:] = value(term)
-            if edge.slide in graph.telescopic:
-                least = np.maximum(least, 0.0)
-        along = np.broadcast_to(np.asarray(w, dtype=complex), (count,))
+                    end[:] = np.maximum(value(term), end) if edge.slide in graph.telescopic else value(term)
         if edge.frame:
-            size = np.abs(along)
-            if edge.slide is not None:
-                size = size + np.maximum(np.abs(least), np.abs(most))
-            steps.append((edge.tail, edge.head, np.stack([-size, -size]), np.stack([size, size])))
-            continue
-        both = np.stack([along.real, along.imag])
-        if edge.slide is None:
-            steps.append((edge.tail, edge.head, both, both))
+            size = np.abs(w) + np.abs(stroke).max(axis=0)
+            steps.append((edge.tail, edge.head, -size, size))
         else:
-            turn = np.broadcast_to(np.asarray(d, dtype=complex), (count,))
+            along, turn = (np.stack([np.real(v), np.imag(v)]).reshape(2, -1) for v in (w, d))
             with np.errstate(invalid="ignore"):
-                ends = np.stack([np.stack([turn.real, turn.imag]) * end for end in (least, most)])
-            ends = np.where(np.isnan(ends), 0.0, ends)
-            steps.append((edge.tail, edge.head, both + ends.min(axis=0), both + ends.max(axis=0)))
+                ends = np.nan_to_num(turn * stroke, nan=0.0, posinf=np.inf, neginf=-np.inf)
+            steps.append((edge.tail, edge.head, along + ends.min(axis=0), along + ends.max(axis=0)))
     for bound in mechanism.bounds:
         if bound.coordinate.kind == "distance" and bound.maximum is not None:
-            size = np.abs(np.broadcast_to(np.asarray(value(bound.maximum), dtype=float), (count,)))
-            steps.append((bound.coordinate.node, bound.coordinate.other, np.stack([-size] * 2), np.stack([size] * 2)))
+            size = np.abs(np.asarray(value(bound.maximum), dtype=float))
+            steps.append((bound.coordinate.node, bound.coordinate.other, -size, size))
     for _ in graph.nodes:
         for tail, head, least, most in steps:
             low[:, head] = np.maximum(low[:, head], low[:, tail] + least)
@@ -208,14 +199,14 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
             high[:, tail] = np.minimum(high[:, tail], high[:, head] - least)
     node = field.outputs[0].node
     bounded = np.isfinite(low[:, node]).all(axis=0) & np.isfinite(high[:, node]).all(axis=0)
-    least, most = (np.where(bounded, side[:, node], 0.0) for side in (low, high))
-    corner, other = least[0] + 1j * least[1], most[0] + 1j * most[1]
     sketch = mechanism.sketch_configuration
     drawn = complex(*(float(sketch.value(c)) for c in field.outputs[:2]))
     guess = sum(float(np.abs(z)) for z in sketch.nodes) + sum(np.abs(w) for w in vectors.w)
     guess = np.broadcast_to(np.asarray(guess, dtype=float), (count,))
-    corner = np.where(bounded, corner, drawn - guess * (1 + 1j))
-    other = np.where(bounded, other, drawn + guess * (1 + 1j))
+    corner, other = (
+        np.where(bounded, side[0, node] + 1j * np.where(bounded, side[1, node], 0.0), drawn + sign * guess * (1 + 1j))
+        for side, sign in ((low, -1), (high, 1))
+    )
     middle, size = 0.5 * (corner + other), 0.5 * (other - corner)
     # Where dimensions cannot close at all the corners are exchanged, or one.
     least = 1e-9 * guess

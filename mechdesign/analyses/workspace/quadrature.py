@@ -43,6 +43,8 @@ SLIVER = 1e-3
 MOST_CELLS = 1000
 # Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
 SINGLE_RAY = 0.01
+# Rays, and nodes of each, of the rules of comparison unless the study says how many.
+RAYS, RADIAL_NODES = {"sector_mean": 101, "midpoint": 300}, {"sector_mean": 49, "midpoint": 200}
 # Segments evaluated at once (11 nodes each).
 BLOCK = 4096
 # Nearer to the boundary than this fraction of the radius, rounding spoils an index that is infinite there.
@@ -292,20 +294,21 @@ def _crossing(designs: Designs, segments: Parts, v: Floats) -> Floats:
 
 
 def simple_means(
-    panels: Panels, integrands: Sequence[Integrand], theta: Floats, fractions: Floats, by_area: bool
-) -> Floats:
-    """Means of indices (integrands, designs) by fixed nodes: the sums that papers use, for comparison.
+    panels: Panels, integrands: Sequence[Integrand], rule: str, nodes: int | None, rays: int | None,
+    counted: tuple[float, float],
+) -> Floats:  # fmt: skip
+    """Means of indices (integrands, designs) by the sums that papers use, for comparison.
 
-    Parameters
-    ----------
-    theta : ndarray
-        Directions of equal weight.
-    fractions : ndarray
-        Nodes of each interval, as fractions of its width.
-    by_area : bool
-        Nodes weighted by their radius (the midpoint rule for the area integral), or equally within each sector
-        [S1, Tables 1 and 2]; sectors are weighted by outer^2 - inner^2 either way.
+    Rays of equal weight and nodes of equal steps along each interval. ``midpoint`` weights nodes by their radius, as the
+    area integral does, ``sector_mean`` equally within each sector [S1, Tables 1 and 2]; sectors are weighted by
+    outer^2 - inner^2 either way.
     """
+    by_area, (low, high) = rule == "midpoint", counted
+    nodes, rays = nodes or RADIAL_NODES[rule], rays or RAYS[rule]
+    if by_area:
+        theta, fractions = low + (high - low) * (np.arange(rays) + 0.5) / rays, (np.arange(nodes) + 0.5) / nodes
+    else:
+        theta, fractions = np.linspace(low, high, rays), np.arange(1, nodes + 1) / (nodes + 1)
     count = len(panels.closes)
     design, angle = np.repeat(np.arange(count), len(theta)), np.tile(theta, count)
     intervals = panels.trace(design, angle)

@@ -21,8 +21,6 @@ from mechdesign.numerics.roots import dips
 from mechdesign.parallel import keep_freed_memory
 from mechdesign.study import Study
 
-SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
-RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6
 # Relative tolerance of the integrals where the study says none: of one region, and of each design of many.
@@ -173,7 +171,7 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     if gauss:
         means[some], doubts[some] = integral.mean, integral.mean_error
     else:
-        means[some] = _simple(question, panels, finite)
+        means[some] = simple_means(panels, finite, question.rule, question.nodes, question.rays, question.counted)
     # Where all pieces count, the raster tells if one is missing.
     every = pieces is None or not question.field.same_assembly or pieces.number <= 1
     missing = np.where(every, panels.seen - integral.area, 0.0)
@@ -254,19 +252,6 @@ def _statistic(
         # Of a deviation that is nothing but its error the square is in doubt, not the root's slope.
         error = np.where(np.isinf(spread), 0.0, np.minimum(total / (2 * spread), np.sqrt(total)))
     return spread, error
-
-
-def _simple(question: Question, panels: Panels, integrands: Sequence[Integrand]) -> Floats:
-    nodes = question.nodes or RADIAL_NODES[question.rule]
-    low, high = question.counted
-    if question.rule == "sector_mean":
-        theta = np.linspace(low, high, question.rays or SECTOR_RAYS)
-        fractions = np.arange(1, nodes + 1) / (nodes + 1)
-    else:
-        rays = question.rays or MIDPOINT_RAYS
-        theta = low + (high - low) * (np.arange(rays) + 0.5) / rays
-        fractions = (np.arange(nodes) + 0.5) / nodes
-    return simple_means(panels, integrands, theta, fractions, by_area=question.rule == "midpoint")
 
 
 def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> Floats:
