@@ -299,8 +299,8 @@ def simple_means(
 ) -> Floats:  # fmt: skip
     """Means of indices (integrands, designs) by the sums that papers use, for comparison.
 
-    Rays of equal weight and nodes of equal steps along each interval. ``midpoint`` weights nodes by their radius, as the
-    area integral does, ``sector_mean`` equally within each sector [S1, Tables 1 and 2]; sectors are weighted by
+    Rays of equal weight and nodes of equal steps along each interval, weighted by their radius as the area integral is
+    (``midpoint``) or equally within each sector (``sector_mean``) [S1, Tables 1 and 2]. Sectors are weighted by
     outer^2 - inner^2 either way.
     """
     by_area, (low, high) = rule == "midpoint", counted
