@@ -125,10 +125,13 @@ class Configuration:
     def take(self, index: Ints | int | tuple[int, ...] | tuple[Ints, ...]) -> Configuration:
         """Poses of a flat batch by index (shape (n,) or scalar)."""
 
+        reason = self.reason[index]
+
         def pick(value: Value) -> Value:
+            if np.ndim(value) == 0 and reason.ndim == 0:
+                return value
             return np.broadcast_to(np.asarray(value), self.shape)[index]
 
-        reason = self.reason[index]
         vectors = Vectors(
             [pick(w) for w in self.vectors.w],
             [pick(d) for d in self.vectors.d],
