@@ -175,10 +175,11 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
     for edge, w, d in zip(graph.edges, vectors.w, vectors.d, strict=True):
         stroke = np.zeros((2, 1, count))
         if edge.slide is not None:
-            stroke += [[[0.0 if edge.slide in graph.telescopic else -np.inf]], [[np.inf]]]
-            for end, term in zip(stroke, strokes.get(edge.slide, (None, None)), strict=True):
-                if term is not None:
-                    end[:] = np.maximum(value(term), end) if edge.slide in graph.telescopic else value(term)
+            shortest, longest = strokes.get(edge.slide, (None, None))
+            stroke[0] = -np.inf if shortest is None else value(shortest)
+            stroke[1] = np.inf if longest is None else value(longest)
+            if edge.slide in graph.telescopic:
+                stroke[0] = np.maximum(stroke[0], 0.0)
         if edge.frame:
             size = np.abs(w) + np.abs(stroke).max(axis=0)
             steps.append((edge.tail, edge.head, -size, size))

@@ -240,11 +240,8 @@ def _highest(y: Floats, low: Floats | float, high: Floats | float) -> tuple[Floa
         value = (a[:, None] + place * (b[:, None] + place * c[:, None])).min(axis=0)
     best, lane = value.argmax(axis=0), np.arange(y.shape[2])
     place, top = place[best, lane], value[best, lane]
-    lowest = np.argsort(a + place * (b + place * c), axis=0)[0]
-    count = len(rival)
-    crossing = best >= count + 2
-    names = np.array([(0, 0)] * (count + 2) + [pair for pair in meets for _ in range(2)]).T[:, best]
-    pair = np.where(crossing, np.sort(rival[names, lane], axis=0), lowest)
+    lowest = np.argsort(a + place * (b + place * c), axis=0)
+    pair = np.where(best >= len(rival) + 2, np.sort(lowest[:2], axis=0), lowest[0])
     return place, top, pair
 
 
