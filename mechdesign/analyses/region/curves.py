@@ -25,6 +25,8 @@ BESIDE = 1e-9
 GRID = 33
 # An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
 INSET = 1e-6
+# Places of a ray's nodes between both curves.
+FRACTIONS = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
 # Poses of all regions together, about (a question may cost much at each), and rays of a patch at least.
 MAX_POSES = 2000
 MIN_RAYS = 3
@@ -53,7 +55,7 @@ class Patch:
 
     def grid(self, about: complex) -> Complexes:
         """Nodes, shape (rays, GRID), denser towards both curves."""
-        radius = self.inner[:, None] + self.fractions() * (self.outer - self.inner)[:, None]
+        radius = self.inner[:, None] + FRACTIONS * (self.outer - self.inner)[:, None]
         return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
 
     def middle(self, about: complex) -> complex:
@@ -66,10 +68,6 @@ class Patch:
         radius, theta = np.abs(z - about), ray_through(z - about, self.theta[0])
         inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
         return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
-
-    def fractions(self) -> Floats:
-        """Places of a ray's nodes between both curves."""
-        return np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
 
 
 def patches(panels: Panels, rays: int) -> Iterator[Patch]:
@@ -87,7 +85,7 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
             traced = panels.trace(zero, theta, SLACK)
         ray, inner, outer, enters, leaves = _whole(traced, SAME_ROOT * float(panels.reach[0]))
         counts = np.bincount(ray, minlength=number)
-        usual = int(np.argmax(np.bincount(counts)))
+        usual = _most(counts)
         kept = np.flatnonzero(counts == usual)
         first = np.searchsorted(ray, kept)
         for slot in range(usual):
@@ -113,9 +111,9 @@ def _whole(traced: Intervals, near: float) -> tuple[Ints, Floats, Floats, Ints, 
     return ray[begins], traced.inner[begins], traced.outer[ends], traced.enters[begins], traced.leaves[ends]
 
 
-def _most(margins: Ints) -> int:
-    """The margin that most rays name: single rays may meet another (a corner)."""
-    names, counts = np.unique(margins, return_counts=True)
+def _most(values: Ints) -> int:
+    """What most rays have: single rays may meet another margin (a corner)."""
+    names, counts = np.unique(values, return_counts=True)
     return int(names[np.argmax(counts)])
 
 

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.region.rays import Designs, Intervals, ray_through
-from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.model import Term
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # A box is drawn wider by this share, so that rounding leaves nothing outside.
@@ -72,11 +70,8 @@ class Raster:
         inside, one = self.inside, self.cell.real * self.cell.imag
         edge = np.zeros(inside.shape, dtype=bool)
         for axis in (1, 2):
-            change = np.diff(inside, axis=axis)
-            one_side, other = [slice(None)] * 3, [slice(None)] * 3
-            one_side[axis], other[axis] = slice(1, None), slice(None, -1)
-            edge[tuple(one_side)] |= change
-            edge[tuple(other)] |= change
+            first, last = inside.take([0], axis), inside.take([-1], axis)
+            edge |= np.diff(inside, axis=axis, prepend=first) | np.diff(inside, axis=axis, append=last)
         return inside.sum(axis=(1, 2)) * one, EDGE * edge.sum(axis=(1, 2)) * one
 
     @property
@@ -165,19 +160,15 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
     low, high = np.full((2, len(graph.nodes), count), -np.inf), np.full((2, len(graph.nodes), count), np.inf)
     low[:, 0], high[:, 0] = 0.0, 0.0
     places = {**mechanism.nominal, **designs.places}
-    strokes = {b.coordinate.slide: (b.minimum, b.maximum) for b in mechanism.bounds if b.coordinate.kind == "slide"}
-
-    def value(term: Term) -> Value:
-        return places[term] if isinstance(term, str) else term
-
+    strokes = {b.coordinate.slide: b.ends(places) for b in mechanism.bounds if b.coordinate.kind == "slide"}
     # Steps from one node to another: the least and largest in x and y.
     steps: list[tuple[int, int, Floats, Floats]] = []
     for edge, w, d in zip(graph.edges, vectors.w, vectors.d, strict=True):
         stroke = np.zeros((2, 1, count))
         if edge.slide is not None:
             shortest, longest = strokes.get(edge.slide, (None, None))
-            stroke[0] = -np.inf if shortest is None else value(shortest)
-            stroke[1] = np.inf if longest is None else value(longest)
+            stroke[0] = -np.inf if shortest is None else shortest
+            stroke[1] = np.inf if longest is None else longest
             if edge.slide in graph.telescopic:
                 stroke[0] = np.maximum(stroke[0], 0.0)
         if edge.frame:
@@ -190,7 +181,7 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
             steps.append((edge.tail, edge.head, along + ends.min(axis=0), along + ends.max(axis=0)))
     for bound in mechanism.bounds:
         if bound.coordinate.kind == "distance" and bound.maximum is not None:
-            size = np.abs(np.asarray(value(bound.maximum), dtype=float))
+            size = np.abs(np.asarray(bound.ends(places)[1], dtype=float))
             steps.append((bound.coordinate.node, bound.coordinate.other, -size, size))
     for _ in graph.nodes:
         for tail, head, least, most in steps:

@@ -175,19 +175,17 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     # Where all pieces count, the raster tells if one is missing.
     every = pieces is None or not question.field.same_assembly or pieces.number <= 1
     missing = np.where(every, panels.seen - integral.area, 0.0)
-    values: dict[str, Floats] = {"area": integral.area}
-    errors = {"area": np.maximum(integral.area_error, missing)}
+    found = {"area": (integral.area, np.maximum(integral.area_error, missing))}
     if {"SUI", "box_area"} & set(question.wanted):
         box = bounding_box(panels, integral.boundary)
-        values["box_area"], errors["box_area"] = box, np.zeros(count)
         with np.errstate(invalid="ignore", divide="ignore"):
-            values["SUI"], errors["SUI"] = integral.area / box, integral.area_error / box
+            found |= {"box_area": (box, np.zeros(count)), "SUI": (integral.area / box, integral.area_error / box)}
     for column in question.wanted:
         name, kind = split(column)
         if name:
-            values[column], errors[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
-    pick = question.wanted
-    return Evaluation({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels, pieces)
+            found[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
+    values, errors = ({name: found[name][k] for name in question.wanted} for k in (0, 1))
+    return Evaluation(values, errors, panels, pieces)
 
 
 def areas_of_pieces(question: Question, given: Evaluation) -> list[float]:
@@ -286,17 +284,14 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> Float
 
 def _best(distance: Floats, design: Ints, theta: Floats, count: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Per design the largest distance, the angle where it is, and the angles of the rays on either side of it."""
-    top = np.full(count, -np.inf)
+    top, low, middle, high = (np.full(count, value) for value in (-np.inf, -np.inf, np.nan, np.inf))
     np.maximum.at(top, design, distance)
-    middle = np.full(count, np.nan)
     here = distance == top[design]
     middle[design[here]] = theta[here]
-    low, high = np.full(count, -np.inf), np.full(count, np.inf)
     below, above = theta < middle[design], theta > middle[design]
     np.maximum.at(low, design[below], theta[below])
     np.minimum.at(high, design[above], theta[above])
-    low, high = np.where(np.isfinite(low), low, middle), np.where(np.isfinite(high), high, middle)
-    return top, low, middle, high
+    return top, np.where(np.isfinite(low), low, middle), middle, np.where(np.isfinite(high), high, middle)
 
 
 def _climb(panels: Panels, which: Ints, low: Floats, middle: Floats, high: Floats, turn: complex) -> Floats:
