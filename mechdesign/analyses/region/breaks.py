@@ -148,14 +148,9 @@ def all_breaks(
 
 
 def _meetings(intervals: Intervals, codes: Ints, left: Ints, leading: Flags) -> Meetings:
-    """What may meet between the rays `left` and those that follow them, by how they differ.
+    """What may meet between the rays `left` and those that follow them, by how their signatures `codes` differ.
 
-    Parameters
-    ----------
-    codes : ndarray of int, shape (rays,)
-        Signatures.
-    leading : ndarray of bool, shape (margins,)
-        Margins to be followed rather than others, which may end at them.
+    Margins that are `leading` are followed rather than others, which may end at them.
     """
     found = [np.zeros(0, dtype=MEETING)]
     kinds = np.unique(np.stack([codes[left], codes[left + 1]]), axis=1, return_inverse=True)[1].ravel()

@@ -29,15 +29,9 @@ DOUBLINGS = 12
 class Raster:
     """Cells of a box around the region of each design, by their centres.
 
-    A circle larger than the one around a cell always holds a centre: pieces that hold one are met.
-
-    Parameters
-    ----------
-    designs : Designs
-    low, cell : ndarray of complex, shape (designs,)
-        Lower left corner of the box, and width and height of a cell.
-    inside : ndarray of bool, shape (designs, rows, columns)
-        Whether a cell's centre lies in the region.
+    A circle larger than the one around a cell always holds a centre: pieces that hold one are met. Of each design the
+    lower left corner of the box, width and height of a cell, both complex, and whether the centres of the cells lie in
+    the region, shape (designs, rows, columns).
     """
 
     designs: Designs
@@ -92,14 +86,9 @@ class Raster:
         return found
 
     def hidden(self, some: Ints, design: Ints, angle: Floats, intervals: Intervals) -> tuple[Ints, Floats]:
-        """Design and angle of further rays, to what rays have passed by: pieces and holes between two of them.
+        """Design and angle of further rays of some designs, to what rays passed by: pieces and holes between two.
 
-        Parameters
-        ----------
-        some : ndarray of int
-            Designs that are looked at.
-        design, angle, intervals
-            The rays, ascending by both; for each design at least those at both ends of the scan.
+        The rays ascend by design and angle; each design has at least those at both ends of the scan.
         """
         every, (begin, end) = np.arange(len(self.low) + 1), self.designs.scan
         first, ends = np.searchsorted(design, every), intervals.by_ray(intervals.inner, intervals.outer)

@@ -215,12 +215,7 @@ def _along(
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Integrals along rays and their estimated errors, both of shape (integrands, rays).
 
-    Parameters
-    ----------
-    evaluated
-        What `_segments` gives for the segments.
-    allowed : ndarray, shape (integrands, rays)
-        Error that a segment may have; those with a larger one are divided.
+    `evaluated` is what `_segments` gives. A segment is divided if its error is larger than `allowed` on its ray.
     """
     value, error = np.zeros((2, *allowed.shape))
     found, doubt, crossing = evaluated

@@ -67,15 +67,10 @@ class Question(Region):
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The wanted columns for each design, and their estimated errors (0 where the rule has none).
+    """The wanted columns for each design, their estimated errors (0 where the rule has none), and the counted panels.
 
-    Parameters
-    ----------
-    panels : Panels
-        Those that are counted.
-    pieces : Pieces or None
-        All pieces of the regions; the first of each design is counted, or all are in any assembly. None for several
-        designs whose pieces all count.
+    Of all pieces of the regions the first of each design is counted, or all are in any assembly; there are none for
+    several designs whose pieces all count.
     """
 
     values: dict[str, Floats]
