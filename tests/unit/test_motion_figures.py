@@ -6,8 +6,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.animation import in_order
-from mechdesign.report.figures.kinematics import curves_figure, figures
+from mechdesign.report.figures.kinematics import curves_figure, figures, in_order
 from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.scene import Sweep, ranks
 

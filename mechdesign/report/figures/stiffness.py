@@ -22,8 +22,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism, link_colors, name_labels
 from mechdesign.report.figures.framing import MAX_HEIGHT, TITLE, framed
 from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.panels import along
-from mechdesign.report.figures.planes import Plane, map_sheet, plane
+from mechdesign.report.figures.panels import Plane, along, map_sheet, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result

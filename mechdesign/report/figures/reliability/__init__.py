@@ -8,11 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
-from mechdesign.report.figures.panels import along
-from mechdesign.report.figures.planes import plane
+from mechdesign.report.figures.panels import along, plane
 from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
-from mechdesign.report.figures.reliability.errors import map_figures, sweep_figures
-from mechdesign.report.figures.reliability.estimates import MAX_LISTED, estimate_figure
+from mechdesign.report.figures.reliability.errors import MAX_LISTED, estimate_figure, map_figures, sweep_figures
 from mechdesign.report.figures.reliability.looks import Sampled, look
 from mechdesign.report.figures.reliability.samples import (
     convergence_figure,

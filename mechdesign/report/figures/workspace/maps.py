@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from matplotlib import colormaps
@@ -21,7 +20,6 @@ from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace.regions import Grid, Region, grids, sheet, some
 from mechdesign.study import Study
 
-Extend = Literal["neither", "max"]
 # Columns of the table that are no indices, beside the held coordinates.
 _NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node", "piece")
 # An index whose largest values are a thin tail is cut off above this share of the area, which the bar shows.
@@ -50,8 +48,7 @@ def index_columns(region: Region) -> list[str]:
 
 
 def _map(study: Study, found: Sequence[Region], column: str) -> Figure:
-    levels, extend = _levels(found, column)
-    norm = BoundaryNorm(levels, 256, extend=extend)
+    norm = _norm(found, column)
     told = found[0].local.column(column)
     places = np.concatenate([region.places() for region in found])
     point = study.workspace.point if study.workspace else ""
@@ -60,39 +57,34 @@ def _map(study: Study, found: Sequence[Region], column: str) -> Figure:
         study, places, [region.title for region in found], f"{name} at point {point}: {told.meaning}", bar=True
     )
     for axes, region in zip(page.axes, found, strict=True):
-        contours(axes, list(grids(region.local, column)), levels, norm, extend, labels=len(found) == 1)
+        contours(axes, list(grids(region.local, column)), norm, labels=len(found) == 1)
     page.ends(found)
-    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, told.unit), ticks=levels)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, told.unit), ticks=norm.boundaries)
     return page.figure
 
 
-def contours(
-    axes: Axes, patches: Sequence[Grid], levels: Floats, norm: BoundaryNorm, extend: Extend, *, labels: bool
-) -> None:
+def contours(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, *, labels: bool) -> None:
     """Filled contours over the patches of a region, each level named once, where its line is longest."""
     drawn = []
+    low, high = norm.boundaries[[0, -1]]
+    # Beyond the last level is where an index grows without bounds, on singularities.
+    over = 2 * high - low
     for x, y, z in patches:
-        # Beyond the last level is where an index grows without bounds, on singularities.
-        over = levels[-1] + (levels[-1] - levels[0])
-        shown = np.where(np.isfinite(z), np.minimum(z, over), over if extend == "max" else levels[0])
-        axes.contourf(x, y, shown, levels=levels, cmap=style.COLORMAP, norm=norm, extend=extend)
-        drawn.append(axes.contour(x, y, shown, levels=levels[1:], colors="white", linewidths=0.5, alpha=0.7))
+        shown = np.where(np.isfinite(z), np.minimum(z, over), over if norm.extend == "max" else low)
+        drawn.append(style.filled(axes, x, y, shown, norm, norm.boundaries[1:]))
     if labels:
         edges = [np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]]) for z in (x + 1j * y for x, y, _ in patches)]
-        label_levels(axes, drawn, levels, norm, _on_paper(axes, np.concatenate(edges)))
+        label_levels(axes, drawn, norm, _on_paper(axes, np.concatenate(edges)))
 
 
-def label_levels(
-    axes: Axes, drawn: Sequence[QuadContourSet], levels: Floats, norm: BoundaryNorm, blocked: Complexes
-) -> None:
+def label_levels(axes: Axes, drawn: Sequence[QuadContourSet], norm: BoundaryNorm, blocked: Complexes) -> None:
     """Name each level once on one of its lines, far from other lines and names; or not at all."""
+    levels = norm.boundaries[1:]
     parts_of = [contour.allsegs for contour in drawn]
-    lines = [
-        [_on_paper(axes, part @ [1, 1j]) for parts in parts_of for part in parts[k]] for k in range(len(levels) - 1)
-    ]
+    lines = [[_on_paper(axes, part @ [1, 1j]) for parts in parts_of for part in parts[k]] for k in range(len(levels))]
     every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]
     taken = np.zeros(0, dtype=complex)
-    for k, level in enumerate(levels[1:]):
+    for k, level in enumerate(levels):
         places = [(part[j], part[j + 1] - part[j - 1]) for part in lines[k] if len(part) > 4
                   for j in range(2, len(part) - 2, max(1, len(part) // 40)) if part[j + 1] != part[j - 1]]  # fmt: skip
         if not places:
@@ -126,8 +118,8 @@ def _nearest(places: Complexes, others: Complexes) -> Floats:
     return np.asarray(np.abs(places[:, None] - others[None, :]).min(axis=1))
 
 
-def _levels(found: Sequence[Region], column: str) -> tuple[Floats, Extend]:
-    """Round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
+def _norm(found: Sequence[Region], column: str) -> BoundaryNorm:
+    """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
     patches = [patch for region in found for patch in grids(region.local, column)]
     values = np.concatenate([z.ravel() for _, _, z in patches])
     areas = np.concatenate([_areas(x, y).ravel() for x, y, _ in patches])
@@ -137,12 +129,11 @@ def _levels(found: Sequence[Region], column: str) -> tuple[Floats, Extend]:
     share = np.cumsum(areas[order]) / areas.sum()
     high = float(values[order[min(int(np.searchsorted(share, _SHOWN_AREA)), len(order) - 1)]])
     low, top = float(values.min()), float(values.max())
-    tail = top > 1.4 * high + 1e-12
-    if not tail:
+    if top > 1.4 * high + 1e-12:
+        top = np.inf
+    else:
         high = top
-    low = 0.0 if 0 <= low < 0.5 * high else low
-    levels = style.levels(low, high, 11)
-    return levels, "max" if tail or top > levels[-1] else "neither"
+    return style.steps(style.levels(0.0 if 0 <= low < 0.5 * high else low, high, 11), low, top)
 
 
 def _areas(x: Floats, y: Floats) -> Floats:
