@@ -121,12 +121,12 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
 def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
     """Columns by kind and unit, in the order of `_RANKS`, the most informative first."""
     section = study.kinematics
-    asked = section.outputs if section is not None and section.outputs is not None else ()
+    asked = section is not None and section.outputs
     values = {column.name: column.values for column in columns}
     unit_of = {column.name: column.unit for column in columns}
     units = study.units
     sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): study.mechanism.size}
-    rank = ranks(study.mechanism, tuple(asked))
+    rank = ranks(study)
     # The condition of a single number is 1, that of each pose is for its table.
     left_out = {"conditioning"} | ({"inverse_condition"} if len(study.mechanism.drives) == 1 else set())
     panels: dict[tuple[str, str], list[_Curve]] = {}
@@ -268,9 +268,7 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
 
 def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
     """Draw the path of every moving point, bold ones for outputs and coupler points, as `ranks` has them."""
-    section = sweep.study.kinematics
-    asked = section.outputs if section is not None and section.outputs is not None else ()
-    ranked = ranks(sweep.mechanism, tuple(asked))
+    ranked = ranks(sweep.study)
     # Where all points are of a low rank, none is thin.
     lift = 2 - max(ranked.values(), default=2)
     colors = link_colors(sweep.mechanism)
