@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.study.schema.reliability import Precision
 
 # Of all intervals.
 CONFIDENCE = 0.997
@@ -19,24 +20,20 @@ CONFIDENCE = 0.997
 WIDTH = 2.97
 
 
-@dataclass(frozen=True)
-class Precision:
-    """How wide the 99.7 % interval may be: half of it, or the standard error as a share of the failure probability."""
+def _half_wanted(precision: Precision, value: float) -> float:
+    """Half of the widest interval that is narrow enough."""
+    return precision.half_width if precision.half_width is not None else WIDTH * (precision.relative or 0.0) * value
 
-    relative: float | None
-    half_width: float | None
 
-    def _half(self, value: float) -> float:
-        return self.half_width if self.half_width is not None else WIDTH * (self.relative or 0.0) * value
+def reached(precision: Precision, value: float, low: float, high: float) -> bool:
+    """Whether an interval is narrow enough."""
+    return 0.5 * (high - low) <= _half_wanted(precision, value)
 
-    def reached(self, value: float, low: float, high: float) -> bool:
-        """Whether an interval is narrow enough."""
-        return 0.5 * (high - low) <= self._half(value)
 
-    def needed(self, value: float, variance: float) -> float:
-        """Samples that reach it, from the value and the variance of one sample."""
-        half = self._half(value)
-        return WIDTH**2 * variance / half**2 if half > 0 else float("inf")
+def needed(precision: Precision, value: float, variance: float) -> float:
+    """Samples that reach a precision, from the value and the variance of one sample."""
+    half = _half_wanted(precision, value)
+    return WIDTH**2 * variance / half**2 if half > 0 else float("inf")
 
 
 def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:

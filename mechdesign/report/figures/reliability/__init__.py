@@ -48,7 +48,7 @@ def _sampled(study: Study, result: Result, poses: Poses) -> Gallery:
     tables, moments = result.tables, result.tables["moments"]
     found = Gallery()
     # The tables are of the first method that samples errors; the moments hold its name.
-    method = next((name for name in moments["method"].tolist() if look(name).simulated), None)
+    method = next((name for name in moments["method"].tolist() if look(name).sampled), None)
     if method is None:
         return found
     makers: dict[str, Callable[[Sampled], Figure | Mapping[str, Figure]]] = {

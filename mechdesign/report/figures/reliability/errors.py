@@ -28,7 +28,6 @@ from mechdesign.report.figures.panels import (
     title,
 )
 from mechdesign.report.figures.reliability.looks import (
-    Look,
     apart,
     best_moments,
     best_probability,
@@ -41,7 +40,7 @@ from mechdesign.report.figures.reliability.looks import (
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.methods import METHODS
+from mechdesign.study.schema.methods import METHODS, Method
 
 MAX_OUTPUTS = 7
 MAX_MAPS = 4
@@ -66,8 +65,8 @@ def sweep_figures(study: Study, moments: Table, swept: Along) -> dict[str, Figur
     found = {"bands": _bands(study, moments, swept)}
     for name, column, what in (("means", "mean", "Mean"), ("deviations", "sigma", "Standard deviation")):
         found[name] = _curves(moments, swept, column, f"{what} of made mechanisms")
-    reference, computed = best_moments(moments), [m for m in methods(moments) if not look(m).simulated]
-    if look(reference).simulated and computed:
+    reference, computed = best_moments(moments), [m for m in methods(moments) if not look(m).sampled]
+    if look(reference).sampled and computed:
         found["difference"] = _difference(moments, swept, reference, computed)
     return found
 
@@ -80,7 +79,7 @@ def _bands(study: Study, moments: Table, swept: Along) -> Figure:
                          swept.label)  # fmt: skip
     tick_abscissa(axes[-1], swept)
     entries: dict[str, Any] = {}
-    filled = next((method for method in known if not look(method).simulated), None)
+    filled = next((method for method in known if not look(method).sampled), None)
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
         axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
         for method in known:
@@ -132,9 +131,10 @@ def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
     return figure
 
 
-def _line(drawn: Look) -> dict[str, Any]:
+def _line(drawn: Method) -> dict[str, Any]:
     """Dashes of what is computed, markers of what is simulated."""
-    return {"color": drawn.color, "linestyle": drawn.dashes, "marker": drawn.marker if drawn.simulated else ""}
+    dashes, marker = ("None", drawn.marker) if drawn.sampled else (drawn.dashes, "")
+    return {"color": drawn.color, "linestyle": dashes, "marker": marker}
 
 
 def _difference(moments: Table, swept: Along, reference: str, computed: Sequence[str]) -> Figure:
@@ -216,7 +216,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
     values = np.arange(count, dtype=np.float64) if swept is None else swept.values
     written = swept is None and count * len(known) <= MAX_WRITTEN
     # Methods stand beside each other at a listed pose; of a sweep those that are simulated, a little.
-    beside = known if swept is None else [method for method in known if look(method).simulated]
+    beside = known if swept is None else [method for method in known if look(method).sampled]
     step = min(0.3 if written else 0.14, 0.8 / len(known)) if swept is None else 0.2 * np.ptp(values) / count
     lines = 1 if swept is not None else min(len(poses.names), 4)
     figure, (axes,) = style.page(1, 1, _HEIGHT, left=_LEFT, right=0.15, top=_ABOVE, bottom=1.0)
@@ -227,7 +227,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
         rows, drawn = np.flatnonzero(table.where(method=method, scope="pose"))[:count], look(method)
         at = values + (beside.index(method) - (len(beside) - 1) / 2) * step if method in beside else values
         value = table["failure"][rows]
-        if drawn.simulated:
+        if drawn.sampled:
             _dots(axes, table, rows, at, method, floor, entries)
         elif swept is None:
             # What is 0 stands on the floor of a logarithmic axis.
@@ -258,7 +258,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
     height = _ABOVE + _HEIGHT + bottom
     figure.set_figheight(height)
     figure.subplots_adjust(bottom=bottom / height, top=1 - _ABOVE / height)
-    notes = ["whiskers: 99.7 % intervals"] * any(look(method).simulated for method in known)
+    notes = ["whiskers: 99.7 % intervals"] * any(look(method).sampled for method in known)
     notes += ["open arrows: no failure was seen, upper end of the interval"] * bool(unseen.any())
     title(figure, heading, "; ".join(notes), left=_LEFT)
     legend_below(figure, list(entries.values()), list(entries))

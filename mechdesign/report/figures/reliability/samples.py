@@ -129,7 +129,7 @@ def trend_figure(given: Sampled) -> Figure:
         if np.isfinite(failure):
             drawn, used = look(method), str(reliability["used"][row])
             words = drawn.words + f" by {look(used).words}" * (used != method)
-            dashes = (0, (1, 1)) if drawn.simulated else drawn.dashes
+            dashes = (0, (1, 1)) if drawn.sampled else drawn.dashes
             lines.append((failure, {"color": drawn.color, "ls": dashes, "label": f"{words}: {number(failure)}"}))
             ends.append(failure)
     positive = [end for end in ends if end > 0]
