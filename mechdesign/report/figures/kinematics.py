@@ -18,7 +18,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, fit, framed, scale_of, windows
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, fit, framed, windows
 from mechdesign.report.figures.panels import abscissa, moving_names, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
@@ -299,12 +299,11 @@ def modes_figure(study: Study, result: Result) -> Figure:
     if found > moving:
         notes.append(f"{found - moving} of {found} assemblies have no valid pose")
     places = np.concatenate([sweep.extent for _, sweep in shown])
-    _, wide, tall = extent(places)
-    columns = max(
-        range(1, min(len(shown), _MAX_COLUMNS) + 1),
-        key=lambda count: scale_of(wide, tall, *_room(count, math.ceil(len(shown) / count)), _pad(count)),
-    )
-    window = fit(places, *_room(columns, math.ceil(len(shown) / columns)), _pad(columns))
+    fitted = {
+        columns: fit(places, *_room(columns, math.ceil(len(shown) / columns)), 0.4 if columns == 1 else 0.2)
+        for columns in range(1, min(len(shown), _MAX_COLUMNS) + 1)
+    }
+    columns, window = max(fitted.items(), key=lambda item: item[1].scale)
     unit, top = study.units.label("length"), _NOTE if notes else 0.0
     figure, grid = windows(window, unit, len(shown), columns, gap=_GAP, above=_PANEL_TITLE, top=top)
     for axes, (title, sweep) in zip(grid, shown, strict=True):
@@ -316,11 +315,6 @@ def modes_figure(study: Study, result: Result) -> Figure:
         )  # fmt: skip
     figure.text(LEFT / style.WIDTH, 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
     return figure
-
-
-def _pad(columns: int) -> float:
-    """Inches around what a panel shows."""
-    return 0.4 if columns == 1 else 0.2
 
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
