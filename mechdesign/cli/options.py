@@ -35,13 +35,16 @@ def _out(told: str) -> Parameter:
 
 
 STUDY = _parameter(
-    "study", Path | None, None, typer.Argument(metavar="STUDY", help=f"The study file. {_LEFT_OUT}", show_default=False)
+    "study",
+    Path | None,
+    None,
+    typer.Argument(metavar="STUDY", help=f"The study file; - is standard input. {_LEFT_OUT}", show_default=False),
 )
 STUDIES = _parameter(
     "study",
     list[Path] | None,
     None,
-    typer.Argument(metavar="STUDY...", help=f"The study files. {_LEFT_OUT}", show_default=False),
+    typer.Argument(metavar="STUDY...", help=f"The study files; - is standard input. {_LEFT_OUT}", show_default=False),
 )
 OUT = _out("Folder for tables, pictures and manifest. Default: results/<study>/<command>.")
 OUT_ALL = _out("Folder that gets one folder a command (several studies: <study>/<command>). Default: results/<study>.")

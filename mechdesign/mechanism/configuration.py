@@ -33,7 +33,7 @@ class Reason(IntEnum):
         return ("", "cannot be assembled", "other assembly", "limit", "does not hold its load")[self]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Configuration:
     """Positions of a mechanism; every array broadcasts to `shape`, the shape of the batch.
 
@@ -65,6 +65,11 @@ class Configuration:
     places: Mapping[str, Value]
     near: Mapping[str, Value] = field(default_factory=dict)
     counted: frozenset[str] = frozenset()
+
+    def __repr__(self) -> str:
+        return (
+            f"<Configuration of shape {self.shape}: {np.count_nonzero(self.valid)} of {self.reason.size} poses valid>"
+        )
 
     @property
     def valid(self) -> Flags:
@@ -125,10 +130,13 @@ class Configuration:
     def take(self, index: Ints | int | tuple[int, ...] | tuple[Ints, ...]) -> Configuration:
         """Poses of a flat batch by index (shape (n,) or scalar)."""
 
+        reason = self.reason[index]
+
         def pick(value: Value) -> Value:
+            if np.ndim(value) == 0 and reason.ndim == 0:
+                return value
             return np.broadcast_to(np.asarray(value), self.shape)[index]
 
-        reason = self.reason[index]
         vectors = Vectors(
             [pick(w) for w in self.vectors.w],
             [pick(d) for d in self.vectors.d],

@@ -203,7 +203,7 @@ def commands(data: dict) -> list[str]:
 
 
 def test_damaged_studies(seeds, tmp_path):
-    for seed in seeds(40):
+    for seed in seeds(20):
         rng = np.random.default_rng(seed)
         name = pick(rng, STUDIES)
         data = copy.deepcopy(STUDIES[name])
@@ -216,7 +216,7 @@ def test_damaged_studies(seeds, tmp_path):
 
 
 def test_odd_overrides(seeds, tmp_path):
-    for seed in seeds(40):
+    for seed in seeds(20):
         rng = np.random.default_rng([7, seed])
         name = pick(rng, STUDIES)
         data = STUDIES[name]

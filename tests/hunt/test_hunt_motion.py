@@ -152,17 +152,17 @@ def check_four_bar(seed: int, six: bool) -> None:
 
 
 def test_extremes_of_four_bars(seeds: Seeds) -> None:
-    for seed in seeds(25):
+    for seed in seeds(13):
         check_four_bar(seed, six=False)
 
 
 def test_extremes_of_six_bars(seeds: Seeds) -> None:
-    for seed in seeds(15):
+    for seed in seeds(8):
         check_four_bar(seed, six=True)
 
 
 def test_extremes_of_slider_cranks(seeds: Seeds) -> None:
-    for seed in seeds(15):
+    for seed in seeds(8):
         rng = np.random.default_rng(seed)
         r, l, e = rng.uniform([20, 40, -30], [80, 160, 30]).tolist()  # noqa: E741
         drawn = float(rng.uniform(0, 360))
@@ -254,7 +254,7 @@ def moved(rng: np.random.Generator) -> tuple[str, Callable[[np.ndarray], np.ndar
 
 
 def test_velocities_along_paths(seeds: Seeds) -> None:
-    for seed in seeds(25):
+    for seed in seeds(13):
         rng = np.random.default_rng(seed)
         robot = Robot(rng)
         form, place, ways = moved(rng)
