@@ -51,11 +51,6 @@ def darker(color: str, share: float = 0.3) -> Color:
     return red, green, blue
 
 
-def rail_side(along: complex) -> complex:
-    """Unit vector from a slide's line to its rail: the lower side."""
-    return -1j * along if (-1j * along).imag <= 0 else 1j * along
-
-
 @dataclass(frozen=True)
 class Pen:
     """Draws symbols on axes; `order` lifts a drawing above those of lower order, `alpha` makes it faint."""
@@ -149,7 +144,8 @@ class Pen:
         """A guide fixed to the ground: the slide's line, and a hatched rail under it."""
         self._line((start, end), 0.0, 0.8, _STEEL, linestyle=(0, (9, 3, 2, 3)))
         along = (end - start) / abs(end - start)
-        down = rail_side(along)
+        # The rail is on the lower side.
+        down = -1j * along if (-1j * along).imag <= 0 else 1j * along
         figure = self.axes.get_figure(root=True)
         assert figure is not None
         shift = down * (SLIDER_SIZE[1] / 2 + 1.2) * self.size / 72

@@ -156,22 +156,17 @@ class Problem:
 
     def draw(self, rng: np.random.Generator, count: int, spread: float = 1.0) -> Floats:
         """Points, shape (dimension, count), normal variables with this standard deviation and all directions."""
-        return self.on_circles(
-            np.where(self.straight[:, None], spread, 1.0) * rng.standard_normal((self.dimension, count))
-        )
-
-    @property
-    def straight(self) -> Flags:
-        """Which of the variables are normal."""
-        return np.isin(np.arange(self.dimension), self.normals)
-
-    def on_circles(self, u: Floats) -> Floats:
-        """Points, shape (dimension, n), changed in place: their directions are cosine and sine again."""
+        u = np.where(self.straight[:, None], spread, 1.0) * rng.standard_normal((self.dimension, count))
         for pair in self.circles:
             length = np.linalg.norm(u[pair], axis=0)
             u[pair[0]] = np.where(length > 0, u[pair[0]], 1.0)
             u[pair] /= np.where(length > 0, length, 1.0)
         return u
+
+    @property
+    def straight(self) -> Flags:
+        """Which of the variables are normal."""
+        return np.isin(np.arange(self.dimension), self.normals)
 
     def margins(self, u: Floats) -> Floats:
         """Margins at points `u` of shape (dimension, n): shape (limits, n)."""

@@ -90,7 +90,7 @@ def workspace_figure(study: Study, result: Result, region: Region, title: str = 
     title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
     page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
     (axes,) = page.axes
-    fill(axes, region)
+    fill(axes, region.local)
     page.ends([region])
     for index in range(len(configuration.reason)):
         draw_mechanism(axes, mechanism, configuration, index, faint=True)
@@ -139,7 +139,7 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
     unit = study.units.label("length")
     size = 9 if len(shown) == 1 else 7.5
     for axes, region in zip(page.axes, shown, strict=True):
-        fill(axes, region)
+        fill(axes, region.local)
         shapes: list[tuple[Patch, tuple[float, float], str, str]] = []
         if CIRCLE[0] in table:
             x, y, radius = (float(table[name][region.row]) for name in CIRCLE)
