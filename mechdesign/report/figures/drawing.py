@@ -239,7 +239,7 @@ def _draw_drives(pen: Pen, scene: Scene) -> list[Label]:
 
 def _slide_labels(scene: Scene) -> list[Label]:
     return [
-        Label(guide.joint, (guide.pin,), style.FAINT, SLIDER_SIZE[1] / 2 + 8, -math.pi / 3, 9, True, True)
+        Label(guide.joint, (guide.pin,), style.FAINT, SLIDER_SIZE[1] / 2 + 8, -math.pi / 3, 9, optional=True)
         for guide in scene.guides
         if guide.joint not in scene.description.drives
     ]
@@ -261,7 +261,7 @@ def _link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
             run = places[1] - places[0]
             anchors = tuple(places[0] + share * run for share in (0.5, 0.4, 0.6, 0.3, 0.7))
             reach, heading = BAR / 2 + 3, cmath.phase(1j * run if (1j * run).imag >= 0 else -1j * run)
-        labels.append(Label(name, anchors, darker(colors[name]), reach, heading, 9, True, True))
+        labels.append(Label(name, anchors, darker(colors[name]), reach, heading, 9, optional=True))
     return labels
 
 

@@ -22,6 +22,7 @@ from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.panels import coordinate_label
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace.regions import (
     MAX_REGIONS,
@@ -210,7 +211,7 @@ def _speed(study: Study, path: Table) -> Figure:
     top, tail = _ends(path["speed_ratio"])
     axes.set_ylim(0, 1.3 * top if tail else None)
     axes.set_title("Speed of the point over that of the drive", loc="left")
-    axes.set_xlabel(style.axis_label(drive, study.units.label(study.mechanism.quantity(drive))))
+    axes.set_xlabel(coordinate_label(study, drive))
     axes.set_ylabel(_label(path))
     axes.margins(x=0.01)
     if len(pieces) > 1:
