@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
-from mechdesign.analyses.stiffness.elements import course_of
+from mechdesign.analyses.stiffness.elements import corners_of, course_of
 from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -297,8 +297,8 @@ def _bent(
     """The beams of an elastic link between the places where something sits, and its brackets."""
     beam = ways[0].beam
     assert beam is not None
-    course = course_of(beam.beams, configuration)
-    sitting = [(ways[0].a, beam.beams.corners[0]), *((edge.b, edge.point) for edge in ways)]
+    course = course_of(beam.link, configuration)
+    sitting = [(ways[0].a, corners_of(beam.link)[0]), *((edge.b, edge.point) for edge in ways)]
     feet = [float(course.foot(point, configuration.point(point))[0]) for _, point in sitting]
     bases = [complex(course.place(np.array([foot]))[0]) for foot in feet]
     order = sorted(range(len(feet)), key=feet.__getitem__)
