@@ -46,8 +46,8 @@ def joints_in_words(description: Description, graph: Graph) -> list[str]:
     ]
     found += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
     for name, joint in description.joints.items():
-        links = joint.links if isinstance(joint, Fixed) else (joint.line.link, getattr(joint, "slider", joint.point))
-        found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(links)})")
+        parts = (*joint.links, joint.point)[:2]
+        found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(parts)})")
     return found
 
 
@@ -345,7 +345,7 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
             if name in driven or bodies != [name] or description.links[name].telescopic:
                 continue
             frames = {graph.bodies[name][0]}
-            if any(name in _line_links(description, joint) for joint in description.joints):
+            if any(name in joint.links for joint in description.joints.values()):
                 continue
         elif name in driven or not _can_go(description, name):
             continue
@@ -361,24 +361,13 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
     return []
 
 
-def _line_links(description: Description, joint: str) -> tuple[str, ...]:
-    found = description.joints[joint]
-    if isinstance(found, Fixed):
-        return found.links
-    return (found.line.link, *([found.slider] if isinstance(found, Prismatic) else ()))
-
-
 def _can_go(description: Description, joint: str) -> bool:
     """Whether a slide can be left out and its links still turn together as before."""
     found = description.joints[joint]
-    if isinstance(found, Fixed) or not isinstance(found, Prismatic):
+    if not isinstance(found, Prismatic):
         return True
+    pairs = [{*other.links} for name, other in description.joints.items() if name != joint]
     reached = {found.line.link}
-    pairs = [
-        {*_line_links(description, name)}
-        for name, other in description.joints.items()
-        if name != joint and isinstance(other, Fixed | Prismatic)
-    ]
     for _ in pairs:
         reached.update(*(pair for pair in pairs if pair & reached))
     return found.slider in reached

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.model import Description, Fixed, Line, Prismatic, Slot, Term
+from mechdesign.mechanism.model import Description, Fixed, Joint, Line, Prismatic, Term
 
 GROUND = "ground"
 
@@ -198,11 +198,9 @@ def build_graph(description: Description) -> Graph:
     )
 
 
-def _named_points(joint: Prismatic | Slot | Fixed) -> list[tuple[str, str]]:
+def _named_points(joint: Joint) -> list[tuple[str, str]]:
     if isinstance(joint, Fixed):
         return [(link, joint.point) for link in joint.links]
     line = joint.line
-    named = [(line.link, point) for point in (line.through, line.toward) if point is not None]
-    if isinstance(joint, Prismatic):
-        named.append((joint.slider, joint.point))
-    return named
+    ends = [(line.link, point) for point in (line.through, line.toward) if point is not None]
+    return ends + [(link, joint.point) for link in joint.links[1:]]

@@ -136,25 +136,14 @@ class Plan:
             raise ValueError(f"{len(self.structure.given)} given coordinates needed, {len(values)} passed")
         dims: dict[str, Value] = {name: np.asarray(v, dtype=float) for name, v in (places or {}).items()}
         shape = np.broadcast_shapes(*(v.shape for v in values), *(v.shape for v in dims.values()))
-        if np.prod(shape, dtype=np.int64) > CHUNK:
-            return self._in_chunks(values, dims, shape, start, limits, jobs)
-        return self._at_once(values, dims, shape, start, limits)
-
-    def _in_chunks(
-        self,
-        values: Sequence[Value],
-        dims: Mapping[str, Value],
-        shape: tuple[int, ...],
-        start: Configuration | None,
-        limits: bool,
-        jobs: int | None,
-    ) -> Configuration:
-        """`solve` by chunks that stay in the processor's cache, on one or more threads."""
+        count = int(np.prod(shape, dtype=np.int64))
+        if count <= CHUNK:
+            return self._at_once(values, dims, shape, start, limits)
+        # By chunks that stay in the processor's cache, on one or more threads.
         keep_freed_memory()
         if self.change_points is not None:
             self.change_points.cover(values[0])
-        given, places = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
-        count = int(np.prod(shape, dtype=np.int64))
+        flat, places = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
         length = CHUNK if self.iterative or worker_count(jobs) == 1 else THREAD_CHUNK
         starts: Ints | None = None
         if start is not None and start.shape:
@@ -168,7 +157,7 @@ class Plan:
             if start is not None and starts is not None:
                 begun = start.take(np.unravel_index(starts[begin : begin + length], start.shape))
             dimensions = {name: some(v) for name, v in places.items()}
-            return self._at_once([some(v) for v in given], dimensions, (min(length, count - begin),), begun, limits)
+            return self._at_once([some(v) for v in flat], dimensions, (min(length, count - begin),), begun, limits)
 
         parts = map_chunks(part, range(0, count, length), jobs)
         whole = joined(parts, shape, self.core.geometry.vectors(dims), dims)
