@@ -14,12 +14,12 @@ from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Interrupted, StudyError, explain
 from mechdesign.mechanism.describe import describe
+from mechdesign.parallel import one_thread
 from mechdesign.report.requirements import command_of, foresee
 from mechdesign.report.writer import write_file, write_sketch
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
-from mechdesign.threads import one_thread
 
 _OUTCOMES = {
     0: "done",
