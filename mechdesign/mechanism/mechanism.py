@@ -139,7 +139,7 @@ class Mechanism(Core):
         values = [np.asarray(g) for g in given]
         state = plan.run(values, self.geometry.nominal, guess)
         reached = state.solved(()) if plan.iterative else None
-        configuration = plan.configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
+        configuration = plan.configuration(state, (), {}, reached)
         if not configuration.valid:
             pose = list(zip(plan.structure.given, given, strict=True))
             raise closing.cannot_assemble(self, plan, state, pose)

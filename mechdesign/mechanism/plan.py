@@ -172,17 +172,19 @@ class Plan:
         limits: bool,
     ) -> Configuration:
         """`solve` without chunks, for arrays of floats that broadcast to `shape`."""
-        vectors = self.core.geometry.vectors(dims)
         reached: Flags | None = None
         guess: Unknowns | None = None
         if self.iterative:
             begin = self.start(start)
             guess, reached = self._follow(values, dims, shape, begin)
-        state = self.run(values, vectors, guess, self.modes_at(values))
+        state = self.run(values, self.core.geometry.vectors(dims), guess, self.modes_at(values))
         if reached is not None:
             # What the path came near to must be a pose, and of the same assembly.
             reached &= state.solved(shape, begin.signs)
-        return self.configuration(state, shape, dims, vectors, reached, limits, values)
+        found = self.configuration(state, shape, dims, reached, values)
+        if limits:
+            self.judge(found)
+        return found
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """Values within half a turn of which angles are reported: given ones as given, drives within their limits."""
@@ -249,9 +251,7 @@ class Plan:
         state: State,
         shape: tuple[int, ...],
         dims: Mapping[str, Value],
-        vectors: Vectors,
         reached: Flags | None,
-        limits: bool,
         given: Sequence[Value] | None = None,
     ) -> Configuration:
         """A state with the reason of each pose; angles that are given keep their turns where `given` has the values."""
@@ -282,13 +282,10 @@ class Plan:
             nodes = [hide(x, lost) for x in nodes]
             rotations = [hide(u, lost) for u in rotations]
             slides = [hide(s, lost) for s in slides]
-        configuration = Configuration(
-            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims),
+        return Configuration(
+            graph, state.vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims),
             self.turns(given or (), dims), frozenset() if given is None else self.counted,
         )  # fmt: skip
-        if limits:
-            self.judge(configuration)
-        return configuration
 
     def judge(self, configuration: Configuration) -> None:
         """Note in the reasons of solved poses where they are outside the study's limits."""
