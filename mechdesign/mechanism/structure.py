@@ -74,7 +74,6 @@ class Structure:
 
     given: tuple[Coordinate, ...]
     edges: tuple[Edge, ...]
-    classes: int
     ties: tuple[Tie, ...]
     known_slides: tuple[tuple[int, int], ...]
     known_nodes: tuple[tuple[int, int, int], ...]
@@ -129,8 +128,7 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
         If the given coordinates do not determine the mechanism.
     """
     edges = list(graph.edges)
-    classes = graph.classes
-    ties = _Ties([Tie(k) for k in range(classes)])
+    ties = _Ties([Tie(k) for k in range(graph.classes)])
     known_slides: list[tuple[int, int]] = []
     node_given: dict[tuple[int, str], int] = {}
     spans: list[tuple[int, int]] = []
@@ -146,13 +144,13 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
             node_given[coordinate.node, coordinate.kind] = k
         elif coordinate.kind == "distance":
             # A given distance is a rigid link between the two points, in a class of its own.
-            ties.parent.append(Tie(classes))
+            frame = len(ties.parent)
+            ties.parent.append(Tie(frame))
             spans.append((len(edges), k))
-            edges.append(Edge(coordinate.node, coordinate.other, classes))
-            classes += 1
+            edges.append(Edge(coordinate.node, coordinate.other, frame))
         else:
             expressions[k] = coordinate
-    found = [ties.find(k) for k in range(classes)]
+    found = [ties.find(k) for k in range(len(ties.parent))]
     known = {slide for slide, _ in known_slides}
     groups = _decompose(graph, edges, [tie.root for tie in found], known, node_given, expressions)
     known_nodes = []
@@ -161,7 +159,7 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
         if min(pair) >= 0:
             known_nodes.append((node, *pair))
     return Structure(
-        tuple(given), tuple(edges), classes, tuple(found), tuple(known_slides), tuple(known_nodes), tuple(spans),
+        tuple(given), tuple(edges), tuple(found), tuple(known_slides), tuple(known_nodes), tuple(spans),
         tuple(groups),
     )  # fmt: skip
 
