@@ -1,8 +1,10 @@
 """Design studies of planar mechanisms: one description, four questions.
 
 >>> import mechdesign
->>> study = mechdesign.load("study.yaml", overrides=["reliability.samples=1000"])  # doctest: +SKIP
->>> mechdesign.reliability(study, seed=1).tables["moments"]["sigma"]  # doctest: +SKIP
+>>> study = mechdesign.load("study.yaml", overrides={"reliability.samples": 1000})  # doctest: +SKIP
+>>> result = mechdesign.reliability(study, seed=1)  # doctest: +SKIP
+>>> result.tables["moments"]["sigma"]  # doctest: +SKIP
+>>> mechdesign.requirements(study, result)  # doctest: +SKIP
 
 The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics.
 """
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from mechdesign.errors import AssemblyError as AssemblyError
     from mechdesign.errors import MechdesignError as MechdesignError
     from mechdesign.errors import StudyError as StudyError
+    from mechdesign.report.requirements import requirements as requirements
     from mechdesign.study import load as load
 
     __version__: str
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
 _HOMES = {
     **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
     "load": "mechdesign.study",
+    "requirements": "mechdesign.report.requirements",
     **{name: command.module for name, command in COMMANDS.items()},
 }
 __all__ = sorted((*_HOMES, "__version__"))

@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+# Number of columns that a table's repr names.
+MAX_SHOWN = 8
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Column:
     """One column of a table."""
 
@@ -19,15 +22,22 @@ class Column:
     unit: str = ""  # as the study declares it; empty for pure numbers and text
     meaning: str = ""  # one line for the manifest
 
+    def __repr__(self) -> str:
+        unit = f" in {self.unit}" if self.unit else ""
+        return f"<Column {self.name}{unit}: {len(self.values)} values>"
+
     @property
     def numeric(self) -> bool:
         """Whether it holds numbers or booleans rather than words."""
         return self.values.dtype.kind in "fiub"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Table:
-    """Columns of equal length; ``table["sigma"]`` is the NumPy array."""
+    """Columns of equal length; ``table["sigma"]`` is the NumPy array.
+
+    Iteration gives its rows as dictionaries, so that ``pandas.DataFrame(table)`` is the same table.
+    """
 
     name: str
     columns: tuple[Column, ...]
@@ -77,14 +87,22 @@ class Table:
         """Names of the columns, in order."""
         return tuple(column.name for column in self.columns)
 
-    def rows(self) -> Iterator[dict[str, Any]]:
+    def to_dict(self) -> dict[str, NDArray[Any]]:
+        """The arrays by the names of their columns, as most libraries of tables take them."""
+        return {column.name: column.values for column in self.columns}
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
         """Iterate over rows as dictionaries of Python scalars."""
         lists = [np.asarray(column.values).tolist() for column in self.columns]
         for row in zip(*lists, strict=True):
             yield dict(zip(self.names, row, strict=True))
 
+    def __repr__(self) -> str:
+        shown = ", ".join(self.names[:MAX_SHOWN]) + ", ..." * (len(self.names) > MAX_SHOWN)
+        return f"<Table {self.name}: {len(self)} rows of {shown}>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Answer of one command."""
 
@@ -96,6 +114,11 @@ class Result:
     files: Mapping[str, str] = field(default_factory=dict)  # texts to be written with the tables, by their file names
     interrupted: str = ""  # how far it came, where it is the finished part of an interrupted computation
     drawn: Mapping[str, Any] = field(default_factory=dict)  # what pictures show besides: solved poses, springs; by name
+
+    def __repr__(self) -> str:
+        tables = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())
+        count = len(self.warnings)
+        return f"<Result of {self.command}: {tables}; {count or 'no'} warning{'s' * (count != 1)}>"
 
     @property
     def main(self) -> Table:

@@ -74,7 +74,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 clearances = in_words(study.reliability, study.mechanism.graph)
                 terminal.emit("\n".join([f"{label}: {study.name}", describe(study.mechanism), *clearances, ""]))
             for warning in study.warnings:
-                terminal.say(f"warning: {warning}", quiet=options.quiet)
+                terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS)
             if not options.no_plots:
                 claim(owners, study)
@@ -158,6 +158,8 @@ def _junit(answers: Sequence[Outcome]) -> str:
                 error = Error(words, type_=f"exit code {given.exit_code}")
                 error.text = given.failed
                 case.result = [error]
+            if given.warnings:
+                case.system_out = "\n".join(f"warning: {warning}" for warning in given.warnings)
             suite.add_testcase(case)
             for verdict in given.verdicts:
                 case = TestCase(f"{given.command}: {verdict.requirement}", classname=name, time=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from mechdesign.report.tables import from_csv
 from mechdesign.results import Result, Table
 from mechdesign.study import Study, load, template_path
 
+STANDARD_INPUT = Path("-")
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -41,7 +44,7 @@ class Outcome:
 
 
 def load_study(path: Path | None, options: Options) -> Study:
-    """Load a study with the options' overrides and seed; without a path, say which one is taken.
+    """Load a study with the options' overrides and seed; ``-`` is standard input; without a path, say which is taken.
 
     Raises
     ------
@@ -53,7 +56,10 @@ def load_study(path: Path | None, options: Options) -> Study:
         path = here if here.exists() else template_path(BUILT_IN)
         what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
         terminal.say(f"study: {what}", quiet=options.quiet)
-    return load(path, options.overrides or (), options.seed)
+    overrides = options.overrides or ()
+    if path == STANDARD_INPUT:
+        return load(text=sys.stdin.buffer.read(), overrides=overrides, seed=options.seed)
+    return load(path, overrides, options.seed)
 
 
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
@@ -157,9 +163,7 @@ def _judged_and_written(
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
-        verdicts = requirements.judge(
-            result, study.requirements, problem=study.problem, freedom=study.mechanism.mobility
-        )
+        verdicts = requirements.requirements(study, result)
     except StudyError:
         if result.command in LONG:
             # What took long is not lost to a requirement that names a row it has not.
@@ -179,14 +183,15 @@ def _journal(study: Study, directory: Path, options: Options) -> Journal:
 
 def tell(given: Outcome, options: Options) -> None:
     """Say on stderr what came out; what is not met or failed is said even where quiet is wanted."""
+    who = f"{given.study}: {given.command}:"
     for warning in given.warnings:
-        terminal.say(f"warning: {warning}", quiet=options.quiet)
+        terminal.say(f"{who} warning: {warning}", quiet=options.quiet)
     for verdict in given.verdicts:
-        terminal.say(f"requirement: {verdict}", quiet=options.quiet and verdict.met)
+        terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
     if given.failed:
-        terminal.say(f"{given.study}: {given.command}: {given.failed}")
+        terminal.say(f"{who} {given.failed}")
     kept = "; they are whole, and not computed again" if given.kept else ""
-    terminal.say(f"{given.study}: {given.command}: {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
+    terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 
 
 @one_thread()

@@ -33,7 +33,7 @@ class Reason(IntEnum):
         return ("", "cannot be assembled", "other assembly", "limit", "does not hold its load")[self]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Configuration:
     """Positions of a mechanism, nan where a pose cannot be assembled; every array broadcasts to `shape`."""
 
@@ -49,6 +49,11 @@ class Configuration:
     # By name, values within half a turn of which angles are reported; angles not named are in (-pi, pi].
     near: Mapping[str, Value] = field(default_factory=dict)
     counted: frozenset[str] = frozenset()  # those of them whose turns count: given, or followed along a motion
+
+    def __repr__(self) -> str:
+        return (
+            f"<Configuration of shape {self.shape}: {np.count_nonzero(self.valid)} of {self.reason.size} poses valid>"
+        )
 
     @property
     def valid(self) -> Flags:

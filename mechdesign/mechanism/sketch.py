@@ -17,6 +17,8 @@ from mechdesign.mechanism.structure import Group, Structure
 # A joint this near to its dividing line, as a fraction of the distances around it, chooses no side.
 UNDECIDED = 0.01
 SKETCH = "mechanism.sketch"
+# Forms of groups that have one assembly, or one that is searched for.
+_WITHOUT_MODE = ("place", "newton", "two slides")
 
 
 @dataclass(frozen=True)
@@ -65,12 +67,25 @@ class Sketch:
         Raises
         ------
         MechanismError
-            Where a point that decides is not in the sketch, or lies within 1 % of its dividing line.
+            Where points that decide are not in the sketch, or one lies within 1 % of its dividing line.
         """
+        missing = {
+            node
+            for group in structure.groups
+            if group.form not in _WITHOUT_MODE
+            for k, _ in group.loops[0].edges
+            if structure.ties[structure.edges[k].frame].root in group.angles
+            for node in (structure.edges[k].tail, structure.edges[k].head)
+            if self.nodes[node] is None
+        }
+        if missing:
+            names, one = ", ".join(f"'{self.graph.nodes[node]}'" for node in sorted(missing)), len(missing) == 1
+            what, them = (f"point {names} is", "it") if one else (f"points {names} are", "them")
+            raise MechanismError(f"{what} needed to choose the assembly; add {them} to the sketch", SKETCH)
         return tuple(self._mode(structure, group) for group in structure.groups)
 
     def _mode(self, structure: Structure, group: Group) -> int:
-        if group.form in ("place", "newton", "two slides"):
+        if group.form in _WITHOUT_MODE:
             return 0
         (loop,) = group.loops
         spans = dict.fromkeys(group.angles, 0j)
@@ -78,7 +93,9 @@ class Sketch:
             edge = structure.edges[k]
             root = structure.ties[edge.frame].root
             if root in spans:
-                tail, head = (self._drawn(node) for node in (edge.tail, edge.head))
+                tail, head = self.nodes[edge.tail], self.nodes[edge.head]
+                assert tail is not None
+                assert head is not None
                 spans[root] += sign * (head - tail)
         if group.form == "two angles":
             first, second = spans.values()
@@ -100,14 +117,6 @@ class Sketch:
                 SKETCH,
             )
         return 1 if side > 0 else -1
-
-    def _drawn(self, node: int) -> complex:
-        place = self.nodes[node]
-        if place is None:
-            raise MechanismError(
-                f"point '{self.graph.nodes[node]}' is needed to choose the assembly; add it to the sketch", SKETCH
-            )
-        return place
 
     def value(self, coordinate: Coordinate) -> float | None:
         """Value of a drive as drawn (radians), or `None` where the sketch does not tell."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,10 +33,6 @@ def command_of(requirement: Condition) -> str:
     return requirement.result.partition(".")[0]
 
 
-def _unplaced(message: str, section: str, index: int) -> Problem:
-    return Problem(message, f"{section}.{index}")
-
-
 def foresee(study: Study, commands: Iterable[str]) -> None:
     """Find, at a look, the requirements of commands that name what their results have not.
 
@@ -52,7 +48,7 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
     for command in [name for name in commands if name in judged]:
         try:
             # Of so few designs some rows may be missing that all of them have.
-            judge(look(study, command), study.requirements, problem=study.problem, whole=command != "optimize")
+            requirements(study, look(study, command), whole=command != "optimize")
         except AssemblyError:
             # Its own computation reports it.
             continue
@@ -62,25 +58,14 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
         raise StudyError(problems)
 
 
-def judge(
-    result: Result,
-    requirements: Iterable[Condition],
-    *,
-    problem: Callable[[str, str, int], Problem] = _unplaced,
-    freedom: int = 1,
-    whole: bool = True,
-) -> tuple[Verdict, ...]:
-    """Verdicts on the requirements that concern this result, in the order of the study.
+def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[Verdict, ...]:
+    """Verdicts on those requirements of a study that concern a result, in the order of the study.
 
     The worst row counts: the smallest value for `at_least`, the largest for `at_most`; nan is not met, nor is a
     requirement that no row answers because none came out valid.
 
     Parameters
     ----------
-    problem : callable
-        From a message, ``requirements`` and a number to a mistake with its place, as `mechdesign.study.Study.problem`.
-    freedom : int
-        How many numbers make a pose: the mobility.
     whole : bool
         Whether the result has all its rows; if not, rows that are missing are no mistake.
 
@@ -88,23 +73,30 @@ def judge(
     ------
     StudyError
         If a requirement names a column that the result has not, or one of words, or a row that its table never has.
-        Every such mistake in one go.
+        Every such mistake in one go, with its place.
     """
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
-    for index, requirement in enumerate(requirements):
+    for index, requirement in enumerate(study.requirements):
         if command_of(requirement) != result.command:
             continue
         try:
-            verdicts.append(_judge(result, requirement, freedom, whole))
+            verdicts.append(judge(result, requirement, study.mechanism.mobility, whole=whole))
         except UnknownColumnError as error:
-            problems.append(problem(str(error), "requirements", index))
+            problems.append(study.problem(str(error), "requirements", index))
     if problems:
         raise StudyError(problems)
     return tuple(verdicts)
 
 
-def _judge(result: Result, requirement: Condition, freedom: int, whole: bool) -> Verdict:
+def judge(result: Result, requirement: Condition, freedom: int = 1, *, whole: bool = True) -> Verdict:
+    """The verdict on one requirement; `freedom` is how many numbers make a pose, see `requirements`.
+
+    Raises
+    ------
+    UnknownColumnError
+        See `requirements`.
+    """
     path = requirement.result.partition(".")[2]
     chosen = choose(result, path, requirement.where, absolute=requirement.abs)
     table, name, values = chosen.table, chosen.column, chosen.values

@@ -5,7 +5,10 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
+import json
+import os
 import pathlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -35,19 +38,26 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
-from mechdesign.study.text.document import Document, KeyPath, leaves, plain, read
+from mechdesign.study.text.document import Document, KeyPath, Mark, leaves, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 
+# Characters of a study's name that a folder's name does without, and the name of a study that has none.
+_UNFIT = re.compile(r"[^\w.-]+")
+_UNNAMED = "study"
+# What messages call a text that is no file.
+_TEXT = "<study>"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Study:
     """A validated study; sections are None where it does not ask."""
 
     name: str  # by default that of its file
-    path: pathlib.Path | None
-    text_sha256: str  # of the file as it was read
+    path: pathlib.Path | None  # None of a study that was given as a text or a mapping
+    text: bytes  # as it was read; empty of a mapping
+    text_sha256: str
     seed: int
     overrides: tuple[str, ...]
     units: Units
@@ -70,8 +80,12 @@ class Study:
 
     @property
     def label(self) -> str:
-        """The name of its folder of results: that of its file."""
-        return self.path.stem if self.path is not None else self.name
+        """The name of its folder of results: that of its file, else its own."""
+        return self.path.stem if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
+
+    def __repr__(self) -> str:
+        questions = ", ".join(self.questions) or "no question"
+        return f"<Study {shown(self.name)}: mobility {self.mechanism.mobility}; {questions}>"
 
     def inputs(self) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
         """Files that the study reads: the keys of their names, the file, and what it holds."""
@@ -85,48 +99,107 @@ class Study:
                 yield keys, folder / value, content
 
     def problem(self, message: str, *keys: str | int) -> Problem:
-        """A mistake at a path of the data, with its place in the text as long as the file is what was read."""
-        content = self.path.read_bytes() if self.path is not None and self.path.is_file() else b""
-        if hashlib.sha256(content).hexdigest() != self.text_sha256:
-            return Problem(message, ".".join(map(str, keys)), str(self.path or ""))
-        document = read(content, str(self.path))
+        """A mistake at a path of the data, with its place in the text."""
+        if not self.text:
+            return Problem(message, ".".join(map(str, keys)))
+        document = read(self.text, str(self.path or _TEXT))
         override(document, self.overrides)
         reporter = Reporter(document)
         reporter.report(keys, message)
         return reporter.problems[-1]
 
 
-def load(path: str | pathlib.Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:
-    """Load a study file; overrides ``a.b.c=value`` apply before validation, a seed replaces the study's own.
+def load(
+    source: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+    seed: int | None = None,
+    *,
+    text: str | bytes | None = None,
+) -> Study:
+    """Load a study from a file, a mapping or a text in YAML.
+
+    Parameters
+    ----------
+    source : path or mapping
+        The study file, or the study as plain data; NumPy's numbers and arrays are taken as numbers and lists.
+    overrides : sequence of str, or mapping
+        ``"a.b.c=value"``, or values by their dotted names; applied in their order, before the study is checked.
+    seed : int, optional
+        In place of the study's own.
+    text : str or bytes
+        The study in YAML, in place of `source`. Files that it names are looked for in the working directory, as are
+        those of a mapping.
 
     Raises
     ------
     StudyError
         With every mistake found, each as ``file:line:column: key path: what, and what would mend it``.
     """
-    file = pathlib.Path(path)
+    if (source is None) == (text is None):
+        raise StudyError("give a study as a file, a mapping or text=..., one of them")
+    if text is not None:
+        return load_bytes(text.encode() if isinstance(text, str) else text, None, overrides, seed)
+    if isinstance(source, Mapping):
+        data = _plain_data(source, "the study")
+        document = Document("", data, values={(): Mark("")})
+        override(document, _texts(overrides))
+        sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
+        return load_document(document, None, b"", sha256, _texts(overrides), seed)
+    assert source is not None
+    file = pathlib.Path(source)
     try:
         content = file.read_bytes()
     except OSError as error:
-        raise StudyError([Problem(f"cannot be read: {error.strerror or error}", file=str(path))]) from None
+        raise StudyError([Problem(f"cannot be read: {error.strerror or error}", file=str(source))]) from None
     return load_bytes(content, file, overrides, seed)
 
 
 @one_thread()
-def load_bytes(content: bytes, path: pathlib.Path, changes: Sequence[str] = (), seed: int | None = None) -> Study:
+def load_bytes(
+    content: bytes,
+    path: pathlib.Path | None,
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+    seed: int | None = None,
+) -> Study:
     """Load a study from the bytes of a file; see `load`."""
-    if seed is not None and seed < 0:
-        raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
-    document = read(content, str(path))
-    if isinstance(changes, str):
-        changes = (changes,)
-    override(document, changes)
-    return load_document(document, path, hashlib.sha256(content).hexdigest(), tuple(changes), seed)
+    document = read(content, str(path or _TEXT))
+    override(document, _texts(overrides))
+    sha256 = hashlib.sha256(content).hexdigest()
+    return load_document(document, path, content, sha256, _texts(overrides), seed)
+
+
+def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
+    """Overrides as ``a.b.c=value``; a value of a mapping is written in JSON, which YAML reads."""
+    if isinstance(overrides, Mapping):
+        return tuple(
+            f"{name}={json.dumps(_plain_data(value, f'the override {name!r}'))}" for name, value in overrides.items()
+        )
+    return (overrides,) if isinstance(overrides, str) else tuple(overrides)
+
+
+def _plain_data(value: Any, what: str) -> Any:
+    """Data of mappings, lists, texts and numbers alone."""
+
+    def plainly(each: Any) -> Any:
+        if isinstance(each, Mapping):
+            return dict(each)
+        if hasattr(each, "tolist"):
+            return each.tolist()
+        if isinstance(each, os.PathLike):
+            return os.fspath(each)
+        raise TypeError(f"it holds {shown(each)}")
+
+    try:
+        return json.loads(json.dumps(value, default=plainly))
+    except (TypeError, ValueError, RecursionError) as error:
+        message = f"{what} is not plain data (mappings, lists, texts, numbers): {error}"
+        raise StudyError([Problem(message)]) from None
 
 
 def load_document(
     document: Document,
-    path: pathlib.Path,
+    path: pathlib.Path | None,
+    text: bytes,
     text_sha256: str,
     changes: tuple[str, ...] = (),
     seed: int | None = None,
@@ -136,6 +209,9 @@ def load_document(
 
     The assembly is that of the `original`, a study that differs in numbers alone, where else the sketch would choose.
     """
+    if seed is not None and seed < 0:
+        raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
+    folder = path.parent if path is not None else pathlib.Path()
     reporter = Reporter(document)
     data = _sections(document, reporter)
     context, formulas = _context(data, reporter)
@@ -150,18 +226,19 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(context.parameters, formulas)
-    parts = _checked(Checker(builder, parameters, parts), path.parent)
+    parts = _checked(Checker(builder, parameters, parts), folder)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
-    _check_poses(parts, mechanism, reporter, path.parent)
+    _check_poses(parts, mechanism, reporter, folder)
     reporter.done()
-    name = parts.get("name") or path.stem
+    name = parts.get("name") or (path.stem if path is not None else _UNNAMED)
     seed = parts["seed"] if seed is None else seed
     named = {"name": name, "seed": seed, "units": dataclasses.asdict(context.units)}
     return Study(
         name=name,
         path=path,
+        text=text,
         text_sha256=text_sha256,
         seed=seed,
         overrides=changes,

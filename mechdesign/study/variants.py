@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import hashlib
 import json
-import pathlib
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -48,7 +46,7 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
     MechanismError, AssemblyError
         See `mechdesign.mechanism.mechanism.Variant`.
     """
-    file, path = str(study.path or ""), study.path or pathlib.Path()
+    file = str(study.path or "")
     unknown = [name for name in changed if name not in study.parameters.known()]
     if unknown:
         raise StudyError([Problem("is neither a parameter nor a dimension", name, file) for name in unknown])
@@ -60,7 +58,9 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
     resolved = changed_data(study, changed)
     if follows(study, changed):
         document = Document(file, resolved, values={(): Mark(file)})
-        return load_document(document, path, study.text_sha256, study.overrides, study.seed, study.mechanism)
+        return load_document(
+            document, study.path, study.text, study.text_sha256, study.overrides, study.seed, study.mechanism
+        )
     description = study.mechanism.description
     new = {name: dataclasses.replace(description.places[name], nominal=float(value)) for name, value in places.items()}
     description = dataclasses.replace(description, places={**description.places, **new})
@@ -214,12 +214,11 @@ def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, di
 
 def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
     """The study's own text with single values changed; None where it would not say the same as `data`."""
-    content = study.path.read_bytes() if study.path is not None and study.path.is_file() else b""
-    if len(content) > _MOST_BYTES or hashlib.sha256(content).hexdigest() != study.text_sha256:
+    if not study.text or len(study.text) > _MOST_BYTES:
         return None
     if any(override.startswith("units") for override in study.overrides):
         return None
-    text, document = content.decode("utf-8-sig"), read(content, "")
+    text, document = study.text.decode("utf-8-sig"), read(study.text, "")
     written = document.data
     wanted = {key: value for key, value in data.items() if key in written}
     # Names of units in full are what the loader makes of the text.

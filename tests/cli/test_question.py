@@ -6,7 +6,9 @@ import os
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from mechdesign.cli.app import app
 from mechdesign.errors import AssemblyError, MechdesignError
 
 from .conftest import SLIDER, answer
@@ -30,7 +32,7 @@ def test_json_is_one_array_and_nothing_else(folder, analysis, invoke):
 def test_quiet_leaves_only_data(folder, analysis, invoke):
     analysis(lambda study, **options: answer(warnings=["mind the gap"]))
     loud = invoke("kinematics", "slider.yaml", "--no-plots")
-    assert "warning: mind the gap" in loud.stderr
+    assert "slider: kinematics: warning: mind the gap" in loud.stderr
     quiet = invoke("kinematics", "slider.yaml", "--no-plots", "--quiet")
     assert quiet.stderr == ""
     assert quiet.stdout == loud.stdout
@@ -211,3 +213,12 @@ def _shifted():
     table = answer().main
     columns = tuple(type(c)(c.name, np.flip(c.values)) for c in table.columns)
     return {"motion": type(table)("motion", columns)}
+
+
+def test_a_study_on_standard_input(folder, analysis):
+    done = CliRunner().invoke(app, ["kinematics", "-", "--no-plots"], input=SLIDER)
+    assert done.exit_code == 0, done.output
+    assert (folder / "results/Offset_slider-crank/kinematics/motion.csv").exists()
+    wrong = CliRunner().invoke(app, ["check", "-"], input=SLIDER.replace("O, A, r", "O, A, q"))
+    assert wrong.exit_code == 2
+    assert wrong.stderr.startswith("<study>:6:19: mechanism.links.crank")

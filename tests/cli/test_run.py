@@ -124,6 +124,15 @@ def test_junit_has_a_case_for_each_question_and_requirement(studies, invoke):
     assert any("kinematics.theta at most 80" in name for name in names)
 
 
+def test_junit_shows_warnings_and_log_lines_name_their_study(studies, analysis, invoke):
+    analysis(lambda study, **options: answer(warnings=["mind the gap"]))
+    done = invoke("run", "slider.yaml", "both.yaml", "--no-plots", "--junit", "report.xml")
+    assert [line.partition(": ")[0] for line in done.stderr.splitlines()] == ["slider"] * 2 + ["both"] * 3
+    assert "slider: kinematics: warning: mind the gap" in done.stderr.splitlines()
+    outputs = [case.system_out for suite in JUnitXml.fromfile("report.xml") for case in suite]
+    assert outputs == ["warning: mind the gap", "warning: mind the gap", None]
+
+
 @pytest.mark.parametrize("spoil", ["nothing", "file", "study", "seed", "override", "plots"])
 def test_resume_computes_again_only_what_is_not_whole_and_the_same(studies, analysis, invoke, spoil):
     computed = []

@@ -31,7 +31,7 @@ def test_no_worse_than_differential_evolution_and_no_small_step_improves(seeds):
 
 
 def compare(name, problem, seed):
-    (row,) = mechdesign.optimize(study_of(problem.study), seed=seed).main.rows()
+    (row,) = mechdesign.optimize(study_of(problem.study), seed=seed).main
     found, at = row[problem.goal], [row[key] for key in problem.ranges]
     # The closed form agrees where it ended.
     low, high = np.array(list(problem.ranges.values())).T
@@ -72,7 +72,7 @@ def test_coupler_curves_of_known_four_bars(seeds):
         text = ", ".join(f"[{p.real!r}, {p.imag!r}]" for p in points.tolist())
         goal = "kinematics.targets.C.rms"
         study = study_of(four_bar_study(BESIDE, f"C: [{text}]", goal, (0, 330, 30)), "optimize.evaluations=6000")
-        (row,) = mechdesign.optimize(study, seed=seed).main.rows()
+        (row,) = mechdesign.optimize(study, seed=seed).main
         assert row[goal] < 1e-6, seed
         assert [row[name] for name in BESIDE] == pytest.approx(known, abs=1e-3), seed
 

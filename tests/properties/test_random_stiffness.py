@@ -87,7 +87,7 @@ def test_every_part_is_in_equilibrium_and_pins_bear_no_moment(case: Sprung) -> N
 
         if loaded in parts:
             act(loaded, *applied, layout.places[case.at])
-        for row in table.rows():
+        for row in table:
             if row["load"] != number:
                 continue
             name, force = str(row["joint"]), np.array([row["fx"], row["fy"], row["mz"]])

@@ -78,7 +78,7 @@ def test_sine_generator_against_three_exact_values() -> None:
     motion = result_of("sine_generator").main
     assert motion["follower.angle_error"] == pytest.approx(spaced, abs=0.03)
 
-    (best,) = optimised("sine_generator")["optimum"].rows()
+    (best,) = optimised("sine_generator")["optimum"]
     a, b, c = (best[name] for name in "abc")
     ratios = 1 / a, 1 / c, (a**2 - b**2 + c**2 + 1) / (2 * a * c)
     errors = sine_errors(*ratios, best["crank_0"], best["follower_0"])

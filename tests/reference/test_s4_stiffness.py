@@ -56,7 +56,7 @@ def test_compliance_at_the_reference_pose(kind: str) -> None:
 @pytest.mark.parametrize("kind", TYPES)
 def test_equivalent_springs_at_the_reference_pose(kind: str) -> None:
     table = mechdesign.stiffness(load(kind)).tables["springs"]
-    first = list(table.rows())[: sum(map(len, SPRINGS[kind].values()))]
+    first = list(table)[: sum(map(len, SPRINGS[kind].values()))]
     for leg, expected in SPRINGS[kind].items():
         assert [row["stiffness"] for row in first if row["leg"] == leg] == pytest.approx(expected, rel=1e-9)
 
@@ -76,7 +76,7 @@ def test_springs_carry_the_platform_as_the_legs_do(kind: str) -> None:
     result = mechdesign.stiffness(load(kind))
     table = result.tables["springs"]
     total = np.zeros((3, 3))
-    for row in list(table.rows())[: len(table) // 3]:
+    for row in list(table)[: len(table) // 3]:
         angle = np.radians(row["angle"])
         force = np.array([np.cos(angle), np.sin(angle)])
         moment = row["x"] * force[1] - (row["y"] - 1.0) * force[0]

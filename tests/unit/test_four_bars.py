@@ -121,7 +121,7 @@ def test_the_input_is_the_driven_link_wherever_it_is_named() -> None:
 
 def test_transmission_angle_of_a_crank_rocker() -> None:
     """Smallest and largest where crank and frame are in line, by the cosine law (Norton, sec. 4.10)."""
-    (row,) = result(four_bar(4, 1, 2.5, 3)).tables["loops"].rows()
+    (row,) = result(four_bar(4, 1, 2.5, 3)).tables["loops"]
 
     def between(span: float) -> float:
         return float(np.degrees(np.arccos((2.5**2 + 3**2 - span**2) / (2 * 2.5 * 3))))
@@ -136,10 +136,10 @@ def test_transmission_angle_of_a_crank_rocker() -> None:
 
 def test_transmission_angle_between_poses_and_at_a_limit() -> None:
     text = four_bar(4, 1, 2.5, 3)
-    (row,) = result(text, "kinematics.sweep.crank={from: 3, to: 363, step: 7.2}").tables["loops"].rows()
+    (row,) = result(text, "kinematics.sweep.crank={from: 3, to: 363, step: 7.2}").tables["loops"]
     assert row["transmission_min"] == pytest.approx(np.degrees(np.arccos(-(2.5**2 + 3**2 - 5**2) / 15)), abs=1e-9)
     assert row["transmission_min_at"] == pytest.approx(180, abs=1e-5)
-    (row,) = result(four_bar(4, 3, 3.5, 2.2)).tables["loops"].rows()
+    (row,) = result(four_bar(4, 3, 3.5, 2.2)).tables["loops"]
     assert row["transmission_min"] == pytest.approx(0, abs=1e-6)
 
 
@@ -208,7 +208,7 @@ def test_a_slider_crank_turns_where_the_rod_is_longer_than_crank_and_offset(
 
 def test_transmission_angle_and_strokes_of_an_offset_slider_crank() -> None:
     tables = result(SLIDER_CRANK).tables
-    (row,) = tables["loops"].rows()
+    (row,) = tables["loops"]
     # sin of the pressure angle: (r + |e|)/l at the bottom.
     assert row["transmission_min"] == pytest.approx(np.degrees(np.arccos(60 / 120)), abs=1e-9)
     assert (row["transmission_min_at"], row["class"]) == (90, "crank-slider")
@@ -327,7 +327,7 @@ def test_other_chains_have_none(text: str) -> None:
 
 def test_listed_poses_give_the_row() -> None:
     found = result(four_bar(4, 1, 2.5, 3).split("kinematics")[0] + "kinematics: {poses: [{crank: 90}, {crank: 180}]}")
-    (row,) = found.tables["loops"].rows()
+    (row,) = found.tables["loops"]
     assert row["transmission_min_at"] == 1
     assert "toggles" not in found.tables
 

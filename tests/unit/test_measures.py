@@ -10,7 +10,7 @@ from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.analyses.reliability.analysis import reliability
 from mechdesign.analyses.stiffness.analysis import stiffness
 from mechdesign.analyses.workspace.analysis import workspace
-from mechdesign.report.requirements import judge
+from mechdesign.report.requirements import requirements
 
 ARM = """
 mechanism:
@@ -80,7 +80,7 @@ def test_measures_are_limited_and_required() -> None:
     outside = (table["mu"] < 55) | (table["lower"] > 55)
     assert outside.any()
     assert np.array_equal(table["valid"], ~outside)
-    verdicts = judge(result, study.requirements)
+    verdicts = requirements(study, result)
     assert verdicts[0].worst == np.min(table["half"])
     assert verdicts[1].worst == pytest.approx(np.max(table["lower"]) - 20)
 

@@ -46,7 +46,7 @@ def test_a_new_index_is_found_in_schema_csv_and_picture() -> None:
     assert "'reach'" in str(schema())
     study = study_of(ARM)
     result = mechdesign.workspace(study)
-    (row,) = result.main.rows()
+    (row,) = result.main
     assert (row["reach_min"], row["reach_max"]) == pytest.approx((20, 80), rel=1e-4)
     # The mean of r over a ring.
     assert row["reach_mean"] == pytest.approx(2 / 3 * (80**3 - 20**3) / (80**2 - 20**2), rel=1e-4)

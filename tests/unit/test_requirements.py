@@ -1,12 +1,13 @@
 """The gate: the worst row counts."""
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from mechdesign.errors import StudyError
-from mechdesign.report.requirements import judge
+import mechdesign
+from mechdesign.errors import Problem, StudyError
 from mechdesign.results import Column, Result, Table
 
 
@@ -24,6 +25,16 @@ def result(**columns):
     first = Table("motion", tuple(Column(name, np.asarray(values)) for name, values in columns.items()))
     second = Table("extremes", (Column("output", np.array(["B.x"])), Column("range", np.array([80.0]))))
     return Result("kinematics", {"motion": first, "extremes": second})
+
+
+def judge(answer, asked):
+    """Verdicts of a study of one degree of freedom that requires so much."""
+
+    def problem(message, section, index):
+        return Problem(message, f"{section}.{index}")
+
+    study = SimpleNamespace(requirements=asked, mechanism=SimpleNamespace(mobility=1), problem=problem)
+    return mechdesign.requirements(study, answer)
 
 
 def verdict(asked, **columns):
@@ -117,3 +128,28 @@ def test_unknown_columns_are_mistakes_of_the_study_all_in_one_go():
     assert "requirements.0: " in lines[0]
     assert "did you mean 'mu'" in lines[0]
     assert "words" in lines[1]
+
+
+def test_requirements_of_a_study_at_a_result_in_a_notebook():
+    study = mechdesign.load(
+        {
+            "mechanism": {
+                "links": {
+                    "ground": {"O": [0, 0], "D": [100, 0]},
+                    "crank": ["O", "A", np.float64(30)],
+                    "rod": ["A", "B", 90],
+                    "rocker": ["D", "B", 60],
+                },
+                "drives": ["crank"],
+                "sketch": {"A": np.array([0, 30]), "B": (75, 55)},
+            },
+            "requirements": [
+                {"result": "kinematics.extremes.B.x.range", "at_most": 1000},
+                {"result": "kinematics.B.y", "at_least": 100},
+            ],
+        }
+    )
+    met, missed = mechdesign.requirements(study, mechdesign.kinematics(study))
+    assert met.met
+    assert not missed.met
+    assert missed.place.startswith("crank ")

@@ -242,7 +242,7 @@ def test_forces_along_a_prop_have_the_signs_of_the_columns() -> None:
     line = (lug - (-100 - 300j)) / abs(lug - (-100 - 300j))
     push = 1000 * 600 / (lug.conjugate() * line).imag
     table = ask_stiffness(boom(80.0), "stiffness.loads=[[0, -1000, 0]]").tables["forces"]
-    found = {(row["joint"], row["on"], row["by"]): complex(row["fx"], row["fy"]) for row in table.rows()}
+    found = {(row["joint"], row["on"], row["by"]): complex(row["fx"], row["fy"]) for row in table}
     expected = {
         ("D", "ground", "strut"): -push * line, ("strut", "strut", "strut"): -push * line,
         ("M", "boom", "strut"): push * line, ("O", "ground", "boom"): push * line - 1000j,

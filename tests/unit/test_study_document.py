@@ -88,7 +88,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
         (b"# only a comment\n", "s.yaml: is empty"),
         (b"\x89PNG\r\n\x1a\n\x00\xff", "s.yaml: is not a text file in UTF-8"),
         (b"\x00\x01\x02", "s.yaml: is not a text in YAML"),
-        (b"a: [1, 2\nb: 3", "s.yaml:2:2: is not YAML"),
+        (b"a: [1, 2\nb: 3", "s.yaml:1:4: is not YAML: this '[' is not closed where line 2 goes on"),
         (b"a:\n\tb: 1", "s.yaml:2:1: is not YAML"),
         (b"a: b: c", "s.yaml:1:5: is not YAML"),
         (b"*.length: 1", "put a word that begins with '*' in quotes"),

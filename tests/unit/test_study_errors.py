@@ -107,6 +107,66 @@ def test_wrong_mechanisms(tmp_path, monkeypatch, old, new, message):
     assert all(line.startswith("study.yaml") for line in found)
 
 
+# What was typed (in place of what), and the only message, which says what to write instead.
+CURES = {
+    "a decimal comma": ("length: 90", "length: 90,5", "mechanism.links.rod: a decimal is written with a point: 90.5"),
+    "a decimal comma in a list": (
+        "B, 60]",
+        "B, 60,5]",
+        "7:13: mechanism.links.rocker: expected [from, to, length], {from, to, length} or the link's points "
+        "{A: [x, y], ...}; a decimal is written with a point: 60.5",
+    ),
+    "a decimal comma with a unit": (
+        "{r: 30}",
+        "{r: 30,5 mm}",
+        "mechanism.parameters: a decimal is written with a point: 30.5 mm",
+    ),
+    "a decimal comma on its own": (
+        "{r: 30}",
+        "\n    r: 30,5",
+        "'30,5' has a decimal comma; a decimal is written with a point: 30.5",
+    ),
+    "no space after a colon": (
+        "length: 90",
+        "length:90",
+        "6:27: mechanism.links.rod: a ':' needs a space after it: 'length: 90'",
+    ),
+    "no space before a list": (
+        "sketch: {A: ",
+        "sketch: {A:",
+        "9:12: is not YAML: a ':' needs a space after it, as in 'length: 90'",
+    ),
+    "no space on its own": (
+        "{theta: {angle: crank}}",
+        "\n    theta: angle:crank",
+        "9:12: mechanism.drives.theta: expected a mapping, not 'angle:crank'; a ':' needs a space after it",
+    ),
+    "no brace": (
+        "{r: 30}",
+        "{r: 30",
+        "2:15: is not YAML: this '{' is not closed where line 3 goes on; '}' or a comma is missing",
+    ),
+    "no ground": (
+        "ground: {O",
+        "base: {O",
+        "4:5: mechanism.links: there is no 'ground', the fixed link whose frame is the world; rename the link that does "
+        "not move (is it 'base'?)",
+    ),
+    "no sketch": (
+        "  sketch: {A: [0, 30], B: [75, 55]}\n",
+        "",
+        "1:1: mechanism.sketch: points 'A', 'B' are needed to choose the assembly; add them to the sketch",
+    ),
+}
+
+
+@pytest.mark.parametrize("slip", CURES)
+def test_a_slip_of_writing_is_answered_with_what_to_write(tmp_path, monkeypatch, slip):
+    old, new, message = CURES[slip]
+    (found,) = problems(tmp_path, monkeypatch, STUDY.replace(old, new))
+    assert found.endswith(message)
+
+
 VARIABLE = "variables: {r: {from: 20, to: 30, step: 5}}"
 QUESTIONS = [
     ("kinematic: {}", "10:1: kinematic: unknown key; did you mean 'kinematics'?"),
@@ -118,6 +178,12 @@ QUESTIONS = [
     ("kinematics: {rates: {theta: 5 mm/s}}", "is a velocity, where an angular velocity is expected"),
     ("kinematics: {rates: {thet: 5}}", "there is no coordinate 'thet'; did you mean 'theta'?"),
     ("kinematics: {outputs: [rod]}", "'rod' is a link; its coordinate is rod.angle"),
+    ("kinematics: {sweep: {crank: 3}}", "'crank' is a link; its coordinate is crank.angle, and its drive is theta"),
+    ("kinematics: {sweep: {theta: [0, 360, 5]}}", "a sweep is written {from: 0, to: 360, step: 5}, not [0, 360, 5]"),
+    ("kinematics: {sweep: {theta: 0..360}}", "a sweep is written {from: 0, to: 360, number: 73}, not 0..360"),
+    ("kinematics: {sweep: {theta: 0:5:360}}", "a sweep is written {from: 0, to: 360, step: 5}, not 0:5:360"),
+    ("kinematics: {rates: {theta: 60 RPM}}", "unknown unit 'RPM'; did you mean 'rpm'?"),
+    ("kinematics: {rates: {theta: 60 U/min}}", "unknown unit 'U/min'; did you mean 'rpm'?"),
     ("kinematics: {outputs: [Q]}", "10:24: kinematics.outputs.0: there is no coordinate 'Q'"),
     ("kinematics: {sweep: {P: 3}}", "'P' is a point; its coordinates are P.x and P.y"),
     ("kinematics: {sweep: {theta: {from: 0, to: 9 mm, step: 1}}}", "'9 mm' is a length, where an angle is expected"),

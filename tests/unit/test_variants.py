@@ -238,5 +238,5 @@ def test_dimensions_with_which_the_drawn_pose_cannot_be_assembled() -> None:
     found = variant(study, changed)
     tables = mechdesign.kinematics(found).tables
     assert 0 < tables["motion"]["valid"].sum() < len(tables["motion"])
-    loop = next(tables["loops"].rows())
+    loop = next(iter(tables["loops"]))
     assert [loop[f"{part}_length"] for part in ("frame", "input", "coupler", "output")] == pytest.approx([4, 2, 0.4, 3])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -233,7 +232,7 @@ def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int])
 def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]) -> bool:
     """Whether the study of this data has the assembly of the mechanism that was evaluated."""
     try:
-        alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path or Path("study.yaml"))
+        alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path)
     except MechdesignError:
         return False
     return alone.mechanism.forward.modes == mechanism.forward.modes

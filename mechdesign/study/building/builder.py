@@ -61,7 +61,9 @@ class Builder:
         return name
 
     def check_name(self, name: str, known: Iterable[str], what: str, path: Iterable[str | int]) -> bool:
-        """Whether a name is known; if not, note it with the nearest one."""
+        """Whether a name is known; if not, note it with the nearest one (of the ground that is missing, once)."""
+        if name == GROUND and GROUND not in self.section.links:
+            return False
         return self.reporter.known(name, known, what, (*ROOT, *path))
 
     def check_named(self, what: str, names: Iterable[str], path: KeyPath) -> bool:
@@ -79,7 +81,9 @@ class Builder:
         """Names are distinct, and there is a ground."""
         section = self.section
         if GROUND not in section.links:
-            self.report(("links",), "there is no 'ground': one link must be the fixed one")
+            fixed = [name for name, link in section.links.items() if link.from_ is None]
+            cure = f"rename the link that does not move (is it {fixed[0]!r}?)" if fixed else "add 'ground: {O: [0, 0]}'"
+            self.report(("links",), f"there is no 'ground', the fixed link whose frame is the world; {cure}")
         seen: dict[str, str] = {}
         groups: list[tuple[str, str, Iterable[str]]] = [
             ("parameter", "parameters", self.parameter_names),

@@ -43,7 +43,9 @@ class Checker:
             if name in self.mechanism.owners:
                 self.report(path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key)
             elif name in self.mechanism.moving:
-                self.report(path, f"{name!r} is a link; its coordinate is {name}.angle", at_key=at_key)
+                drives = [drive for drive, given in self.mechanism.drives.items() if given and given.angle == name]
+                also = f", and its drive is {drives[0]}" if drives else ""
+                self.report(path, f"{name!r} is a link; its coordinate is {name}.angle{also}", at_key=at_key)
             else:
                 what = "coordinate or parameter" if others else "coordinate"
                 self.known(name, [*self.mechanism.coordinates, *others], what, path, at_key=at_key)

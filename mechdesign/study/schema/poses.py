@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Self
 
@@ -12,6 +13,16 @@ from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
+
+
+def _range(raw: list[Any] | str) -> str:
+    """The keys of a range that is written as ``[0, 360, 5]``, ``0..360`` or ``0:5:360``; nothing of what is none."""
+    parts = raw if isinstance(raw, list) else re.split(r"\s*(?:\.\.+|:|\s+to\s+)\s*", raw)
+    if isinstance(raw, str) and len(parts) == 3:
+        parts = [parts[0], parts[2], parts[1]]
+    if len(parts) == 2:
+        return f"from: {parts[0]}, to: {parts[1]}, number: 73"
+    return "from: {}, to: {}, step: {}".format(*parts) if len(parts) == 3 else ""
 
 
 class Sweep(fields.Model):
@@ -26,6 +37,8 @@ class Sweep(fields.Model):
     @model_validator(mode="before")
     @classmethod
     def _long_form(cls, raw: Any) -> Any:
+        if isinstance(raw, list | str) and (ends := _range(raw)):
+            raise failure(f"a sweep is written {{{ends}}}, not {raw}")
         return {"from": raw, "to": raw, "number": 1} if isinstance(raw, int | float | str) else raw
 
     @model_validator(mode="after")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import yaml
@@ -34,7 +35,7 @@ _WORDS = {
 _HINTS = {
     "cannot start any token": " (indent with spaces, not tabs; put special characters in quotes)",
     "alias": " (put a word that begins with '*' in quotes, as in \"*.length\")",
-    "mapping values are not allowed": " (a ':' too many on the line, or wrong indentation)",
+    "mapping values are not allowed": " (a ':' too many here, one without a space after it above, or wrong indentation)",
 }
 
 
@@ -69,6 +70,8 @@ class Document:
     # Mistakes of writing that leave the rest readable, and the parts where complaints would only repeat them.
     problems: list[Problem] = field(default_factory=list)
     spoiled: set[KeyPath] = field(default_factory=set)
+    # Lists in which two numbers may be one with a decimal comma, and that number.
+    commas: dict[KeyPath, str] = field(default_factory=dict)
     # Entries that the text does not have: an override made them.
     added: set[KeyPath] = field(default_factory=set)
 
@@ -98,14 +101,31 @@ def read(content: bytes, name: str) -> Document:
         builder.document.data = builder.value(yaml.compose(text, Loader=_Loader), ())
         return builder.document
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        here = Mark(name, mark.line + 1, mark.column + 1) if mark else Mark(name)
-        parts = [str(part) for part in (error.context, error.problem) if part]
-        hint = next((hint for words, hint in _HINTS.items() if any(words in part for part in parts)), "")
-        raise StudyError([here.problem(f"is not YAML: {', '.join(parts)}{hint}")]) from None
+        raise StudyError([_misread(error, name)]) from None
     except yaml.YAMLError as error:
         first = str(getattr(error, "reason", error)).splitlines()[0]
         raise StudyError([Mark(name).problem(f"is not a text in YAML: {first}")]) from None
+
+
+def _misread(error: yaml.MarkedYAMLError, name: str) -> Problem:
+    """What is wrong where a text is not YAML; a brace that is not closed is reported where it opens."""
+
+    def at(mark: Any) -> Mark:
+        return Mark(name, mark.line + 1, mark.column + 1) if mark else Mark(name)
+
+    context, problem = str(error.context or ""), str(error.problem or "")
+    begin, noticed = error.context_mark or error.problem_mark, error.problem_mark or error.context_mark
+    if context.startswith("while parsing a flow") and noticed is not None:
+        opening, closing = "{}" if "mapping" in context else "[]"
+        message = (
+            f"this {opening!r} is not closed where line {noticed.line + 1} goes on; {closing!r} or a comma is missing"
+        )
+        return at(begin).problem(f"is not YAML: {message}")
+    if "':'" in problem and "scanning" in context:
+        return at(begin).problem("is not YAML: a ':' needs a space after it, as in 'length: 90'")
+    parts = [part for part in (context, problem) if part]
+    hint = next((hint for words, hint in _HINTS.items() if any(words in part for part in parts)), "")
+    return at(noticed).problem(f"is not YAML: {', '.join(parts)}{hint}")
 
 
 def _check_events(text: str, name: str) -> None:
@@ -155,6 +175,7 @@ class _Builder:
             return _scalar(node)
         if isinstance(node, yaml.SequenceNode):
             self._check_split(node, node.value, path)
+            self._check_commas(node, path)
             return [self.value(item, (*path, index)) for index, item in enumerate(node.value)]
         self._check_split(node, [entry for pair in node.value for entry in pair], path)
         mapping: dict[str, Any] = {}
@@ -163,6 +184,8 @@ class _Builder:
                 self._note(key, "a key must be a word", path)
                 continue
             inner: KeyPath = (*path, key.value)
+            if node.flow_style and not key.style and item.start_mark.index == item.end_mark.index:
+                self._check_lone_key(key, path, list(mapping.values())[-1:])
             if key.value in mapping:
                 line = self.document.keys[inner].line
                 self._note(key, f"duplicate key; {key.value!r} is given in line {line} already", inner)
@@ -173,6 +196,25 @@ class _Builder:
 
     def _note(self, node: yaml.Node, message: str, path: KeyPath) -> None:
         self.document.problems.append(_mark(node, self.document.name).problem(message, dotted(path)))
+
+    def _check_commas(self, node: Any, path: KeyPath) -> None:
+        """Keep ``90,5`` in ``[A, B, 90,5]``: whole numbers with a bare comma between, where others have a space."""
+        pairs = list(pairwise(node.value)) if node.flow_style else []
+        near = [two.start_mark.index - one.end_mark.index == 1 for one, two in pairs]
+        for (one, two), joined in zip(pairs, near, strict=True):
+            if joined and not all(near) and all(_INTEGER.fullmatch(str(each.value)) for each in (one, two)):
+                self.document.commas[path] = f"{one.value}.{two.value}"
+
+    def _check_lone_key(self, key: Any, path: KeyPath, before: Sequence[Any]) -> None:
+        """Find ``{length:90}`` and ``{length: 90,5}``, whose last word is a key without a value to YAML."""
+        name, _, value = key.value.partition(":")
+        if name and value:
+            self._note(key, f"a ':' needs a space after it: '{name}: {value}'", path)
+        elif key.value[:1].isdigit() and before and isinstance(before[0], int):
+            self._note(key, f"a decimal is written with a point: {before[0]}.{key.value}", path)
+        else:
+            return
+        self.document.spoiled.add(path)
 
     def _check_split(self, holder: Any, entries: Sequence[Any], path: KeyPath) -> None:
         """Find ``{to: min(a, b)}``, which YAML splits at the comma into two entries."""

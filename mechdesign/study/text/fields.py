@@ -29,6 +29,7 @@ PAIR_FORM: Form = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxIte
 
 NAME = re.compile(r"[^\W\d]\w*")
 COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:\s*[^\W\d].*)?")
 # Magnitudes beyond which a number is a slip of writing, as its square or reciprocal would soon overflow: of numbers,
 # and of lengths, which are multiplied with one another more often.
 MAX_NUMBER = 1e60
@@ -121,6 +122,8 @@ def _read_text(text: str, context: Context, kind: str | None) -> StudyNumber:
         if not math.isfinite(number):
             raise failure(f"{text!r} is too large a number")
         return StudyNumber(number)
+    if _DECIMAL_COMMA.fullmatch(text):
+        raise failure(f"{text!r} has a decimal comma; a decimal is written with a point: {text.replace(',', '.')}")
     expression = context.expression(text)
     for name in sorted(expression.names - set(context.parameters)):
         raise failure(f"unknown name {name!r} in {shown(text)}{_known_names(name, context)}")

@@ -33,6 +33,8 @@ _EXPECTED = defaultdict(
     too_long="a shorter list",
     none_required="nothing",
 )
+# Those that want a mapping.
+_MAPPINGS = ("dict_type", "model_type", "model_attributes_type")
 
 
 def unknown_key(name: str, known: Iterable[str]) -> str:
@@ -64,7 +66,9 @@ class Reporter:
         found = self.written(path)
         if any(found[: len(part)] == part for part in self.document.spoiled):
             return
-        problem = self._placed(found, message, at_key)
+        comma = next((number for part, number in self.document.commas.items() if found[: len(part)] == part), None)
+        hint = f"; a decimal is written with a point: {comma}" if comma is not None else ""
+        problem = self._placed(found, message + hint, at_key)
         if problem not in self.problems:
             self.problems.append(problem)
 
@@ -162,6 +166,8 @@ class Reporter:
                 self.report(location, f"is missing{meaning}", at_key=True)
             else:
                 message = item["msg"] if kind == "study" else f"expected {_EXPECTED[kind]}, not {shown(item['input'])}"
+                if kind in _MAPPINGS and isinstance(item["input"], str) and ":" in item["input"]:
+                    message += "; a ':' needs a space after it"
                 self.report(location, message, at_key=at_key)
 
     def mended(self, error: ValidationError, root: type[BaseModel], key: str, raw: Any) -> Any:

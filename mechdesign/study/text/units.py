@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
+from mechdesign.errors import nearest
+
 Powers = tuple[int, ...]
 """Exponents of length, angle, time and force."""
 
@@ -92,6 +94,10 @@ psi = pound_force / inch ** 2
 ksi = 1000 * psi
 joule = newton * meter = J
 """
+
+
+# Units as other languages and programs write them.
+_MEANT = {"u/min": "rpm", "upm": "rpm", "tr/min": "rpm", "rev/min": "rpm", "grad": "deg", "sek": "s", "zoll": "in"}
 
 
 class QuantityError(ValueError):
@@ -222,7 +228,9 @@ def _unit(unit: str) -> tuple[Powers, float]:
         parsed = registry.parse_units(unit.replace("^", "**").replace("·", "*"))
         base = registry.Quantity(1.0, parsed).to_base_units()
     except Exception:  # pint lets through whatever its tokenizer and its own classes raise
-        raise QuantityError(f"unknown unit {unit!r}") from None
+        known = (line.partition("=")[0].strip() for line in _DEFINITIONS.split("\n"))
+        near = _MEANT.get(unit.replace(" ", "").casefold()) or nearest(unit, (*_COMMON, *known))
+        raise QuantityError(f"unknown unit {unit!r}" + f"; did you mean {near!r}?" * (near is not None)) from None
     dimensions = {str(name): power for name, power in base.dimensionality.items()}
     mass, length = dimensions.get("[mass]", 0), dimensions.get("[length]", 0)
     angle, time = dimensions.get("[angle]", 0), dimensions.get("[time]", 0)

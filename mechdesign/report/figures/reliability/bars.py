@@ -134,7 +134,7 @@ def allocation_figure(study: Study, table: Table) -> Figure:
     total = [float(np.nansum(table[name])) for name in ("cost_given", "cost_allocated")]
     note = f"cost {total[0]:.4g} as given, {total[1]:.4g} allocated ({100 * (total[1] / total[0] - 1):+.1f} %)"
     table = table.take(np.arange(len(table))[:MAX_TOLERANCES])
-    names = [f"{row['source']}" + f" ({row['kind']})" * (row["kind"] != "tolerance") for row in table.rows()]
+    names = [f"{row['source']}" + f" ({row['kind']})" * (row["kind"] != "tolerance") for row in table]
     units = table["unit"].tolist()
     margin = 0.35 + 0.075 * max(len(name) for name in names)
     figure, (one, two) = style.page(
