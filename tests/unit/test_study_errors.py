@@ -149,8 +149,8 @@ CURES = {
     "no ground": (
         "ground: {O",
         "base: {O",
-        "4:5: mechanism.links: there is no 'ground', the fixed link whose frame is the world; rename the link that does "
-        "not move (is it 'base'?)",
+        "4:5: mechanism.links: there is no 'ground', the fixed link whose frame is the world; rename the link that "
+        "does not move (is it 'base'?)",
     ),
     "no sketch": (
         "  sketch: {A: [0, 30], B: [75, 55]}\n",

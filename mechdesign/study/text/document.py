@@ -35,7 +35,7 @@ _WORDS = {
 _HINTS = {
     "cannot start any token": " (indent with spaces, not tabs; put special characters in quotes)",
     "alias": " (put a word that begins with '*' in quotes, as in \"*.length\")",
-    "mapping values are not allowed": " (a ':' too many here, one without a space after it above, or wrong indentation)",
+    "mapping values are not allowed": " (a ':' too many here, one without a space above, or wrong indentation)",
 }
 
 
