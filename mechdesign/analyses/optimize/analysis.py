@@ -30,13 +30,12 @@ from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, Study
 from mechdesign.journal import Journal
 from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
-from mechdesign.parallel import workers
+from mechdesign.parallel import one_thread, workers
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
 from mechdesign.study.variants import changed_data, rewritten, variant
-from mechdesign.threads import one_thread
 
 # Numbers that a search keeps of the rows behind its goals.
 MAX_KEPT_ROWS = 10_000_000

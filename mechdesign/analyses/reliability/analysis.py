@@ -26,13 +26,12 @@ from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MAX_SAMPLES, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Reason
-from mechdesign.parallel import keep_freed_memory
+from mechdesign.parallel import keep_freed_memory, one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS
-from mechdesign.threads import one_thread
 
 # Poses whose sensitivities are computed together.
 _POSES_TOGETHER = 2048

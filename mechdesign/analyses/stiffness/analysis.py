@@ -29,13 +29,12 @@ from mechdesign.analyses.stiffness.tables import (
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.parallel import map_chunks
+from mechdesign.parallel import map_chunks, one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.threads import one_thread
 
 # Poses solved together.
 CHUNK = 8192
