@@ -102,7 +102,7 @@ def test_no_estimate_without_limits_and_no_histogram_without_samples() -> None:
     assert "estimate" not in ask("reliability.limits={}").tables
     assert "histogram" in ask("reliability.limits={}").tables
     analytic = ask("reliability.methods=[analytic]", "reliability.poses=[{theta: 60}]").tables
-    assert analytic.keys() == {"moments", "reliability", "contributions"}
+    assert analytic.keys() == {"moments", "reliability", "capability", "contributions"}
 
 
 def test_columns_of_reliability_are_those_of_the_format() -> None:

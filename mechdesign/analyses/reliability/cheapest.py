@@ -122,7 +122,8 @@ class ToleranceModel:
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
         from mechdesign.analyses.reliability.probability import failure_probability
 
-        linear, question = self.linear(scales).take([self.task.settings[k].pose for k in which]), self.task.question
+        poses = [self.task.settings[k].pose for k in which]
+        linear, question = self.linear(scales).take(poses), self.task.question.at(self.task.nominal[:, poses])
         return failure_probability(linear.covariance(), question.bands, question.discs, linear.shift().T)
 
     def cost(self, x: Floats) -> tuple[float, Floats]:

@@ -173,16 +173,25 @@ class Clearance(fields.Model):
 
 
 class ErrorLimit(fields.Model):
-    """What an error may be: within [min, max], or (of a point) within a radius."""
+    """What an error may be: within [min, max], or (of a point) within a radius; or what the value itself may be.
 
-    short = (fields.NUMBER_FORM,)
+    `lsl` and `usl` are the lower and upper specification limit of the value, the same at all poses.
+    """
+
+    short = (fields.NUMBER_FORM, fields.PAIR_FORM)
     min: fields.Number | None = None
     max: fields.Number | None = None
+    lsl: fields.Number | None = None
+    usl: fields.Number | None = None
     radius: fields.NonNegative | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _long_form(cls, raw: Any, info: ValidationInfo) -> Any:
+        if isinstance(raw, list):
+            if len(raw) != 2:
+                raise failure(f"expected a number, or the lowest and highest error such as [-1, 0.8], not {shown(raw)}")
+            return {"min": raw[0], "max": raw[1]}
         if not isinstance(raw, int | float | str) or isinstance(raw, bool):
             return raw
         size = read_number(raw, info.context or Context()).nominal
@@ -192,13 +201,28 @@ class ErrorLimit(fields.Model):
 
     @model_validator(mode="after")
     def _some(self) -> ErrorLimit:
-        if self.radius is None and self.min is None and self.max is None:
-            raise failure("a limit needs a number, 'min', 'max' or 'radius'")
-        if self.radius is not None and (self.min is not None or self.max is not None):
-            raise failure("'radius' excludes 'min' and 'max'")
-        if self.min is not None and self.max is not None and self.max < self.min:
-            raise failure(f"the maximum {self.max:g} is below the minimum {self.min:g}")
+        kinds = [given for keys in (("min", "max"), ("lsl", "usl"), ("radius",)) if (given := self.given(*keys))]
+        if not kinds:
+            raise failure("a limit needs a number, 'min', 'max', 'lsl', 'usl' or 'radius'")
+        if len(kinds) > 1:
+            raise failure(
+                f"{kinds[0][0]!r} and {kinds[1][0]!r} exclude each other: 'min' and 'max' limit the error, 'lsl' and "
+                "'usl' the value itself, 'radius' the place of a point"
+            )
+        low, high = self.ends
+        if low is not None and high is not None and high < low:
+            raise failure(f"the maximum {high:g} is below the minimum {low:g}")
         return self
+
+    @property
+    def absolute(self) -> bool:
+        """Whether it is a limit of the value itself."""
+        return self.lsl is not None or self.usl is not None
+
+    @property
+    def ends(self) -> tuple[float | None, float | None]:
+        """Lowest and highest error, or value where it is absolute."""
+        return (self.lsl, self.usl) if self.absolute else (self.min, self.max)
 
 
 class Precision(fields.Model):
