@@ -83,7 +83,7 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
             half = math.sqrt(scalar.law.moments[1]) / scalar.factor
         allocated = half > 0 and dimension.kind != "measured" and (scalar.kind != "load" or scalar.name in given)
         cost = given.get(scalar.name, Cost()) if allocated else None
-        found.append(Tolerance(scalar.name, half, dimension.kind, scalar.unit, cost))
+        found.append(Tolerance(scalar.name, half, dimension.kind, scalar.unit or "", cost))
     for pin in sources.pins:
         cost = given.get(pin.name) if pin.radius > 0 else None
         found.append(Tolerance(pin.name, pin.radius, "clearance", pin.unit, cost))

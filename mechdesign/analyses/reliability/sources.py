@@ -28,15 +28,15 @@ class Scalar:
     """A dimension that varies: by `kind` a ``parameter`` (in its own unit), a ``place``, a ``drive`` or a ``load``.
 
     `moves` has the derivative of each place, drive or load that it changes (radians, lengths), and its quantity.
-    `factor` are radians, lengths or loads in one `unit` of the study, which of a parameter may be unknown.
+    `factor` are radians, lengths or loads in one `unit` of the study; that of a parameter may be unknown.
     """
 
     name: str
     kind: str
     law: Marginal
     moves: Mapping[str, tuple[float, str]]
-    factor: float = 1.0
-    unit: str = ""
+    factor: float
+    unit: str | None
 
     @property
     def directions(self) -> list[dict[str, float]]:
@@ -252,28 +252,18 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
         moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
         turned = kind != "parameter" and moves[name][1] == "angle"
         factor = study.units.angle_factor if turned else 1.0
+        unit = study.units.label(LOADS[name]) if kind == "load" else study.unit_of(name)
         if dimension.measured is not None:
             folder = study.path.parent if study.path is not None else Path()
             law: Marginal = Measured.of(factor * dimension.deviations(nominal / factor, folder), nominal)
         else:
             law = marginal(dimension, nominal, factor)
-        scalars.append(Scalar(name, kind, law, moves, factor, _unit(study, name, moves)))
+        scalars.append(Scalar(name, kind, law, moves, factor, unit))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
     pins = tuple(_pin(point, clearance, study.units.label("length")) for point, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))
     _check_sizes(sources)
     return sources, warnings
-
-
-def _unit(study: Study, name: str, moves: Mapping[str, tuple[float, str]]) -> str:
-    """Unit of a dimension; of a parameter where a number of the geometry is the parameter itself."""
-    value, factors = study.parameters.nominal.get(name), study.parameters.factors
-    units = [
-        study.units.label(quantity)
-        for place, (slope, quantity) in moves.items()
-        if value is None or (slope == factors[place] and study.mechanism.nominal[place] == value * slope)
-    ]
-    return units[0] if units else ""
 
 
 def _quantity(mechanism: Mechanism, name: str) -> str:

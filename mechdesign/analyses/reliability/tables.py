@@ -210,6 +210,10 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity, task.linear.share()))
     pose, channel, source = (index.ravel() for index in np.indices(share.shape))
     names = np.array([source.name for source in task.sources.all])
+    factors = np.array([source.factor for source in task.sources.all])
+    # What has no known unit stands by its name.
+    units = np.array([[task.study.units.ratio(unit, each.name if each.unit is None else each.unit)
+                       for each in task.sources.all] for unit in task.labels[2].tolist()])  # fmt: skip
     links = np.array([links_meant(task.study, c.coordinate) for c in task.question.channels])
     columns = [
         *at_poses(task, pose),
@@ -219,6 +223,9 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
                meaning="links whose point the output is, where its pin has a clearance: the pin moves in another link"),
         Column("sensitivity", sensitivity.ravel(),
                meaning="derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)"),
+        Column("derivative", (sensitivity * task.scale[:, None] * factors).ravel(),
+               meaning="the same for one unit of the source as the study counts it, in `unit`"),
+        Column("unit", units[channel, source], meaning="unit of `derivative`: the output's over the source's"),
         Column("share", share.ravel(), meaning="share of the output's variance, to the first order"),
         *_index_columns(indices, share.shape),
     ]  # fmt: skip
