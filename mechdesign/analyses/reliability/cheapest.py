@@ -86,7 +86,7 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
         found.append(Tolerance(scalar.name, half, dimension.kind, scalar.unit or "", cost))
     for pin in sources.pins:
         cost = given.get(pin.name) if pin.radius > 0 else None
-        found.append(Tolerance(pin.name, pin.radius, "clearance", pin.unit, cost))
+        found.append(Tolerance(pin.name, pin.radius, "clearance", study.units.label("length"), cost))
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,8 +68,6 @@ class Pin:
     analytic: str
     sampled: str
     places: tuple[str, ...]
-    unit: str
-    factor: ClassVar[float] = 1.0
 
     @property
     def moments(self) -> tuple[float, float, float, float]:
@@ -260,7 +258,7 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
             law = marginal(dimension, nominal, factor)
         scalars.append(Scalar(name, kind, law, moves, factor, unit))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
-    pins = tuple(_pin(point, clearance, study.units.label("length")) for point, clearance in section.clearances.items())
+    pins = tuple(_pin(point, clearance) for point, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))
     _check_sizes(sources)
     return sources, warnings
@@ -310,7 +308,7 @@ def _correlation(study: Study, scalars: Sequence[Scalar]) -> Correlation | None:
     return Correlation.of([scalar.law for scalar in scalars], pairs)
 
 
-def _pin(point: str, clearance: Clearance, unit: str) -> Pin:
+def _pin(point: str, clearance: Clearance) -> Pin:
     link = clearance.link
     if link is None:
         raise StudyError(f"reliability.clearances.{point}: name the 'link' whose pin moves")
@@ -318,7 +316,7 @@ def _pin(point: str, clearance: Clearance, unit: str) -> Pin:
     return Pin(
         point, clearance.radius, None if spread is None else marginal(spread, clearance.radius),
         clearance.pin.analytic, clearance.pin.monte_carlo,
-        (f"{link}.length",) if clearance.effect == "length" else offset_names(link, point), unit,
+        (f"{link}.length",) if clearance.effect == "length" else offset_names(link, point),
     )  # fmt: skip
 
 

@@ -210,10 +210,12 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity, task.linear.share()))
     pose, channel, source = (index.ravel() for index in np.indices(share.shape))
     names = np.array([source.name for source in task.sources.all])
-    factors = np.array([source.factor for source in task.sources.all])
+    pins, study = len(task.sources.pins), task.study
+    factors = np.array([scalar.factor for scalar in task.sources.scalars] + [1.0] * pins)
     # What has no known unit stands by its name.
-    units = np.array([[task.study.units.ratio(unit, each.name if each.unit is None else each.unit)
-                       for each in task.sources.all] for unit in task.labels[2].tolist()])  # fmt: skip
+    below = [scalar.name if scalar.unit is None else scalar.unit for scalar in task.sources.scalars]
+    below += [study.units.label("length")] * pins
+    units = np.array([[study.units.ratio(unit, each) for each in below] for unit in task.labels[2].tolist()])
     links = np.array([links_meant(task.study, c.coordinate) for c in task.question.channels])
     columns = [
         *at_poses(task, pose),
