@@ -138,22 +138,18 @@ def capability(task: Task, found: Sequence[MethodResult]) -> Table:
     Limits of errors are those of the value about its nominal one.
     """
     known, question = _with_moments(task, found), task.question.at(task.nominal)
-    single, bands = task.question.single, len(question.bands)
+    single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
     shape = (task.poses.count, len(known), len(single))
     pose, method, limit = (index.ravel() for index in np.indices(shape))
-    channel = np.array([b.output for b in question.bands] + [d.x for d in question.discs])
-    # nan of circles: their limits are about a point, which has no spread of its own.
-    mean, sigma, low, high, nominal = np.full((5, *shape), np.nan)
-    nominal[:, :, :bands] = (task.nominal[channel[:bands]] * task.scale[channel[:bands], None]).T[:, None]
-    for k, each in enumerate(known):
-        middle, covariance = each.moments(task)
-        variance = np.diagonal(covariance, axis1=1, axis2=2).T
-        for row, band in enumerate(question.bands):
-            scale = task.scale[band.output]
-            mean[:, k, row], low[:, k, row], high[:, k, row] = (
-                scale * end for end in (middle[band.output], band.low, band.high)
-            )
-            sigma[:, k, row] = scale * np.sqrt(np.maximum(variance[band.output], 0.0))
+    scale = task.scale[rows]
+    means, covariances = (np.stack(part) for part in zip(*(each.moments(task) for each in known), strict=True))
+    # nan of circles, whose limits are about a point.
+    nominal, mean, sigma, low, high = np.full((5, *shape), np.nan)
+    nominal[..., :bands] = (task.nominal[rows].T * scale)[:, None]
+    mean[..., :bands] = np.moveaxis(means[:, rows], 2, 0) * scale
+    sigma[..., :bands] = np.sqrt(np.maximum(covariances[:, :, rows, rows].swapaxes(0, 1), 0.0)) * scale
+    for k, band in enumerate(question.bands):
+        low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (band.low, band.high))
     with np.errstate(divide="ignore", invalid="ignore"):
         both = np.isfinite(low) & np.isfinite(high)
         cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
@@ -166,7 +162,7 @@ def capability(task: Task, found: Sequence[MethodResult]) -> Table:
                   for row in range(len(nominal))])
         for name in ("failure", "low", "high")
     )  # fmt: skip
-    output, order, unit = (label[channel] for label in task.labels)
+    output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
     output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
     interval = "end of its interval, 99.7 %, where samples are counted"
     columns = [
