@@ -51,7 +51,7 @@ def test_overrides_as_a_mapping() -> None:
 def test_mistakes_of_a_mapping_name_their_keys() -> None:
     with pytest.raises(mechdesign.StudyError, match=re.escape("mechanism.links.crank.2: ")):
         mechdesign.load(DATA, {"mechanism.links.crank": ["O", "A", "q"]})
-    with pytest.raises(mechdesign.StudyError, match="the study is not plain data .*: it holds 'object'"):
+    with pytest.raises(mechdesign.StudyError, match=r"the study is not plain data .*: it holds 'object'"):
         mechdesign.load({"mechanism": object()})
     for source in (DATA, None, "mechanism:\n  links: {}", ["study.yaml"]):
         with pytest.raises(mechdesign.StudyError, match="give a study as one of"):
