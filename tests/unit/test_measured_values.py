@@ -30,7 +30,7 @@ def write(folder: Path, text: str, name: str = "levers.csv") -> None:
     (folder / name).write_text(text)
 
 
-def column(values: Sequence[float] | np.ndarray, name: str = "length") -> str:
+def column(values: Sequence[object] | np.ndarray, name: str = "length") -> str:
     return f"part;{name};note\n" + "".join(f"L{k};{value};good\n" for k, value in enumerate(values))
 
 
@@ -77,7 +77,10 @@ def test_measured_values_are_correlated_with_others(tmp_path: Path) -> None:
         (None, "column: length", "cannot be read: No such file"),
         (column(VALUES), "column: width", "has no column 'width'; its first line names part, length, note"),
         (column(VALUES), "", "has 3 columns: say by 'column' which one"),
-        (column(VALUES), "column: note", "'L0;[0-9.]*;good' has no finite number of column 'note'"),
+        (column(VALUES), "column: note", "levers.csv:2: 'L0;[0-9.]*;good' has no finite number of column 'note'"),
+        ("nan\n" + "100\n" * 12, "", "levers.csv:1: 'nan' has no finite number"),
+        ("length\n100,1\n", "", "levers.csv:2: '100,1' has no finite number"),
+        (column(["100,1"] * 12), "column: length", "'length'; a decimal is written with a point"),
         (column(VALUES[:9]), "column: length", "9 measured values are too few: give 10 or more"),
         (column([100.1] * 12), "column: length", "all 12 measured values are 100.1: nothing varies"),
         (column(VALUES - 100), "column: length", "where they are deviations, say 'nominal: 0'"),

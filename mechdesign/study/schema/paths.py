@@ -249,12 +249,14 @@ def read_column(file: pathlib.Path, name: str | None) -> Floats:
         Where the file cannot be read, there is no such column, or it holds anything but finite numbers.
     """
     lines = _lines(file)
-    separator = next((mark for mark in (";", "\t") if any(mark in line for _, line in lines[:1])), ",")
-    cells = [(number, [cell.strip() for cell in row]) for (number, _), row in
-             zip(lines, csv.reader([line for _, line in lines], delimiter=separator), strict=True)]  # fmt: skip
-    if not cells:
+    if not lines:
         raise StudyError(f"{file} holds no numbers")
-    first, place = cells[0][1], 0
+    separator = next((mark for mark in (";", "\t") if mark in lines[0][1]), ",")
+    try:
+        rows = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator))] for _, line in lines]
+    except csv.Error as error:
+        raise StudyError(f"{file} is no CSV file: {error}") from None
+    first, place = rows[0], 0
     if name is not None and name not in first:
         raise StudyError(f"{file} has no column {name!r}; its first line names {', '.join(first)}")
     if name is not None:
@@ -262,19 +264,22 @@ def read_column(file: pathlib.Path, name: str | None) -> Floats:
     elif len(first) > 1:
         raise StudyError(f"{file} has {len(first)} columns: say by 'column' which one, by its name in the first line")
     found = []
-    for number, row in cells[1 if name is not None or not _is_number(first[0]) else 0 :]:
-        if len(row) != len(first) or not _is_number(row[place]):
+    for (number, line), row in zip(lines, rows, strict=True):
+        value = _number(row[place]) if place < len(row) <= len(first) else None
+        if value is not None and math.isfinite(value):
+            found.append(value)
+        elif row is not first or (name is None and value is not None):
             what = f" of column {name!r}" if name is not None else ""
-            raise StudyError(f"{file}:{number}: {separator.join(row)!r} has no finite number{what}")
-        found.append(float(row[place]))
+            hint = "; a decimal is written with a point" if "," in line and separator != "," else ""
+            raise StudyError(f"{file}:{number}: {line!r} has no finite number{what}{hint}")
     return np.array(found)
 
 
-def _is_number(text: str) -> bool:
+def _number(text: str) -> float | None:
     try:
-        return math.isfinite(float(text))
+        return float(text)
     except ValueError:
-        return False
+        return None
 
 
 def _lines(file: pathlib.Path) -> list[tuple[int, str]]:
