@@ -61,6 +61,13 @@ def test_limits_of_an_angle_are_at_the_nearest_turn() -> None:
     exact = ndtr(-1.0) + ndtr(-2.0)
     assert table["reliability"]["failure"] == pytest.approx([exact, exact], rel=1e-9)
     assert table["capability"]["usl"] - table["capability"]["nominal"] == pytest.approx([0.2, 0.2])
+    # A single limit has no middle to be near to: the value is that of the tables.
+    single = (
+        drive[0],
+        "reliability.limits={lever.angle: {usl: 170}}",
+        "reliability.poses=[{theta: -20}, {theta: 179}]",
+    )
+    assert mechdesign.reliability(study_of(LEVER, *single)).tables["reliability"]["failure"].tolist() == [0.0, 1.0]
 
 
 def test_a_nominal_value_outside_its_limits_is_told_with_its_pose() -> None:

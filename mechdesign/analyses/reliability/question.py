@@ -82,15 +82,15 @@ class ReliabilityQuestion:
     def at(self, nominal: Sequence[Any] | Floats) -> ReliabilityQuestion:
         """The question at poses where the channels have these values: all limits are those of errors.
 
-        Limits of an angle are counted from the nominal value's turn.
+        Two limits of an angle are those at the turn nearest to its value.
         """
         bands = tuple(self._about(band, nominal[band.output]) if band.absolute else band for band in self.bands)
         return replace(self, bands=bands)
 
     def _about(self, band: Band, value: Any) -> Band:
-        channel, known = self.channels[band.output], [end for end in (band.low, band.high) if np.isfinite(end)]
-        if channel.order == 0 and channel.coordinate.quantity == "angle":
-            value = value - TURN * np.round((value - np.mean(known)) / TURN)
+        channel, middle = self.channels[band.output], 0.5 * (band.low + band.high)
+        if channel.order == 0 and channel.coordinate.quantity == "angle" and np.isfinite(middle):
+            value = value - TURN * np.round((value - middle) / TURN)
         return Band(band.output, band.low - value, band.high - value)
 
     @cached_property

@@ -78,7 +78,8 @@ class Dimension(fields.Model):
     ``beta`` has two shape parameters between its ends.
 
     `measured` is a file of measured values of the dimension, in the study's units: one a line, or a `column`. What they
-    deviate from is the dimension's own nominal value (of a drive or a load 0), or `nominal`.
+    deviate from is the dimension's own nominal value (of a drive or a load 0), or `nominal`. What is sampled is drawn
+    from their interpolated distribution, beyond whose ends nothing lies.
     """
 
     bare, short = "tolerance", (fields.NUMBER_FORM, fields.PAIR_FORM)
@@ -175,7 +176,8 @@ class Clearance(fields.Model):
 class ErrorLimit(fields.Model):
     """What an error may be: within [min, max], or (of a point) within a radius; or what the value itself may be.
 
-    `lsl` and `usl` are the lower and upper specification limit of the value, the same at all poses.
+    `lsl` and `usl` are the lower and upper specification limit of the value, the same at all poses; an angle between
+    two of them is counted at the turn nearest to them.
     """
 
     short = (fields.NUMBER_FORM, fields.PAIR_FORM)
