@@ -101,19 +101,17 @@ class Study:
     def unit_of(self, name: str) -> str | None:
         """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
 
-        That of a parameter is known where a number of the geometry is the parameter itself.
+        That of a parameter is known where numbers of the geometry, all of one quantity, change as much as it does.
         """
         parameters, places = self.parameters, self.mechanism.description.places
-        if name in places:
-            return self.units.label(places[name].quantity)
-        if name in self.mechanism.drives:
-            return self.units.label(self.mechanism.quantity(name))
-        slopes = parameters.derivatives(name) if name in parameters.nominal else {}
-        for place, slope in slopes.items():
-            own = parameters.dependent[place].evaluate(parameters.nominal) == parameters.nominal[name]
-            if own and slope == parameters.factors[place]:
-                return self.units.label(places[place].quantity)
-        return None
+        if name not in parameters.nominal:
+            quantity = places[name].quantity if name in places else self.mechanism.quantity(name)
+            return self.units.label(quantity)
+        slopes = parameters.derivatives(name).items()
+        found = {places[place].quantity for place, slope in slopes if abs(slope) == parameters.factors[place]} - {
+            "none"
+        }
+        return self.units.label(*found) if len(found) == 1 else None
 
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text."""

@@ -143,11 +143,12 @@ class Designs:
         return np.asarray(1 - share if self.goals[k].smallest else share)
 
     def unit_of(self, name: str) -> str:
-        """Unit of a goal or of a variable, where it is known."""
+        """Unit of a goal, or of a variable that is a place of the geometry; none for a parameter."""
         for each in self.goals:
             if each.name == name:
                 return self._unit_and_meaning(each)[0]
-        return self.study.unit_of(name) or ""
+        place = self.study.mechanism.description.places.get(name)
+        return self.study.units.label(place.quantity) if place is not None else ""
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
         """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
