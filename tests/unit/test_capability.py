@@ -173,3 +173,30 @@ def test_tolerances_are_allocated_to_limits_of_the_value() -> None:
 def test_limits_that_make_no_sense_are_refused(limit: str, message: str) -> None:
     with pytest.raises(StudyError, match=message):
         study_of(LEVER, f"reliability.limits={{P.x: {limit}}}")
+
+
+def test_limits_of_the_value_over_a_workspace() -> None:
+    """The index at each node is what the first order says there; P.x alone is limited, far from most of the nodes."""
+    study = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, A, 100], fore: [A, P, 80]}
+  drives: {t1: {angle: upper}, t2: {angle: fore, from: upper}}
+  limits: [{drive: t1, min: 0, max: 90}, {drive: t2, min: 20, max: 160}]
+  sketch: {A: [87, 50], P: [130, 120]}
+workspace: {point: P, indices: [reliability], integrate: {rule: midpoint, nodes: 9}}
+reliability:
+  poses: workspace
+  dimensions: {upper.length: 3, fore.length: 3}
+  limits: {P.x: {usl: 60}}
+  methods: [analytic]
+""")
+    local, table = mechdesign.workspace(study).tables["local"], mechdesign.reliability(study).tables["reliability"]
+    chance = dict(zip(zip(local["x"].round(6), local["y"].round(6), strict=True), local["reliability"], strict=True))
+    nodes = zip(zip(table["P.x"].round(6), table["P.y"].round(6), strict=True), table["reliability"], strict=True)
+    shared = [(chance[node], expected) for node, expected in nodes if node in chance]
+    found, expected = np.array(shared).T
+    assert len(found) > 100
+    # Nodes are found to about 1e-8 of the arm.
+    assert found == pytest.approx(expected, abs=1e-6)
+    assert (expected > 0.99).any()
+    assert (expected < 0.01).any()
