@@ -225,7 +225,7 @@ def load_document(
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
-    parameters = builder.parameters(context.parameters, formulas)
+    parameters = builder.parameters(formulas)
     parts = _checked(Checker(builder, parameters, parts), folder)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
@@ -363,7 +363,11 @@ def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Contex
         # What was wrong may have been what uses them.
         return
     optimize, reliability = parts.get("optimize"), parts.get("reliability")
-    used = context.used.union(optimize.variables if optimize else (), reliability.dimensions if reliability else ())
+    used = context.used.union(
+        *(formula.names for formula in parameters.dependent.values()),
+        optimize.variables if optimize else (),
+        reliability.dimensions if reliability else (),
+    )
     for name, formula in reversed([*parameters.formulas.items()]):
         # A parameter may use those above it.
         if name in used:

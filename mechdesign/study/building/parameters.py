@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechdesign.expressions import Expression, Number
+from mechdesign.mechanism.model import MEASURED
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ class Parameters:
 
     def match(self, pattern: str) -> tuple[str, ...]:
         """Places that a pattern such as ``*.length`` names."""
-        return tuple(place for place in self.factors if fnmatchcase(place, pattern))
+        return tuple(p for p in self.factors if fnmatchcase(p, pattern) and not p.startswith(MEASURED))
 
     def known(self) -> Iterable[str]:
         """Names of all parameters and places."""
