@@ -1,4 +1,7 @@
-"""Chunks of work on threads or processes, in order, with bounded memory."""
+"""Chunks of work on threads or processes, in order, with bounded memory; and linear algebra on one thread.
+
+The last digits of a long sum depend on how many threads share it.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,11 @@ import os
 import platform
 import signal
 import sys
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from itertools import islice
 from typing import Any, TypeVar
@@ -25,6 +29,12 @@ _LOOK_AHEAD = 3
 _TRIM_THRESHOLD = -1
 _MMAP_THRESHOLD = -3
 _MEBIBYTE = 2**20
+# Read by a library of linear algebra when it is loaded: SciPy's may be so in the middle of a computation.
+_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+_lock = threading.Lock()
+_inside = 0
+_outside = ExitStack()
 
 
 def worker_count(jobs: int | None) -> int:
@@ -125,3 +135,40 @@ def keep_freed_memory() -> None:
     mallopt = ctypes.CDLL(None).mallopt
     mallopt(_MMAP_THRESHOLD, 64 * _MEBIBYTE)
     mallopt(_TRIM_THRESHOLD, 256 * _MEBIBYTE)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Results of what is computed inside do not depend on how many threads linear algebra may use.
+
+    The limit is that of the process, and of those forked from it. What was set before comes back with the last of
+    those inside, so that they may be nested, and overlap where several threads compute.
+    """
+    global _inside
+    with _lock:
+        if not _inside:
+            _limit()
+        _inside += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _inside -= 1
+            if not _inside:
+                _outside.close()
+
+
+def _limit() -> None:
+    from threadpoolctl import threadpool_limits
+
+    _outside.callback(_restore, {name: os.environ.get(name) for name in _VARIABLES})
+    os.environ.update(dict.fromkeys(_VARIABLES, "1"))
+    _outside.enter_context(threadpool_limits(1, user_api="blas"))
+
+
+def _restore(values: dict[str, str | None]) -> None:
+    for name, value in values.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value

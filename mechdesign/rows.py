@@ -80,9 +80,9 @@ def _one_unit(table: Table, column: str, counts: Flags) -> None:
     telling = [name for name, found in pairs.items() if len({word for word, _ in found}) == len(found)]
     words = telling[0] if telling else named[0].name
     rows = [f"{word} ({unit or 'no unit'})" for word, unit in pairs[words]]
-    told = ", ".join(rows[:MOST_ROWS]) + ", ..." * (len(rows) > MOST_ROWS)
+    listed = ", ".join(rows[:MOST_ROWS]) + ", ..." * (len(rows) > MOST_ROWS)
     raise UnknownColumnError(
-        f"the rows of {table.name} whose {column} is judged have several units: {told}; say which of them count by "
+        f"the rows of {table.name} whose {column} is judged have several units: {listed}; say which of them count by "
         f"'where', e.g. where: {{{words}: {next(iter(pairs[words]))[0]}}}"
     )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -113,7 +112,12 @@ def _solve_group(
     plan = mechanism.plan(group.names)
     coordinates = plan.structure.given
     given = [np.asarray(radians(study, c, v), dtype=float) for c, v in zip(coordinates, group.columns(), strict=True)]
-    solve = partial(_solve, mechanism, plan, poses)
+
+    def solve(values: Sequence[Floats], rows: Ints) -> Configuration:
+        """Poses at or near some rows, not yet judged by the limits."""
+        start = starts(mechanism, poses, rows) if plan.iterative else None
+        return plan.solve(values, dimensions(poses, rows), start=start, limits=False)
+
     pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
 
     def at(piece: slice) -> Configuration:
@@ -135,12 +139,6 @@ def _solve_group(
         configuration = replace(configuration, near=followed, counted=configuration.counted | near.keys())
         plan.judge(configuration)
         yield SolvedPoses(group.rows[piece], group.names, configuration)
-
-
-def _solve(mechanism: Mechanism, plan: Plan, poses: Poses, given: Sequence[Floats], rows: Ints) -> Configuration:
-    """Poses at or near some rows, not yet judged by the limits."""
-    start = starts(mechanism, poses, rows) if plan.iterative else None
-    return plan.solve(given, dimensions(poses, rows), start=start, limits=False)
 
 
 def _followed(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) -> list[Coordinate]:

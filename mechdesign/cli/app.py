@@ -62,7 +62,7 @@ def _start(
     """Options before the command."""
 
 
-def _add(name: str, takes: Sequence[Parameter], short: str, told: str) -> None:
+def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
     """Add a command: its arguments and options, and its help; what it runs is imported when it is called."""
 
     def command(**said: Any) -> None:
@@ -77,7 +77,7 @@ def _add(name: str, takes: Sequence[Parameter], short: str, told: str) -> None:
             raise typer.Exit((batch.check if name == "check" else batch.run)(study, options))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
-    app.command(name, short_help=short, help=told)(command)
+    app.command(name, short_help=short, help=long)(command)
 
 
 for _name, _asked in COMMANDS.items():

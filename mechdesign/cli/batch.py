@@ -14,12 +14,12 @@ from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Interrupted, StudyError, explain
 from mechdesign.mechanism.describe import describe
+from mechdesign.parallel import one_thread
 from mechdesign.report.requirements import command_of, foresee
 from mechdesign.report.writer import write_file, write_sketch
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
-from mechdesign.threads import one_thread
 
 _OUTCOMES = {
     0: "done",
@@ -124,7 +124,7 @@ def _summary(answers: Sequence[Outcome]) -> Table:
     def met(given: Outcome) -> str:
         return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
 
-    told: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
+    found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
         "study": (str, lambda given: given.study),
         "command": (str, lambda given: given.command),
         "outcome": (str, lambda given: _OUTCOMES[given.exit_code] + " (kept)" * given.kept),
@@ -136,7 +136,7 @@ def _summary(answers: Sequence[Outcome]) -> Table:
     }
     columns = (
         Column(name, np.array([tell_of(given) for given in answers if given.command], dtype=kind))
-        for name, (kind, tell_of) in told.items()
+        for name, (kind, tell_of) in found.items()
     )
     return Table("summary", tuple(columns), meaning="what became of each question")
 

@@ -15,13 +15,13 @@ from mechdesign.cli import terminal
 from mechdesign.cli.options import BUILT_IN, Options
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.journal import NAME, Journal
+from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.report.tables import from_csv
 from mechdesign.results import Result, Table
 from mechdesign.study import Study, load, template_path
-from mechdesign.threads import one_thread
 
 STANDARD_INPUT = Path("-")
 

@@ -16,36 +16,31 @@ BUILT_IN = "two_link_arm"
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
-def _parameter(name: str, kind: Any, default: Any, told: Any) -> Parameter:
+def _parameter(name: str, kind: Any, default: Any, meaning: Any) -> Parameter:
     annotated: Any = Annotated
-    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotated[kind, told])
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotated[kind, meaning])
 
 
-def _text(name: str, kind: Any, flag: str, metavar: str, told: str, **more: Any) -> Parameter:
-    option = typer.Option(flag, metavar=metavar, help=told, show_default=False, **more)
+def _study(kind: Any, metavar: str, meaning: str) -> Parameter:
+    argument = typer.Argument(metavar=metavar, help=f"{meaning} {_LEFT_OUT}", show_default=False)
+    return _parameter("study", kind | None, None, argument)
+
+
+def _text(name: str, kind: Any, flag: str, metavar: str, meaning: str, **more: Any) -> Parameter:
+    option = typer.Option(flag, metavar=metavar, help=meaning, show_default=False, **more)
     return _parameter(name, kind | None, None, option)
 
 
-def _flag(name: str, flag: str, told: str, *short: str) -> Parameter:
-    return _parameter(name, bool, False, typer.Option(flag, *short, help=told))
+def _flag(name: str, flag: str, meaning: str, *short: str) -> Parameter:
+    return _parameter(name, bool, False, typer.Option(flag, *short, help=meaning))
 
 
-def _out(told: str) -> Parameter:
-    return _text("out", Path, "--out", "DIR", told)
+def _out(meaning: str) -> Parameter:
+    return _text("out", Path, "--out", "DIR", meaning)
 
 
-STUDY = _parameter(
-    "study",
-    Path | None,
-    None,
-    typer.Argument(metavar="STUDY", help=f"The study file; - is standard input. {_LEFT_OUT}", show_default=False),
-)
-STUDIES = _parameter(
-    "study",
-    list[Path] | None,
-    None,
-    typer.Argument(metavar="STUDY...", help=f"The study files; - is standard input. {_LEFT_OUT}", show_default=False),
-)
+STUDY = _study(Path, "STUDY", "The study file; - is standard input.")
+STUDIES = _study(list[Path], "STUDY...", "The study files; - is standard input.")
 OUT = _out("Folder for tables, pictures and manifest. Default: results/<study>/<command>.")
 OUT_ALL = _out("Folder that gets one folder a command (several studies: <study>/<command>). Default: results/<study>.")
 OUT_DRAWINGS = _out("Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.")

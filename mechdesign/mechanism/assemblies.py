@@ -96,7 +96,6 @@ def _variant(
 def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configuration]:
     """Assembled poses at the sketch's values for some modes of the closed forms; the sketch first, if it is one."""
     sketch = plan.core.sketch_configuration
-    vectors = plan.core.geometry.nominal
     given = [np.asarray(sketch.value(coordinate), dtype=float) for coordinate in plan.structure.given]
     random = np.random.default_rng(0)
     size = plan.core.size
@@ -106,8 +105,8 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
         guess += [
             random.uniform(-2 * size, 2 * size, SEARCH_STARTS) for _ in (*group.slides, *group.bases, *group.bases)
         ]
-    state = plan.run(given, vectors, guess, modes, SEARCH_STEPS)
-    every = plan.configuration(state, (SEARCH_STARTS,), {}, vectors, state.solved((SEARCH_STARTS,)), limits=False)
+    state = plan.run(given, plan.core.geometry.nominal, guess, modes, SEARCH_STEPS)
+    every = plan.configuration(state, (SEARCH_STARTS,), {}, state.solved((SEARCH_STARTS,)))
     good = every.valid
     for slide in plan.core.graph.telescopic:
         # A leg without length has no direction: whatever its angle, it is no assembly.

@@ -21,7 +21,7 @@ TOUCHING = 1e-10
 SAMPLES_PER_TURN = 720
 
 
-def closing_groups(groups: Sequence[Group]) -> list[int]:
+def _closing_groups(groups: Sequence[Group]) -> list[int]:
     """Index of the group of each closure of a configuration."""
     counts = {"two angles": 2, "angle and fixed slide": 1, "angle and turning slide": 1}
     return [index for index, group in enumerate(groups) for _ in range(counts.get(group.form, 0))]
@@ -87,7 +87,7 @@ class ChangePoints:
 
     def _closures(self, index: int, values: Floats) -> Floats:
         modes = self._parity(values, index)[: index + 1]
-        closing = closing_groups(self._groups[: index + 1])
+        closing = _closing_groups(self._groups[: index + 1])
         own = [c for c, group in zip(self._all_closures(values, modes), closing, strict=True) if group == index]
         return np.stack([np.broadcast_to(c, values.shape) for c in own])
 

@@ -32,23 +32,18 @@ CHECK_LENGTHS = "check the lengths"
 
 
 def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
-    """Why a sketch cannot be assembled at its own drive values, and what would mend it.
+    """Why a sketch cannot be assembled at its own drive values (radians or lengths), and what would mend it.
 
-    Parameters
-    ----------
-    plan, state : Plan, State
-        The plan of the drives and the state that it ended in.
-    given : sequence of (Coordinate, float)
-        The drives and their values (radians or lengths).
+    `state` is what the plan of the drives ended in.
     """
     unit, equations = core.description.angle_unit, core.equations
     values = ", ".join(f"{c.name} = {v / (unit if c.quantity == 'angle' else 1.0):.6g}" for c, v in given)
     start = f"the sketch cannot be assembled at its own drive values{f' ({values})' if given else ''}"
     x, gap = equations.solve(equations.from_sketch(core.sketch), given)
     if gap < CLOSED:
-        told = _closed_otherwise(core, plan, x, start)
-        if told is not None:
-            return told
+        reason = _closed_otherwise(core, plan, x, start)
+        if reason is not None:
+            return reason
     where, mend = open_group(state, equations.gaps(x))
     if not plan.iterative:
         drawn = Plan(core, plan.structure, plan.modes, follows=False)
@@ -183,14 +178,8 @@ def _newton(state: State, group: Group, gaps: Complexes) -> str:
 def closing_range(valid: Callable[[Floats], Value], coordinate: Coordinate, size: float, unit: float) -> str:
     """For which values of one drive, the others held, a mechanism closes; empty where for none.
 
-    Parameters
-    ----------
-    valid : callable
-        Whether it closes, for an array of the drive's values (radians or lengths).
-    size : float
-        A characteristic length: lengths are tried up to four of it, either way.
-    unit : float
-        Radians in one of the study's units of angle.
+    `valid` says so of an array of its values (radians or lengths); lengths are tried up to four times `size`, either
+    way. `unit` is the radians in one of the study's units of angle.
     """
     angle = coordinate.quantity == "angle"
     values = np.linspace(0.0, 2 * np.pi, SWEEP_POSES) if angle else np.linspace(-4 * size, 4 * size, SWEEP_POSES)

@@ -35,36 +35,20 @@ class Reason(IntEnum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Configuration:
-    """Positions of a mechanism; every array broadcasts to `shape`, the shape of the batch.
-
-    Parameters
-    ----------
-    nodes, rotations, slides : sequences of arrays
-        Position of each node and unit rotation exp(i theta) of each angle class (complex), displacement of each slide;
-        nan where the pose cannot be assembled.
-    closures : sequence of arrays
-        Positive inside the range in which each group closes, zero at its limits.
-    reason : int8 array of `shape`
-        See `Reason`.
-    places : mapping of str to arrays
-        Dimensions that differ from the nominal ones.
-    near : mapping of str to arrays
-        By name, values within half a turn of which angles are reported; angles not named are in (-pi, pi].
-    counted : frozenset of str
-        Those of them whose turns count: given, or followed along a motion.
-    """
+    """Positions of a mechanism, nan where a pose cannot be assembled; every array broadcasts to `shape`."""
 
     graph: Graph
     vectors: Vectors
-    shape: tuple[int, ...]
-    nodes: Sequence[Value]
-    rotations: Sequence[Value]
-    slides: Sequence[Value]
-    closures: Sequence[Value]
-    reason: NDArray[np.int8]
-    places: Mapping[str, Value]
+    shape: tuple[int, ...]  # of the batch
+    nodes: Sequence[Value]  # complex position of each node
+    rotations: Sequence[Value]  # unit rotation exp(i theta) of each angle class
+    slides: Sequence[Value]  # displacement of each slide
+    closures: Sequence[Value]  # positive inside the range in which each group closes, zero at its limits
+    reason: NDArray[np.int8]  # `Reason` of each pose, of this very shape
+    places: Mapping[str, Value]  # dimensions that differ from the nominal ones
+    # By name, values within half a turn of which angles are reported; angles not named are in (-pi, pi].
     near: Mapping[str, Value] = field(default_factory=dict)
-    counted: frozenset[str] = frozenset()
+    counted: frozenset[str] = frozenset()  # those of them whose turns count: given, or followed along a motion
 
     def __repr__(self) -> str:
         return (

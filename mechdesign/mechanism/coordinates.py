@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from mechdesign.errors import MechanismError
+from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import MEASURED, Description, Drive, Measure, Quantity
@@ -69,8 +68,7 @@ def resolve(name: str, description: Description, graph: Graph) -> Coordinate:
         slide = graph.slides.index(owner)
         if (part == "length") == (slide in graph.telescopic):
             return Coordinate(name, "slide", "length", slide=slide)
-    near = difflib.get_close_matches(name, all_names(description, graph), 1)
-    hint = f"; did you mean '{near[0]}'?" if near else ""
+    hint = suggestion(name, all_names(description, graph))
     raise MechanismError(f"'{name}' is not a coordinate of this mechanism{hint}", name)
 
 
@@ -99,7 +97,12 @@ def _measure(name: str, measure: Measure, description: Description, graph: Graph
             for part in sorted(measure.expression.names)
         )
         return Coordinate(name, "expression", "none", expression=measure.expression, parts=parts)
-    first, second = measure.items or ("", "")
-    if measure.kind == "angle":
+    return between(name, measure.kind, measure.items or ("", ""), graph)
+
+
+def between(name: str, kind: str, items: Sequence[str], graph: Graph) -> Coordinate:
+    """The ``angle`` from one link to another, or the distance of two points."""
+    first, second = items
+    if kind == "angle":
         return Coordinate(name, "angle", "angle", body=second, reference=first)
     return Coordinate(name, "distance", "length", node=graph.node(first), other=graph.node(second))

@@ -156,13 +156,8 @@ class Core:
         return tuple(bound.coordinate for bound in self.bounds if bound.counts(self.nominal))
 
     def _bound(self, limit: Limit, index: int) -> Bound:
-        if limit.kind == "distance":
-            a, b = (self.graph.node(point) for point in limit.items)
-            coordinate = Coordinate("-".join(limit.items), "distance", "length", node=a, other=b)
-        elif limit.kind == "angle":
-            coordinate = Coordinate(
-                "-".join(limit.items), "angle", "angle", body=limit.items[1], reference=limit.items[0]
-            )
+        if limit.kind in ("distance", "angle"):
+            coordinate = names.between("-".join(limit.items), limit.kind, limit.items, self.graph)
         else:
             coordinate = self.coordinate(limit.items[0])
         label = limit.label or f"limits.{index}"

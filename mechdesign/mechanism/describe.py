@@ -9,15 +9,17 @@ from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.diagnosis import joints_in_words
 from mechdesign.mechanism.four_bars import describe_loops
-from mechdesign.mechanism.graph import GROUND, Graph
+from mechdesign.mechanism.graph import GROUND, Graph, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Prismatic, Term
+from mechdesign.mechanism.model import Description, Fixed, Limit, Measure, Term
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import deciding_joints
 from mechdesign.mechanism.structure import Group, Structure
 
 # Stands for all bodies that are placed before a group.
 BASE = ""
+# Begins the name of a pin that slides in a slot.
+PIN_IN = "pin in "
 
 
 @dataclass(frozen=True)
@@ -141,26 +143,22 @@ def chain_of(
     def to(body: str) -> None:
         body = BASE if body in placed else body
         before = walk[-1] if walk else BASE
-        if isinstance(before, str) and before != body:
-            if not _clamped(description, before, body, graph.nodes[node]):
-                walk.append(("R", graph.nodes[node]))
-            walk.append(body)
-        elif not isinstance(before, str):
-            walk.append(body)
+        if body == before:
+            return
+        if isinstance(before, str) and not _clamped(description, before, body, graph.nodes[node]):
+            walk.append(("R", graph.nodes[node]))
+        walk.append(body)
 
     for k, sign in loop.edges:
         edge = structure.edges[k]
         if edge.slide is None or edge.slide not in group.slides:
-            # A given distance is no body of the mechanism; it spans like a link.
-            to(edge.locals[0][1] if edge.locals else "a given distance")
+            to(edge.locals[0][1])
         else:
             name = graph.slides[edge.slide]
-            tail, head = _slide_bodies(description, name)
-            ends = [tail, head] if sign > 0 else [head, tail]
-            to(ends[0] if ends[0] is not None else f"pin in {name}")
+            first, last = _slide_bodies(description, name)[::sign]
+            to(first)
             walk.append(("P", name))
-            node = edge.head if sign > 0 else edge.tail
-            to(ends[1] if ends[1] is not None else f"pin in {name}")
+            to(last)
         node = edge.head if sign > 0 else edge.tail
     if walk and walk[-1] != BASE:
         walk.append(("R", graph.nodes[loop.end]))
@@ -180,7 +178,7 @@ def chain_of(
             if outer[2] == joints[2][1]:
                 joints[1:] = joints[:0:-1]
     return GroupChain(
-        tuple(link for link in dict.fromkeys(links) if not link.startswith("pin in ")),
+        tuple(link for link in dict.fromkeys(links) if not link.startswith(PIN_IN)),
         letters,
         tuple(dict.fromkeys(name for letter, name in joints if letter == "R" and ":" not in name)),
         tuple(dict.fromkeys(name for letter, name in joints if letter == "P")),
@@ -194,21 +192,16 @@ def _pinned(
     driven = {name for drive in description.drives.values() for name in (drive.target, drive.reference)} | {GROUND}
     for slide in (one, other):
         for body in _slide_bodies(description, slide):
-            if body is None or body in driven or body in middle:
-                continue
-            for owner, point in graph.points:
+            for owner, point in graph.points if body not in driven and body not in middle else ():
                 if owner == body and any(point == shared and mate != body for mate, shared in graph.points):
                     return body, point, slide
     return None
 
 
-def _slide_bodies(description: Description, name: str) -> tuple[str, str | None]:
-    """Bodies at the tail and head of a slide; None for the pin in a slot, a body of no size."""
+def _slide_bodies(description: Description, name: str) -> tuple[str, ...]:
+    """Bodies at the tail and head of a slide; the pin in a slot is a body of no size."""
     joint = description.joints.get(name)
-    if joint is None:
-        return name, f"{name}:rod"
-    assert not isinstance(joint, Fixed)
-    return joint.line.link, joint.slider if isinstance(joint, Prismatic) else None
+    return (name, rod_of(name)) if joint is None else (*joint.links, f"{PIN_IN}{name}")[:2]
 
 
 def _clamped(description: Description, a: str, b: str, point: str) -> bool:

@@ -46,8 +46,8 @@ def joints_in_words(description: Description, graph: Graph) -> list[str]:
     ]
     found += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
     for name, joint in description.joints.items():
-        links = joint.links if isinstance(joint, Fixed) else (joint.line.link, getattr(joint, "slider", joint.point))
-        found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(links)})")
+        parts = (*joint.links, joint.point)[:2]
+        found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(parts)})")
     return found
 
 
@@ -106,11 +106,8 @@ def _too_free(equations: Equations, jacobian: Floats, drives: Sequence[str], mis
     free = [_motion(graph, motion) for motion in _motions(equations, jacobian)]
     add = f"add {missing} drive{'s' if missing > 1 else ''}"
     examples = list(dict.fromkeys(drive for _, _, drive in free if drive))
-    hint = (
-        f", for example {', '.join(examples[:MAX_MOTIONS])}{' ...' if len(examples) > MAX_MOTIONS else ''}"
-        if examples
-        else ""
-    )
+    more = " ..." if len(examples) > MAX_MOTIONS else ""
+    hint = f", for example {', '.join(examples[:MAX_MOTIONS])}{more}" if examples else ""
     if not drives:
         return f"{add}{hint}"
     idle = f"as nothing drives or holds {'it' if len(free) == 1 else 'them'}"
@@ -195,9 +192,9 @@ def undetermined(
             return over_constrained(description, equations, x, len(given), real, len(given))
     what = "the drives" if driven else ", ".join(coordinate.name for coordinate in given)
     verb = "does" if len(given) == 1 and not driven else "do"
-    told = _twice_and_free(equations, given, driven) or reason
+    why = _twice_and_free(equations, given, driven) or reason
     where = DRIVES if driven else "poses"
-    return MechanismError(f"{what} {verb} not determine the mechanism: {told}", where)
+    return MechanismError(f"{what} {verb} not determine the mechanism: {why}", where)
 
 
 def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: bool) -> str:
@@ -229,9 +226,9 @@ def _links(names: Sequence[str]) -> str:
 def _parts(graph: Graph, names: Sequence[str]) -> str:
     """Links and joints, each called what it is."""
     links, joints = ([name for name in names if (name in graph.bodies) == body] for body in (True, False))
-    told = [_links(links)] if links else []
-    told += [f"joint{'s' if len(joints) > 1 else ''} {listed(joints)}"] if joints else []
-    return " and ".join(told) or "the same part"
+    named = [_links(links)] if links else []
+    named += [f"joint{'s' if len(joints) > 1 else ''} {listed(joints)}"] if joints else []
+    return " and ".join(named) or "the same part"
 
 
 def _rigid(equations: Equations, count: int, drives: int) -> str:
@@ -264,10 +261,9 @@ def _motions(equations: Equations, jacobian: Floats) -> list[Floats]:
 
 def motions_in_words(equations: Equations, jacobian: Floats) -> str:
     """What can still move under the rows of a Jacobian; empty where nothing can."""
-    told = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
-    return "; ".join(told[:MAX_MOTIONS]) + (
-        f"; and {len(told) - MAX_MOTIONS} more motions" if len(told) > MAX_MOTIONS else ""
-    )
+    found = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
+    more = [f"and {len(found) - MAX_MOTIONS} more motions"] if len(found) > MAX_MOTIONS else []
+    return "; ".join([*found[:MAX_MOTIONS], *more])
 
 
 def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:
@@ -320,14 +316,9 @@ def owners_of(graph: Graph, edges: Iterable[int]) -> list[str]:
 
 
 def repeating(description: Description, equations: Equations, x: Floats, excess: int) -> list[str]:
-    """Links, else joints, that can be left out without changing the motion, as many as there is excess; or none.
+    """Links, else joints, that can be left out without changing the motion; or none.
 
-    Parameters
-    ----------
-    x : array
-        A configuration in the midst of the motion.
-    excess : int
-        Degrees of freedom beyond the count.
+    `x` is a configuration in the midst of the motion, `excess` its degrees of freedom beyond the count.
     """
     graph = equations.graph
     jacobian = equations.jacobian(x)
@@ -345,7 +336,7 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
             if name in driven or bodies != [name] or description.links[name].telescopic:
                 continue
             frames = {graph.bodies[name][0]}
-            if any(name in _line_links(description, joint) for joint in description.joints):
+            if any(name in joint.links for joint in description.joints.values()):
                 continue
         elif name in driven or not _can_go(description, name):
             continue
@@ -361,24 +352,13 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
     return []
 
 
-def _line_links(description: Description, joint: str) -> tuple[str, ...]:
-    found = description.joints[joint]
-    if isinstance(found, Fixed):
-        return found.links
-    return (found.line.link, *([found.slider] if isinstance(found, Prismatic) else ()))
-
-
 def _can_go(description: Description, joint: str) -> bool:
     """Whether a slide can be left out and its links still turn together as before."""
     found = description.joints[joint]
-    if isinstance(found, Fixed) or not isinstance(found, Prismatic):
+    if not isinstance(found, Prismatic):
         return True
+    pairs = [{*other.links} for name, other in description.joints.items() if name != joint]
     reached = {found.line.link}
-    pairs = [
-        {*_line_links(description, name)}
-        for name, other in description.joints.items()
-        if name != joint and isinstance(other, Fixed | Prismatic)
-    ]
     for _ in pairs:
         reached.update(*(pair for pair in pairs if pair & reached))
     return found.slider in reached

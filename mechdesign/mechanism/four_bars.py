@@ -43,24 +43,13 @@ class Joint:
 
 @dataclass(frozen=True)
 class FourBar:
-    """A closed chain of four bodies.
+    """A closed chain of four bodies."""
 
-    Parameters
-    ----------
-    links : tuple of str
-        Frame, input, coupler and output.
-    joints : tuple of Joint
-        Between frame and input, input and coupler, coupler and output, output and frame.
-    lengths : tuple of float
-        Of the links in that order, between their two revolute joints; nan for a link with the slide.
-    offset : float
-        Of a slider-crank: distance of the slide's line from the pin of the body that carries the line, measured at the
-        pin of the body that slides; nan for a four-bar.
-    """
-
-    links: tuple[str, ...]
-    joints: tuple[Joint, ...]
-    lengths: tuple[float, ...]
+    links: tuple[str, ...]  # frame, input, coupler and output
+    joints: tuple[Joint, ...]  # between frame and input, input and coupler, coupler and output, output and frame
+    lengths: tuple[float, ...]  # of the links, between their two revolute joints; nan for a link with the slide
+    # Of a slider-crank: distance of the slide's line from the pin of the body that carries the line, measured at the
+    # pin of the body that slides; nan for a four-bar.
     offset: float
 
     @cached_property

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.model import Description, Fixed, Line, Prismatic, Slot, Term
+from mechdesign.mechanism.model import Description, Fixed, Joint, Line, Prismatic, Term
 
 GROUND = "ground"
 
@@ -51,29 +51,16 @@ class Edge:
 
 @dataclass(frozen=True)
 class Graph:
-    """Nodes, edges, angle classes and slides of a mechanism.
+    """Nodes, edges, angle classes and slides of a mechanism."""
 
-    Node 0 is the origin of the ground, at 0; class 0 is the ground's.
-
-    Parameters
-    ----------
-    bodies : mapping of str to (int, tuple of Turn)
-        Angle class of each body, and its constant offset within the class.
-    points : mapping of (str, str) to (Term, Term)
-        By body and point, the point's coordinates in the body's frame.
-    slides, telescopic : tuple of str, frozenset of int
-        Names of the joints and telescopic legs whose displacement is a coordinate; which of them are legs.
-    ties : tuple of (str, str, tuple of Turn)
-        Pairs of bodies that turn together, and the turns from the first's x axis to the second's.
-    """
-
-    nodes: tuple[str, ...]
+    nodes: tuple[str, ...]  # the first is the origin of the ground, at 0
     edges: tuple[Edge, ...]
-    classes: int
-    bodies: Mapping[str, tuple[int, tuple[Turn, ...]]]
-    points: Mapping[tuple[str, str], tuple[Term, Term]]
-    slides: tuple[str, ...]
-    telescopic: frozenset[int]
+    classes: int  # how many; class 0 is the ground's
+    bodies: Mapping[str, tuple[int, tuple[Turn, ...]]]  # angle class of each, and its constant offset within the class
+    points: Mapping[tuple[str, str], tuple[Term, Term]]  # by body and point, its coordinates in the body's frame
+    slides: tuple[str, ...]  # joints and telescopic legs whose displacement is a coordinate
+    telescopic: frozenset[int]  # which of them are legs
+    # Pairs of bodies that turn together, and the turns from the first's x axis to the second's.
     ties: tuple[tuple[str, str, tuple[Turn, ...]], ...]
 
     def node(self, name: str) -> int:
@@ -198,11 +185,9 @@ def build_graph(description: Description) -> Graph:
     )
 
 
-def _named_points(joint: Prismatic | Slot | Fixed) -> list[tuple[str, str]]:
+def _named_points(joint: Joint) -> list[tuple[str, str]]:
     if isinstance(joint, Fixed):
         return [(link, joint.point) for link in joint.links]
     line = joint.line
-    named = [(line.link, point) for point in (line.through, line.toward) if point is not None]
-    if isinstance(joint, Prismatic):
-        named.append((joint.slider, joint.point))
-    return named
+    ends = [(line.link, point) for point in (line.through, line.toward) if point is not None]
+    return ends + [(link, joint.point) for link in joint.links[1:]]

@@ -217,7 +217,7 @@ def turning_point(
     distance, index, (value, state) = min(found, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
     if state is None or distance > reach:
         return None
-    return value, plan.configuration(state, (), near.places, near.vectors, None, limits=False), index
+    return value, plan.configuration(state, (), near.places, None), index
 
 
 @quiet

@@ -20,7 +20,7 @@ from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import check_independent
-from mechdesign.mechanism.sketch import SKETCH, assembly_modes, drawn_value, unknowns_as_drawn
+from mechdesign.mechanism.sketch import SKETCH
 from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Flags, Floats
 
@@ -106,8 +106,7 @@ class Mechanism(Core):
                 raise diagnosis.undetermined(
                     self.description, self.equations, self.sketch, coordinates, str(error)
                 ) from None
-            modes = assembly_modes(self.graph, self.geometry, structure, self.sketch)
-            self._plans[key] = Plan(self, structure, modes)
+            self._plans[key] = Plan(self, structure, self.sketch.modes(structure))
         return self._plans[key]
 
     def adopt(self, given: tuple[str, ...], plan: Plan) -> None:
@@ -128,18 +127,18 @@ class Mechanism(Core):
         plan = self.forward
         given: list[float] = []
         for coordinate in plan.structure.given:
-            value = drawn_value(self.graph, self.geometry, self.sketch, coordinate)
+            value = self.sketch.value(coordinate)
             if value is None and (coordinate.kind == "slide" and coordinate.slide in self.graph.telescopic):
                 raise MechanismError(
                     f"the ends of leg '{self.graph.slides[coordinate.slide]}' are needed; add them to the sketch",
                     SKETCH,
                 )
             given.append(0.0 if value is None else value)
-        guess = unknowns_as_drawn(self.graph, self.geometry, plan.structure, self.sketch) if plan.iterative else None
+        guess = self.sketch.unknowns(plan.structure) if plan.iterative else None
         values = [np.asarray(g) for g in given]
         state = plan.run(values, self.geometry.nominal, guess)
         reached = state.solved(()) if plan.iterative else None
-        configuration = plan.configuration(state, (), {}, self.geometry.nominal, reached, limits=False)
+        configuration = plan.configuration(state, (), {}, reached)
         if not configuration.valid:
             pose = list(zip(plan.structure.given, given, strict=True))
             raise closing.cannot_assemble(self, plan, state, pose)

@@ -63,6 +63,11 @@ class Prismatic:
     point: str
     angle: Term = 0.0
 
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The link with the line, and that which slides."""
+        return self.line.link, self.slider
+
 
 @dataclass(frozen=True)
 class Slot:
@@ -71,6 +76,11 @@ class Slot:
     name: str
     line: Line
     point: str
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The link with the line."""
+        return (self.line.link,)
 
 
 @dataclass(frozen=True)

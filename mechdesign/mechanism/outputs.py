@@ -60,13 +60,10 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
 
 @quiet
 def second(configuration: Configuration, coordinate: Coordinate, one: Rates, other: Rates, both: Rates) -> Value:
-    """Second derivative of a coordinate, along `one` and `other`.
+    """Second derivative of a coordinate, along `one` and `other`; `both` has those of positions.
 
-    Parameters
-    ----------
-    both : Rates
-        Second derivatives of positions: the accelerations where `one` and `other` are both the velocities; where
-        `other` is by dimensions, what the velocities change by these.
+    They are the accelerations where `one` and `other` are both the velocities; where `other` is by dimensions, what the
+    velocities change by these.
     """
     if coordinate.kind == "distance":
         span, a, b, ab = (_span(n, coordinate) for n in (configuration.nodes, one.nodes, other.nodes, both.nodes))

@@ -136,25 +136,14 @@ class Plan:
             raise ValueError(f"{len(self.structure.given)} given coordinates needed, {len(values)} passed")
         dims: dict[str, Value] = {name: np.asarray(v, dtype=float) for name, v in (places or {}).items()}
         shape = np.broadcast_shapes(*(v.shape for v in values), *(v.shape for v in dims.values()))
-        if np.prod(shape, dtype=np.int64) > CHUNK:
-            return self._in_chunks(values, dims, shape, start, limits, jobs)
-        return self._at_once(values, dims, shape, start, limits)
-
-    def _in_chunks(
-        self,
-        values: Sequence[Value],
-        dims: Mapping[str, Value],
-        shape: tuple[int, ...],
-        start: Configuration | None,
-        limits: bool,
-        jobs: int | None,
-    ) -> Configuration:
-        """`solve` by chunks that stay in the processor's cache, on one or more threads."""
+        count = int(np.prod(shape, dtype=np.int64))
+        if count <= CHUNK:
+            return self._at_once(values, dims, shape, start, limits)
+        # By chunks that stay in the processor's cache, on one or more threads.
         keep_freed_memory()
         if self.change_points is not None:
             self.change_points.cover(values[0])
-        given, places = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
-        count = int(np.prod(shape, dtype=np.int64))
+        flat, places = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
         length = CHUNK if self.iterative or worker_count(jobs) == 1 else THREAD_CHUNK
         starts: Ints | None = None
         if start is not None and start.shape:
@@ -168,7 +157,7 @@ class Plan:
             if start is not None and starts is not None:
                 begun = start.take(np.unravel_index(starts[begin : begin + length], start.shape))
             dimensions = {name: some(v) for name, v in places.items()}
-            return self._at_once([some(v) for v in given], dimensions, (min(length, count - begin),), begun, limits)
+            return self._at_once([some(v) for v in flat], dimensions, (min(length, count - begin),), begun, limits)
 
         parts = map_chunks(part, range(0, count, length), jobs)
         whole = joined(parts, shape, self.core.geometry.vectors(dims), dims)
@@ -183,17 +172,19 @@ class Plan:
         limits: bool,
     ) -> Configuration:
         """`solve` without chunks, for arrays of floats that broadcast to `shape`."""
-        vectors = self.core.geometry.vectors(dims)
         reached: Flags | None = None
         guess: Unknowns | None = None
         if self.iterative:
             begin = self.start(start)
             guess, reached = self._follow(values, dims, shape, begin)
-        state = self.run(values, vectors, guess, self.modes_at(values))
+        state = self.run(values, self.core.geometry.vectors(dims), guess, self.modes_at(values))
         if reached is not None:
             # What the path came near to must be a pose, and of the same assembly.
             reached &= state.solved(shape, begin.signs)
-        return self.configuration(state, shape, dims, vectors, reached, limits, values)
+        found = self.configuration(state, shape, dims, reached, values)
+        if limits:
+            self.judge(found)
+        return found
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """Values within half a turn of which angles are reported: given ones as given, drives within their limits."""
@@ -260,9 +251,7 @@ class Plan:
         state: State,
         shape: tuple[int, ...],
         dims: Mapping[str, Value],
-        vectors: Vectors,
         reached: Flags | None,
-        limits: bool,
         given: Sequence[Value] | None = None,
     ) -> Configuration:
         """A state with the reason of each pose; angles that are given keep their turns where `given` has the values."""
@@ -293,13 +282,10 @@ class Plan:
             nodes = [hide(x, lost) for x in nodes]
             rotations = [hide(u, lost) for u in rotations]
             slides = [hide(s, lost) for s in slides]
-        configuration = Configuration(
-            graph, vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims),
+        return Configuration(
+            graph, state.vectors, shape, nodes, rotations, slides, state.closures, reason, dict(dims),
             self.turns(given or (), dims), frozenset() if given is None else self.counted,
         )  # fmt: skip
-        if limits:
-            self.judge(configuration)
-        return configuration
 
     def judge(self, configuration: Configuration) -> None:
         """Note in the reasons of solved poses where they are outside the study's limits."""

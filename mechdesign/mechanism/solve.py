@@ -27,7 +27,7 @@ from mechdesign.mechanism.algebra import Value, cross, dot, norm2, plus, rotatio
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.outputs import Rates, first
-from mechdesign.mechanism.state import State, Unknowns, columns, loop_gap, scalars
+from mechdesign.mechanism.state import State, Unknowns, columns, scalars
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
 
@@ -91,7 +91,7 @@ def equations(state: State, group: Group) -> tuple[list[list[Value]], list[Value
     for loop in group.loops:
         total, derivatives = columns(state, group, loop.edges)
         rows += [[*row, *([0.0] * 2 * len(group.bases))] for row in scalars(derivatives)]
-        gap = plus(loop_gap(state, loop.start, loop.end), 1, total)
+        gap = plus(state.gap(loop), 1, total)
         errors += [gap.real, gap.imag]
     if group.conditions:
         state.place(group)
@@ -127,7 +127,7 @@ def _moves(state: State, group: Group) -> list[Rates]:
         nodes[j][node], nodes[j + 1][node] = 1.0 + 0.0j, 1.0j
     angles = [[float(tie.root == root) for tie in structure.ties] for root in group.angles]
     slides = [[float(slide == own) for slide in range(len(state.slides))] for own in group.slides]
-    still, held = [0.0] * structure.classes, [0.0] * len(state.slides)
+    still, held = [0.0] * len(structure.ties), [0.0] * len(state.slides)
     turns = [*angles, *([still] * lengths)]
     shifts = [*([held] * len(group.angles)), *slides, *([held] * 2 * len(group.bases))]
     return [Rates(*each, {}) for each in zip(nodes, turns, shifts, strict=True)]
@@ -212,7 +212,7 @@ def loop_vectors(state: State, group: Group) -> tuple[Value, dict[int, Value], d
     """Around a dyad's loop: the known vector k, and by its unknowns the vectors z that turn and the directions d."""
     structure = state.structure
     loop = group.loops[0]
-    k: Value = ZERO if loop.start == loop.end else loop_gap(state, loop.start, loop.end)
+    k: Value = ZERO if loop.start == loop.end else state.gap(loop)
     z: dict[int, Value] = dict.fromkeys(group.angles, ZERO)
     d: dict[int, Value] = {}
     for index, sign in loop.edges:

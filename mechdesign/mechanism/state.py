@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, plus, rotation, vector
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.structure import Group, Structure
+from mechdesign.mechanism.structure import Group, Loop, Structure
 from mechdesign.numerics.arrays import Flags, Floats
 
 # The unknowns of all groups without a closed form, one after another (see `Structure.unknowns`).
@@ -71,6 +71,10 @@ class State:
     def edge(self, k: int) -> Value:
         """World vector of an edge whose rotation and slide are known."""
         return self.turned(self.arm(k), self.structure.edges[k].frame)
+
+    def gap(self, loop: Loop) -> Value:
+        """Known part of a loop's closure error: from the node where it ends to that where it starts."""
+        return 0.0 if loop.start == loop.end else self.nodes[loop.start] - self.nodes[loop.end]
 
     def turn(self, root: int, turn: Value) -> None:
         """Set the rotation of a root and of the classes tied to it."""
@@ -144,11 +148,6 @@ def columns(state: State, group: Group, path: Sequence[tuple[int, int]]) -> tupl
 def _quarter_turn(value: Value) -> Value:
     """i times a vector; a vector that no edge contributes to stays the plain zero."""
     return value if isinstance(value, float) else vector(-value.imag, value.real)
-
-
-def loop_gap(state: State, loop_start: int, loop_end: int) -> Value:
-    """Known part of a loop's closure error: from the node where it ends to that where it starts."""
-    return 0.0 if loop_start == loop_end else state.nodes[loop_start] - state.nodes[loop_end]
 
 
 def scalars(loop_columns: Sequence[Value]) -> tuple[list[Value], list[Value]]:

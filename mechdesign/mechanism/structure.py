@@ -10,7 +10,7 @@ the mechanism's Assur groups; with outputs given, those of the inverse problem.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -74,7 +74,6 @@ class Structure:
 
     given: tuple[Coordinate, ...]
     edges: tuple[Edge, ...]
-    classes: int
     ties: tuple[Tie, ...]
     known_slides: tuple[tuple[int, int], ...]
     known_nodes: tuple[tuple[int, int, int], ...]
@@ -129,8 +128,7 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
         If the given coordinates do not determine the mechanism.
     """
     edges = list(graph.edges)
-    classes = graph.classes
-    ties = _Ties([Tie(k) for k in range(classes)])
+    ties = _Ties([Tie(k) for k in range(graph.classes)])
     known_slides: list[tuple[int, int]] = []
     node_given: dict[tuple[int, str], int] = {}
     spans: list[tuple[int, int]] = []
@@ -146,13 +144,13 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
             node_given[coordinate.node, coordinate.kind] = k
         elif coordinate.kind == "distance":
             # A given distance is a rigid link between the two points, in a class of its own.
-            ties.parent.append(Tie(classes))
+            frame = len(ties.parent)
+            ties.parent.append(Tie(frame))
             spans.append((len(edges), k))
-            edges.append(Edge(coordinate.node, coordinate.other, classes))
-            classes += 1
+            edges.append(Edge(coordinate.node, coordinate.other, frame))
         else:
             expressions[k] = coordinate
-    found = [ties.find(k) for k in range(classes)]
+    found = [ties.find(k) for k in range(len(ties.parent))]
     known = {slide for slide, _ in known_slides}
     groups = _decompose(graph, edges, [tie.root for tie in found], known, node_given, expressions)
     known_nodes = []
@@ -161,7 +159,7 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
         if min(pair) >= 0:
             known_nodes.append((node, *pair))
     return Structure(
-        tuple(given), tuple(edges), classes, tuple(found), tuple(known_slides), tuple(known_nodes), tuple(spans),
+        tuple(given), tuple(edges), tuple(found), tuple(known_slides), tuple(known_nodes), tuple(spans),
         tuple(groups),
     )  # fmt: skip
 
@@ -277,46 +275,24 @@ def _match(rows: list[list[int]], columns: int) -> list[int] | None:
 def _components(arcs: list[tuple[int, int]], count: int) -> list[list[int]]:
     """Strongly connected components, each after those that its arcs lead to.
 
-    By searches along the arcs and back along them (Kosaraju). Whatever a component reaches, it reaches strictly more
-    than that does; what it reaches is kept as the bits of a whole number.
+    The rows of a component reach the same rows, kept as the bits of a whole number, and strictly more than what they
+    lead to does.
     """
     ahead: list[list[int]] = [[] for _ in range(count)]
-    behind: list[list[int]] = [[] for _ in range(count)]
     for a, b in arcs:
         ahead[a].append(b)
-        behind[b].append(a)
-    finished = [row for tree in _trees(ahead, range(count)) for row in tree]
-    found = _trees(behind, reversed(finished))
-    place = {row: k for k, members in enumerate(found) for row in members}
-    reached = [0] * len(found)
-    for k in reversed(range(len(found))):
-        for row in found[k]:
-            reached[k] |= 1 << row
+    reached = [1 << row for row in range(count)]
+    order, before = list(range(count)), [0] * count
+    while reached != before:
+        before = [*reached]
+        for row in order:
             for other in ahead[row]:
-                reached[k] |= reached[place[other]]
-    order = sorted(range(len(found)), key=lambda k: (reached[k].bit_count(), min(found[k])))
-    return [sorted(found[k]) for k in order]
-
-
-def _trees(arcs: Sequence[Sequence[int]], roots: Iterable[int]) -> list[list[int]]:
-    """Depth-first trees from roots in their order; the rows of each in the order in which they are finished."""
-    seen: set[int] = set()
-    trees: list[list[int]] = []
-    for root in roots:
-        if root in seen:
-            continue
-        seen.add(root)
-        tree, path = [], [(root, iter(arcs[root]))]
-        while path:
-            _, rest = path[-1]
-            onward = next((other for other in rest if other not in seen), None)
-            if onward is None:
-                tree.append(path.pop()[0])
-            else:
-                seen.add(onward)
-                path.append((onward, iter(arcs[onward])))
-        trees.append(tree)
-    return trees
+                reached[row] |= reached[other]
+        order.reverse()
+    found: dict[int, list[int]] = defaultdict(list)
+    for row, bits in enumerate(reached):
+        found[bits].append(row)
+    return [found[bits] for bits in sorted(found, key=lambda bits: (bits.bit_count(), found[bits][0]))]
 
 
 def _group(

@@ -32,14 +32,8 @@ def bracketed_roots(
 
     The parabola through the ends and a third point has exactly one root between ends of opposite sign, so a step never
     leaves the bracket, and one step solves a quadratic function. nan counts as negative (the function ends there);
-    a bracket that shrinks too slowly, or has nan at an end, is halved.
-
-    Parameters
-    ----------
-    c, fc : ndarray
-        A third point, anywhere (may be nan).
-    tolerance : ndarray
-        Wanted accuracy of each root, if its digits hold it.
+    a bracket that shrinks too slowly, or has nan at an end, is halved. The third point `c` may lie anywhere (or be
+    nan); `tolerance` is the wanted accuracy of each root, if its digits hold it.
     """
     a, b, c, fa, fb, fc = (np.array(v, dtype=float) for v in (a, b, c, fa, fb, fc))
     root = np.where(fa == 0, a, np.where(fb == 0, b, 0.5 * (a + b)))
@@ -91,14 +85,9 @@ def bracketed_roots(
 
 
 def lowest(function: Callable[[Floats], Floats], low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """Places and smallest values between `low` and `high`.
+    """Places and smallest values, shape (n,), between `low` and `high`, where each function falls and then rises.
 
-    Parameters
-    ----------
-    function : callable
-        Values, shape (n,), of all functions at places of shape (n,), never nan.
-    low, high : ndarray, shape (n,)
-        Brackets in which each function falls and then rises.
+    `function` gives the values of all of them at places of shape (n,), never nan.
     """
     left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_left, at_right = function(left), function(right)
@@ -121,15 +110,9 @@ def dips(
     """Lowest places of many functions by successive parabolas, and their values; only so low as is `enough`.
 
     A function is left alone when it could not fall so far even as steeply as `STEEP` times what convexity allows.
-
-    Parameters
-    ----------
-    function : callable
-        ``function(which, x)``: values of some functions (indices) at places, of the same shape.
-    x, values : ndarray, shape (3, n)
-        Ascending places of which the middle one is lowest, and the values there; infinite where unknown.
-    enough : ndarray, shape (n,)
-        Value below which a place is low enough; minus infinity where the lowest place is wanted.
+    ``function(which, x)`` gives the values of some functions (indices) at places of the same shape. `x` and `values`,
+    shape (3, n), are ascending places of which the middle one is lowest, and the values there, infinite where unknown;
+    `enough`, shape (n,), is minus infinity where the lowest place is wanted.
     """
     x, values, left = x.copy(), values.copy(), np.arange(x.shape[1])
     for _ in range(steps):

@@ -66,10 +66,7 @@ def zero_curves(values: Floats, function: Callable[[Floats, Floats], Floats]) ->
 def joined(curves: Sequence[Complexes], exact: float) -> list[Complexes]:
     """Curves with those whose ends meet put together, the nearest first; one whose own ends meet is closed.
 
-    Parameters
-    ----------
-    exact : float
-        Distance at which ends meet, whatever the spacing of the points.
+    Ends nearer than `exact` meet whatever the spacing of the points.
     """
     curves = [curve for curve in curves if len(curve) > 1]
     if not curves:

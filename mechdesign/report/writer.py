@@ -129,7 +129,7 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[di
         }
         drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study, result))
         if animate:
-            from mechdesign.report.figures.animation import animation
+            from mechdesign.report.figures.kinematics import animation
 
             drawings[ANIMATION] = lambda: animation(result)
         drawn, failed = render(drawings)

@@ -22,7 +22,6 @@ from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Fixed
-from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document
 from mechdesign.study.text.document import Document, KeyPath, Mark, leaves, plain, read
@@ -70,12 +69,12 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
         study,
         resolved=resolved,
         mechanism=Variant(study.mechanism, description),
-        parameters=Parameters(
-            {name: float(value) for name, value in parameters.items()},
-            {name: formula for name, formula in old.formulas.items() if name not in changed},
-            {place: formula for place, formula in old.dependent.items() if place not in changed},
-            old.factors,
-            old.measured.difference(changed),
+        parameters=dataclasses.replace(
+            old,
+            nominal={name: float(value) for name, value in parameters.items()},
+            formulas={name: formula for name, formula in old.formulas.items() if name not in changed},
+            dependent={place: formula for place, formula in old.dependent.items() if place not in changed},
+            measured=old.measured.difference(changed),
         ),
     )
 

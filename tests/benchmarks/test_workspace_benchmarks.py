@@ -14,7 +14,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.question import answer, questions
 
 STUDY = Path(__file__).parents[2] / "configs" / "two_rrr.yaml"

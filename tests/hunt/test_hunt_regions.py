@@ -11,7 +11,7 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.results import Result
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.region.panels import BATCH, SINGLE
+from mechdesign.analyses.region.rays import BATCH, SINGLE
 from mechdesign.analyses.region.rules import Rule
 from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.results import Result, Table

@@ -7,7 +7,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.question import answer, questions
 
 # A platform on three legs, each a crank and a rod; its angle is asked for as it is, or by a measure.

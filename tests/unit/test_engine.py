@@ -9,9 +9,10 @@ from helpers.limit_states import Case, quasi_monte_carlo
 from scipy.special import ndtr
 
 from mechdesign.analyses.reliability.engine.design_points import find
-from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, Precision, Problem
+from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, Problem, reached
 from mechdesign.analyses.reliability.methods.form import form
 from mechdesign.analyses.reliability.methods.importance_sampling import importance_sampling
+from mechdesign.study.schema.reliability import Precision
 
 CASES = {
     **{f"half_space_{d}_{beta:g}": limit_states.linear(d, beta) for d in (1, 2, 30, 100) for beta in (2.0, 4.0, 7.0)},
@@ -34,7 +35,7 @@ CASES = {
     "lognormals_40": limit_states.lognormals(40),
     "noisy": limit_states.noisy(),
 }
-PRECISION = Precision(0.05 / WIDTH, None)
+PRECISION = Precision(relative=0.05 / WIDTH)
 # Distances of the parabola's design points: where x + y dy/dx = 0, the outer two.
 _X = np.sort(np.roots([0.5, -0.15, -3.985, 0.4995]).real)[[0, 2]]
 PARABOLA = sorted(np.hypot(_X, 5 - 0.5 * (_X - 0.1) ** 2).tolist())
@@ -65,7 +66,7 @@ def test_published_probabilities() -> None:
 def test_importance_sampling_covers_the_exact_value(case: Case) -> None:
     found = sampled(case.problem)
     assert found.low <= case.exact <= found.high
-    assert PRECISION.reached(found.failure, found.low, found.high)
+    assert reached(PRECISION, found.failure, found.low, found.high)
 
 
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.exact > 1e-3 and "100" not in name])

@@ -12,7 +12,6 @@ from mechdesign.analyses.reliability.engine.problem import (
     CONFIDENCE,
     WIDTH,
     Estimate,
-    Precision,
     Problem,
     binomial,
     failed,
@@ -20,6 +19,7 @@ from mechdesign.analyses.reliability.engine.problem import (
 )
 from mechdesign.analyses.reliability.methods.auto import climb, rungs
 from mechdesign.analyses.reliability.methods.importance_sampling import importance_sampling
+from mechdesign.study.schema.reliability import Precision
 
 SEEDS = 80
 CASES = {
@@ -66,7 +66,7 @@ def test_importance_sampling_that_ends_at_its_precision(name: str) -> None:
     case, intervals = CASES[name], []
     for seed in range(SEEDS):
         rng, problem = generator(seed + 10_000), case.problem
-        found = importance_sampling(problem, find(problem, rng), rng, 100_000, Precision(0.1 / WIDTH, None))
+        found = importance_sampling(problem, find(problem, rng), rng, 100_000, Precision(relative=0.1 / WIDTH))
         intervals.append((found.low, found.high))
         assert found.high - found.low <= 0.2 * found.failure
     check(intervals, case.exact)
@@ -96,7 +96,7 @@ def test_auto(name: str, used: str) -> None:
     for seed in range(SEEDS):
         problem, other = case.problem, case.problem
         found, method, _ = climb(
-            problem, Precision(0.1 / WIDTH, None), lambda n, s=seed, p=other: plain(p, s + 10**6, n), rungs(),
+            problem, Precision(relative=0.1 / WIDTH), lambda n, s=seed, p=other: plain(p, s + 10**6, n), rungs(),
             generator(seed), 100_000, 100_000,
         )  # fmt: skip
         assert method == used

@@ -7,8 +7,9 @@ import pytest
 from helpers import limit_states
 from helpers.limit_states import Case
 
-from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, Precision, binomial, failed
+from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, binomial, failed, reached
 from mechdesign.analyses.reliability.methods.auto import FEW, PILOT, climb, disagree, rungs
+from mechdesign.study.schema.reliability import Precision
 
 Said = tuple[Estimate, str, dict[str, Estimate]]
 
@@ -29,11 +30,11 @@ def climbed(case: Case, precision: Precision, most: int = 200_000, sees: Case | 
 
 def relative(share: float) -> Precision:
     """Half the interval as a share of the probability."""
-    return Precision(share / WIDTH, None)
+    return Precision(relative=share / WIDTH)
 
 
 def precise(found: Estimate, precision: Precision) -> bool:
-    return precision.reached(found.failure, found.low, found.high)
+    return reached(precision, found.failure, found.low, found.high)
 
 
 @pytest.mark.parametrize(("case", "share", "used"), [
@@ -70,19 +71,19 @@ def test_evaluations_are_those_of_all_rungs() -> None:
 @pytest.mark.parametrize("half", [1e-2, 1e-3, 1e-5])
 def test_half_a_width(half: float) -> None:
     case = limit_states.linear(3, 3.0)
-    found, _, _ = climbed(case, Precision(None, half))
+    found, _, _ = climbed(case, Precision(half_width=half))
     assert 0.5 * (found.high - found.low) <= half
     assert found.low <= case.exact <= found.high
 
 
 def test_half_a_width_of_failures_that_the_pilot_does_not_see() -> None:
     case = limit_states.linear(3, 5.0)
-    found, _, _ = climbed(case, Precision(None, 1e-8))
+    found, _, _ = climbed(case, Precision(half_width=1e-8))
     assert 0.5 * (found.high - found.low) <= 1e-8
     assert found.low <= case.exact <= found.high
 
 
-@pytest.mark.parametrize("precision", [relative(0.05), Precision(None, 1e-9)])
+@pytest.mark.parametrize("precision", [relative(0.05), Precision(half_width=1e-9)])
 def test_where_no_failure_is_seen_there_is_a_value_of_0_and_a_bound(precision: Precision) -> None:
     found, used, rungs = climbed(Case(3, lambda u: np.ones((1, u.shape[1])), 0.0), precision, FEW)
     assert used == "monte_carlo"

@@ -9,8 +9,7 @@ import pytest
 
 import mechdesign
 from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.optimize.judge import JudgedDesigns
-from mechdesign.analyses.optimize.tables import Comparison
+from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.variables import grid
 from mechdesign.errors import AssemblyError, StudyError
 
@@ -47,15 +46,15 @@ def test_an_empty_grid_says_so() -> None:
         mechdesign.optimize(study)
 
 
-def compare(values: list[float], *, smallest: bool = False, feasible: int | None = None) -> Comparison:
+def compare(values: list[float], *, smallest: bool = False, feasible: int | None = None) -> Designs:
     """Designs of one goal, of which the first so many are feasible."""
     one, count = goal("kinematics.P.x", smallest=smallest), len(values)
     codes = np.where(np.arange(count) < (count if feasible is None else feasible), 0, 1).astype(np.int32)
     study = mechdesign.load(CONFIGS / "two_link_arm.yaml")
-    designs = JudgedDesigns(
-        {"r1": np.arange(count) + 1.0}, (one,), (), {one: np.array(values)}, {}, codes, ["", "lost"]
-    )
-    return Comparison(study, designs, np.ones((1, 1)), {})
+    return Designs(
+        study, {"r1": np.arange(count) + 1.0}, (one,), (), {one: np.array(values)}, {}, codes, ["", "lost"],
+        np.ones((1, 1)), {},
+    )  # fmt: skip
 
 
 def test_normalisation_over_feasible_designs() -> None:

@@ -8,8 +8,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.optimize.goals import Goal
-from mechdesign.analyses.optimize.judge import JudgedDesigns
-from mechdesign.analyses.optimize.tables import Comparison
+from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.report.figures import style
 from mechdesign.report.figures.optimize import MAX_LINES, convergence, figures, front_figure, parallel_axes
 from mechdesign.results import Column, Table
@@ -71,13 +70,13 @@ def test_a_single_goal_is_shown_in_its_own_unit() -> None:
     assert line[:, 1] == pytest.approx(result.tables["designs"]["kinematics.P.x"])
 
 
-def many(count: int = 500) -> Comparison:
+def many(count: int = 500) -> Designs:
     x, y, z = np.random.default_rng(0).random((3, count))
     goals = Goal("cost", "", "", smallest=True), Goal("mass", "", "", smallest=True)
     values = dict(zip(goals, (x + y, 1 - x + z), strict=True))
     codes = (np.arange(count) == 3).astype(np.int32)
-    designs = JudgedDesigns({"x": x, "y": y, "z": z}, goals, (), values, {}, codes, ["", "wrong"])
-    return Comparison(study_of(ARM), designs, np.array([[1.0, 0.0]]), {})
+    variables, weights = {"x": x, "y": y, "z": z}, np.array([[1.0, 0.0]])
+    return Designs(study_of(ARM), variables, goals, (), values, {}, codes, ["", "wrong"], weights, {})
 
 
 def test_parallel_axes_of_many_designs_show_some_and_always_the_best() -> None:
@@ -86,7 +85,7 @@ def test_parallel_axes_of_many_designs_show_some_and_always_the_best() -> None:
         axes = parallel_axes(designs).axes[0]
     lines = axes.collections[0].get_segments()
     assert len(lines) == MAX_LINES
-    cost = designs.values[designs.designs.feasible, 0]
+    cost = designs.values[designs.feasible, 0]
     best = axes.lines[0].get_xydata()
     assert best[3, 1] == 0
     assert {text.get_text() for text in axes.texts} >= {f"{cost.min():.4g}", f"{cost.max():.4g}"}

@@ -10,8 +10,8 @@ from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region.panels import BATCH, SINGLE, Effort, find_panels
-from mechdesign.analyses.region.rays import Designs, trace
+from mechdesign.analyses.region.panels import find_panels
+from mechdesign.analyses.region.rays import BATCH, SINGLE, Designs, Effort, trace
 from mechdesign.analyses.workspace.question import questions
 
 ARM = """
@@ -239,7 +239,7 @@ def test_panels_end_at_corners_and_where_rays_touch(assembly: str, effort: Effor
     about, one, other, hole, reach = 0.05 + 0.45j, -0.15, 0.15, 0.15, 0.65
     study = study_of(FIVE_BAR, f"workspace.assembly={assembly}", "workspace.scan.about=[0.05, 0.45]")
     question = questions(study)[0]
-    panels = find_panels(Designs(question.field, {}, 1, about), question.scan, effort)
+    panels = find_panels(Designs(question.field, {}, 1, about, question.scan, effort))
     ends = np.concatenate([panels.low, panels.high])
     touching = [np.angle(one - about) - np.arcsin(hole / abs(one - about)),
                 np.angle(other - about) + np.arcsin(hole / abs(other - about))]  # fmt: skip
@@ -251,8 +251,11 @@ def test_panels_end_at_corners_and_where_rays_touch(assembly: str, effort: Effor
 def test_few_samples_find_a_gap_between_them() -> None:
     """A gap that a determinant leaves, where it dips hardly steeper to one side of a sample than to the other."""
     study = study_of(FIVE_BAR, "workspace.assembly=same", "mechanism.parameters.b=0.3675195822454308")
-    designs = Designs(questions(study)[0].field, {}, 1, 0.2267883835941191j)
+    question, about = questions(study)[0], 0.2267883835941191j
     zero, angle, reach = np.zeros(1, dtype=np.intp), np.array([4.377794174748168]), np.array([1.2])
-    few, many = (trace(designs, zero, angle, reach, effort.samples) for effort in (BATCH, SINGLE))
+    few, many = (
+        trace(Designs(question.field, {}, 1, about, question.scan, effort), zero, angle, reach)
+        for effort in (BATCH, SINGLE)
+    )
     assert len(many.inner) == 3
     np.testing.assert_allclose([few.inner, few.outer], [many.inner, many.outer], atol=1e-12)

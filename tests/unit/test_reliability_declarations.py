@@ -12,7 +12,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints
-from mechdesign.analyses.reliability.engine.problem import Estimate, Precision, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.methods import normal
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.errors import StudyError
@@ -20,6 +20,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.reliability import figures
 from mechdesign.report.tables import to_csv
 from mechdesign.study.schema.methods import METHODS, Method
+from mechdesign.study.schema.reliability import Precision
 from mechdesign.study.schema.study_file import schema
 
 LEVER = """

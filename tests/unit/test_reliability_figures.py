@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 import mechdesign
 from mechdesign.analyses.poses import study_poses
 from mechdesign.report.figures import style
-from mechdesign.report.figures.panels import number
-from mechdesign.report.figures.planes import plane
+from mechdesign.report.figures.panels import number, plane
 from mechdesign.report.figures.reliability import figures
 from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
 from mechdesign.report.figures.reliability.looks import look

@@ -9,8 +9,8 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region.panels import BATCH, Effort, find_panels
-from mechdesign.analyses.region.rays import Designs, trace
+from mechdesign.analyses.region.panels import find_panels
+from mechdesign.analyses.region.rays import BATCH, Designs, trace
 from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.numerics.roots import bracketed_roots
@@ -89,7 +89,7 @@ def test_ends_of_intervals_lie_on_the_limits() -> None:
     question = questions(study)[0]
     theta = np.linspace(0.05, 3.1, 57)
     zero = np.zeros(len(theta), dtype=int)
-    found = trace(Designs(question.field, {}, 1, 0j), zero, theta, np.full(len(theta), 7.0), 12)
+    found = trace(Designs(question.field, {}, 1, 0j, question.scan, BATCH), zero, theta, np.full(len(theta), 7.0))
     for radius in (found.inner, found.outer):
         place = radius * np.exp(1j * theta[found.ray])
         lengths = np.abs(place[:, None] - np.array([1, -1]))
@@ -98,11 +98,11 @@ def test_ends_of_intervals_lie_on_the_limits() -> None:
 
 def test_panels_end_where_the_active_limits_change() -> None:
     question = questions(study_of(LEGS, UPPER))[0]
-    panels = find_panels(Designs(question.field, {}, 1, 0j), (0.0, np.pi), Effort(16, 12, 24))
+    panels = find_panels(Designs(question.field, {}, 1, 0j, (0.0, np.pi), BATCH))
     assert panels.high == pytest.approx([np.pi / 2, np.pi], abs=1e-8)
     # A base that is not symmetric: the corners are where two circles meet.
     moved = {"ground.B1.x": np.array([1.3])}
-    panels = find_panels(Designs(question.field, moved, 1, 0j), (0.0, np.pi), Effort(16, 12, 24))
+    panels = find_panels(Designs(question.field, moved, 1, 0j, (0.0, np.pi), BATCH))
     corner = (1.3**2 - 1) / (2 * 2.3) + 0j
     corner += 1j * np.sqrt(9 - (corner.real + 1) ** 2)
     assert np.abs(panels.high - np.angle(corner)).min() < 1e-12

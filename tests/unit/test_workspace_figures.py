@@ -8,8 +8,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.workspace import figures, inscribed_figure, loops
-from mechdesign.report.figures.workspace.maps import index_columns
+from mechdesign.report.figures.workspace import figures, index_columns, inscribed_figure, loops
 from mechdesign.report.figures.workspace.regions import fate, regions
 from mechdesign.results import Column, Result, Table
 

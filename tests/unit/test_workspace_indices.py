@@ -11,7 +11,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.poses import study_poses
-from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.index import Local, prepare
 from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import StudyError

@@ -29,11 +29,11 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.numerics.arrays import Flags
+from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.threads import one_thread
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8

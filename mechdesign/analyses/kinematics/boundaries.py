@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from mechdesign.mechanism import Configuration, Reason
 from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.margins import DEAD_CENTRE, ZERO_LENGTH, Cause, SweepMargins, turning_point
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
 from mechdesign.numerics.roots import bracketed_roots, lowest
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -32,12 +31,12 @@ ROOT_PRECISION = 1e-13
 AT_END = 1e-9
 # Ends within this part of the sweep's size are one.
 SAME_END = 1e-11
-# A change point within this part of a step of a pose is at it.
-CHANGE_AT_POSE = 1e-6
 # The motion has no gap at a single place if it is valid this far to both sides, as a part of the step.
 GAP_PROBE = 1e-5
 # A change point this near to zero, as a part of the sweep, is there.
 CHANGE_AT_ZERO = 1e-7
+# A value of the swept coordinate at which two assemblies of a group meet and the motion goes on.
+ChangePoint = tuple[float, Cause]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,16 +52,8 @@ class Boundary:
     configuration: Configuration | None
 
 
-@dataclass(frozen=True)
-class ChangePoint:
-    """A value of the swept coordinate at which two assemblies of a group meet and the motion goes on."""
-
-    place: float
-    cause: Cause
-
-
 @dataclass(frozen=True, eq=False)
-class _Parts:
+class _Parts(Lanes):
     """Parts of the steps of a sweep; `step` is the step of each, shape (n,).
 
     Of both ends the place, whether it is valid, shape (2, n), the margins, and their slopes times the length of the
@@ -74,14 +65,6 @@ class _Parts:
     valid: Flags
     values: Floats
     rises: Floats
-
-    def take(self, index: Ints | Flags) -> _Parts:
-        return _Parts(*(getattr(self, name)[..., index] for name in self.__dataclass_fields__))
-
-    @staticmethod
-    def joined(parts: Sequence[_Parts]) -> _Parts:
-        names = _Parts.__dataclass_fields__
-        return _Parts(*(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names))
 
 
 def boundaries(margins: SweepMargins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint]]:
@@ -298,14 +281,8 @@ class _Search:
         place, value = lowest(closure, low, high)
         side = GAP_PROBE * self.length[step]
         some = (value <= touch[function, 0]) & (closure(place - side) > value) & (closure(place + side) > value)
-        found: dict[tuple[int, float], ChangePoint] = {}
-        for k in np.flatnonzero(some & self._goes_on(step, place)).tolist():
-            beside = self.at[step[k] : step[k] + 2]
-            beside = beside[np.abs(beside - place[k]) <= CHANGE_AT_POSE * self.length[step[k]]]
-            at = float(np.clip(beside[0], *sorted(self.at[[1, -2]]))) if len(beside) else float(place[k])
-            found.setdefault((int(function[k]), round(at / (CHANGE_AT_POSE * self.length[step[k]]))),
-                             ChangePoint(at, self.margins.causes[function[k]]))  # fmt: skip
-        return list(found.values())
+        gone_through = np.flatnonzero(some & self._goes_on(step, place)).tolist()
+        return [(float(place[k]), self.margins.causes[function[k]]) for k in gone_through]
 
 
 def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Boundary]]:
@@ -367,11 +344,11 @@ def _hidden(swept: str, unit: str, places: Floats, ends: list[Boundary], valid: 
 def _warnings(study: Study, margins: SweepMargins, swept: str, changes: list[ChangePoint]) -> list[str]:
     unit = study.units.label(study.mechanism.quantity(swept))
     places: dict[str, dict[str, None]] = {}
-    for change in sorted(changes, key=lambda change: change.place):
+    for at, cause in sorted(changes, key=lambda change: change[0]):
         # The smallest value of a smooth function is found to the root of rounding.
-        at = change.place if abs(change.place) > CHANGE_AT_ZERO * np.ptp(margins.at) else 0.0
-        place = f"{in_study_units(study, margins.coordinate, at):.6g} {unit}".rstrip()
-        places.setdefault(place, {})[change.cause.joint] = None
+        near = at if abs(at) > CHANGE_AT_ZERO * np.ptp(margins.at) else 0.0
+        place = f"{in_study_units(study, margins.coordinate, near):.6g} {unit}".rstrip()
+        places.setdefault(place, {})[cause.joint] = None
     return [
         f"change point at {swept} = {place} (joints {'; '.join(joints)}): two assemblies meet there, and branch 'side' "
         "keeps each joint on its side of the line, where a made mechanism may cross it"

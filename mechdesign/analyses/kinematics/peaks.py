@@ -12,7 +12,7 @@ from mechdesign.analyses.kinematics.lines import STILL, PoseLine
 from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
 from mechdesign.numerics.roots import bracketed_roots, lowest
 from mechdesign.results import Column, Table
 
@@ -24,12 +24,10 @@ Along = Callable[[Ints, Floats], Floats]
 
 # Error of the place of an extreme or a zero, as a part of its segment.
 PLACE_PRECISION = 1e-13
-# Parts of a segment that may hold an extreme at which poses are added first.
-LOOKS = np.array([0.25, 0.5, 0.75])
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class Places(Lanes):
     """Places on a line: function, the poses of the line on both sides, swept coordinate, and value there.
 
     `sign` is 1 where the function is smallest beside the place, -1 where it is largest, 0 where it is zero.
@@ -41,15 +39,6 @@ class Places:
     place: Floats
     value: Floats
     sign: Ints
-
-    def take(self, index: Ints | Flags) -> Places:
-        """Some of them."""
-        return Places(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
-
-    @staticmethod
-    def joined(*parts: Places) -> Places:
-        """All of several."""
-        return Places(*(np.concatenate([getattr(p, name) for p in parts]) for name in Places.__dataclass_fields__))
 
     def position(self, line: PoseLine) -> Floats:
         """Place along the sweep in rows."""
@@ -76,44 +65,29 @@ def turns(line: PoseLine, rows: Ints, wanted: Wanted) -> Places:
     """Places between the poses of a line at which slopes of functions (rows of its values) change their sign.
 
     A segment cannot hold a value below both its ends by more than half its length times its largest slope: links
-    hardly turn within it. Wanted segments are divided where their slope does not change evenly, so that it might be
-    zero twice: by its parabola, in the middle by a quarter of its larger end.
+    hardly turn within it, and functions hardly bend.
     """
-    some: list[Flags] = []
-    for looks in (LOOKS, None):
-        values, slopes = (table[rows][:, np.stack([line.begin, line.end])] for table in (line.values, line.slopes))
-        slopes = slopes * (line.place[line.end] - line.place[line.begin])
-        steep = np.fmax(np.abs(slopes[:, 0]), np.abs(slopes[:, 1]))
-        drop = np.nan_to_num(steep) / 2
-        some = [wanted(sign, sign * values, drop) for sign in (1, -1)]
-        if looks is not None:
-            with np.errstate(invalid="ignore"):
-                bent = ~(6 * np.abs(values[:, 1] - values[:, 0] - slopes.mean(axis=1)) <= steep)
-            line.divide(np.flatnonzero(((some[0] | some[1]) & bent).any(axis=0)), looks)
+    values, slopes = (table[rows][:, np.stack([line.begin, line.end])] for table in (line.values, line.slopes))
+    slopes = slopes * (line.place[line.end] - line.place[line.begin])
+    drop = np.nan_to_num(np.fmax(np.abs(slopes[:, 0]), np.abs(slopes[:, 1]))) / 2
     which, function, segment = np.nonzero([
-        flags & (sign * slopes[:, 0] < 0) & (sign * slopes[:, 1] > 0) for sign, flags in zip((1, -1), some, strict=True)
+        wanted(sign, sign * values, drop) & (sign * slopes[:, 0] < 0) & (sign * slopes[:, 1] > 0) for sign in (1, -1)
     ])  # fmt: skip
     begin, end, sign = line.begin[segment], line.end[segment], 1 - 2 * which
     slopes = line.slopes[rows]
     place = _roots(
         lambda lane, x: line.sample(begin[lane], x)[1][rows[function[lane]], np.arange(len(lane))],
-        (line.place[begin], line.place[end]), (slopes[function, begin], slopes[function, end]),
+        line.place[begin], slopes[function, begin], line.place[end], slopes[function, end],
     )  # fmt: skip
     value = line.sample(begin, place)[0][rows[function], np.arange(len(place))]
     known = np.isfinite(value)
     return Places(function, begin, end, place, value, sign).take(known)
 
 
-def _roots(
-    evaluate: Callable[[Ints, Floats], Floats], at: tuple[Floats, Floats], ends: tuple[Floats, Floats]
-) -> Floats:
-    """Roots between places `at`, with values `ends` of opposite signs there."""
-    rising = np.where(ends[0] > 0, -1.0, 1.0)
-    none = np.full(len(rising), np.nan)
-    return bracketed_roots(
-        lambda lane, x: rising[lane] * evaluate(lane, x),
-        at[0], rising * ends[0], at[1], rising * ends[1], none, none, PLACE_PRECISION * np.abs(at[1] - at[0]),
-    )  # fmt: skip
+def _roots(evaluate: Along, low: Floats, at_low: Floats, high: Floats, at_high: Floats) -> Floats:
+    """Roots between places with values of opposite signs."""
+    none = np.full(len(low), np.nan)
+    return bracketed_roots(evaluate, low, at_low, high, at_high, none, none, PLACE_PRECISION * np.abs(high - low))
 
 
 def zeros(line: PoseLine, rows: Ints, at_pose: float, touching: float) -> Places:
@@ -144,11 +118,11 @@ def zeros(line: PoseLine, rows: Ints, at_pose: float, touching: float) -> Places
         found: Floats = line.sample(begin[lane], x)[0][rows[function[lane]], np.arange(len(lane))]
         return found
 
-    place = _roots(value, (low, high), (at_low, at_high))
+    place = _roots(value, low, at_low, high, at_high)
     found = value(np.arange(len(function)), place)
     crossed = Places(function, begin, end, place, found, 0 * begin)
     # A function that jumps from side to side is not zero between.
-    return Places.joined(at_nodes, crossed.take(np.abs(found) <= touching), touched)
+    return Places.joined([at_nodes, crossed.take(np.abs(found) <= touching), touched])
 
 
 def peaks(line: PoseLine, rows: Ints, still: Floats, *, all_poses: bool = False) -> tuple[Peak, Peak]:
@@ -247,35 +221,33 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     """
     study, poses, outputs = motion.question.study, motion.question.poses, motion.question.outputs
     mechanism = study.mechanism
-    shape = (poses.designs, poses.count // poses.designs)
+    each = poses.count // poses.designs
     curves = {output.name: (output.quantity, motion.arrays[output.name]) for output in outputs}
     curves |= {error.name: (error.quantity, error.values) for error in motion.errors}
-    at = poses.values[swept] if swept is not None else np.tile(np.arange(shape[1], dtype=float), shape[0])
+    at = poses.values[swept] if swept is not None else np.tile(np.arange(each, dtype=float), poses.designs)
     turn = 2 * np.pi / study.units.angle_factor
     sizes = {"length": mechanism.size, "angle": turn}
-    # Of both ends: value and place, and the pose; shape (designs, names).
-    found, row = np.full((2, 2, shape[0], len(curves)), np.nan), np.zeros((2, shape[0], len(curves)), dtype=np.intp)
-    still, first_row = np.zeros((shape[0], len(curves))), np.arange(shape[0]) * shape[1]
-    for k, (quantity, curve) in enumerate(curves.values()):
-        values, known = curve.reshape(shape), (motion.valid & np.isfinite(curve)).reshape(shape)
-        some = known.any(axis=1)
-        every = known.all()
-        row[0, :, k] = first_row + (values if every else np.where(known, values, np.inf)).argmin(axis=1)
-        row[1, :, k] = first_row + (values if every else np.where(known, values, -np.inf)).argmax(axis=1)
-        low, high = (values.ravel()[row[end, :, k]] for end in (0, 1))
-        still[:, k] = STILL * np.fmax(np.fmax(np.abs(low), np.abs(high)), sizes.get(quantity, 0.0))
-        # A curve that stands still has both extremes at its first pose.
-        stands = some & ~(high - low > still[:, k])
-        row[:, stands, k] = (first_row + known.argmax(axis=1))[stands]
-        found[:, 0, some, k], found[:, 1, some, k] = values.ravel()[row[:, some, k]], at[row[:, some, k]]
+    # By curve and design; of both ends the pose, and value and place.
+    table = np.stack([values for _, values in curves.values()])
+    known = (motion.valid & np.isfinite(table)).reshape(len(table), poses.designs, each)
+    begin, lane = np.arange(poses.designs) * each, np.arange(len(table))[:, None]
+    row = begin + np.stack([
+        np.where(known, sign * table.reshape(known.shape), np.inf).argmin(axis=2) for sign in (1, -1)
+    ])  # fmt: skip
+    low, high = table[lane, row]
+    size = np.array([sizes.get(quantity, 0.0) for quantity, _ in curves.values()])[:, None]
+    still = STILL * np.fmax(np.fmax(np.abs(low), np.abs(high)), size)
+    # A curve that stands still has both extremes at its first pose.
+    row = np.where(high - low > still, row, begin + known.argmax(axis=2))
+    found = np.where(known.any(axis=2), np.stack([table[lane, row], at[row]], axis=1), np.nan)
     moving = np.asarray(found[1, 0] - found[0, 0] > still)
     if line is not None:
         _between(motion, line, names, found, row, still, moving)
     (low, low_at), (high, high_at) = found
-    timed = np.zeros(shape[0], dtype=bool)
+    timed = np.zeros(poses.designs, dtype=bool)
     if line is not None and mechanism.quantity(line.swept) == "angle" and np.ptp(at) >= turn * (1 - 1e-9):
-        timed = motion.valid.reshape(shape).all(axis=1) & ~line.torn & (not line.ends)
-    part = np.where(timed[:, None] & moving, (high_at - low_at) % turn, np.nan)
+        timed = motion.valid.reshape(-1, each).all(axis=1) & ~line.torn & (not line.ends)
+    part = np.where(timed & moving, (high_at - low_at) % turn, np.nan)
     with np.errstate(divide="ignore"):
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
     ratio[~np.isfinite(ratio)] = np.nan
@@ -285,59 +257,53 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     return Table(
         "extremes",
         (
-            Column("output", np.tile(np.array(list(curves)), shape[0]), "", "output or error, in its own unit"),
-            Column("min", low.ravel(), "", "smallest value over the motion, in `unit`"),
-            Column("min_at", low_at.ravel(), unit, f"{where} smallest value"),
-            Column("max", high.ravel(), "", "largest value over the motion, in `unit`"),
-            Column("max_at", high_at.ravel(), unit, f"{where} largest value"),
-            Column("range", (high - low).ravel(), "", "max - min, in `unit`"),
-            Column("time_ratio", ratio.ravel(), "", "longer over shorter time between the extremes, constant speed"),
-            Column("unit", np.tile(np.array(units, dtype=str), shape[0]), "", "unit of min, max and range"),
+            Column("output", np.tile(np.array(list(curves)), poses.designs), "", "output or error, in its own unit"),
+            Column("min", low.T.ravel(), "", "smallest value over the motion, in `unit`"),
+            Column("min_at", low_at.T.ravel(), unit, f"{where} smallest value"),
+            Column("max", high.T.ravel(), "", "largest value over the motion, in `unit`"),
+            Column("max_at", high_at.T.ravel(), unit, f"{where} largest value"),
+            Column("range", (high - low).T.ravel(), "", "max - min, in `unit`"),
+            Column("time_ratio", ratio.T.ravel(), "", "longer over shorter time between the extremes, constant speed"),
+            Column("unit", np.tile(np.array(units, dtype=str), poses.designs), "", "unit of min, max and range"),
         ),
         "extremes of the outputs over the motion",
     )
 
 
 def _between(
-    motion: Motion,
-    line: PoseLine,
-    names: Collection[str] | None,
-    found: Floats,
-    row: Ints,
-    still: Floats,
+    motion: Motion, line: PoseLine, names: Collection[str] | None, found: Floats, row: Ints, still: Floats,
     moving: Flags,
-) -> None:
+) -> None:  # fmt: skip
     """Put better extremes than those of the poses into `found`: from between the poses, and at limits of the motion.
 
-    `found` has value and place of the smallest and the largest, shape (2, 2, designs, names), `row` their poses; of
-    shape (designs, names) are `still`, rounding, and `moving`, where those found to move are added.
+    `found` has value and place of the smallest and the largest, shape (2, 2, names, designs), `row` their poses; of
+    shape (names, designs) are `still`, rounding, and `moving`, where those found to move are added.
     """
     study, outputs = motion.question.study, motion.question.outputs
     swept = study.mechanism.coordinate(line.swept)
 
     def take(peak: Peak, end: int, which: Sequence[int], exact: bool) -> None:
         sign = 1 - 2 * end
-        value = np.where(np.isnan(found[end, 0][:, which]), np.inf, sign * found[end, 0][:, which])
-        new, place, rounding = sign * peak.value.T, in_study_units(study, swept, peak.place.T), still[:, which]
-        away = np.abs(peak.position.T - row[end][:, which])
+        value = np.where(np.isnan(found[end, 0, which]), np.inf, sign * found[end, 0, which])
+        away, rounding = np.abs(peak.position - row[end, which]), still[which]
         with np.errstate(invalid="ignore"):
             # Better, or that pose's own extreme, but beside it.
-            beside = (np.abs(sign * new - value) <= rounding) & (away < 1) & (away > 1e-9) & moving[:, which] & exact
-            lower = sign * new < value - rounding
-        for part, table in enumerate((new, place)):
-            found[end, part][:, which] = np.where(lower | beside, table, found[end, part][:, which])
-        moving[:, which] |= lower
+            beside = (np.abs(peak.value - value) <= rounding) & (away < 1) & (away > 1e-9) & moving[which] & exact
+            lower = peak.value < value - rounding
+        for part, new in enumerate((sign * peak.value, in_study_units(study, swept, peak.place))):
+            found[end, part, which] = np.where(lower | beside, new, found[end, part, which])
+        moving[which] |= lower
 
     mine = [k for k, output in enumerate(outputs) if names is None or output.name in names]
     rows = np.array([line.rows[outputs[k].name] for k in mine], dtype=np.intp)
-    for end, peak in enumerate(peaks(line, rows, still.T[mine])):
+    for end, peak in enumerate(peaks(line, rows, still[mine])):
         take(peak, end, mine, True)
-    wrong = list(range(len(outputs), still.shape[1]))
+    wrong = list(range(len(outputs), len(still)))
     if any(names is None or error.name in names for error in motion.errors):
         for end, sign in enumerate((1, -1)):
             along = _errors(motion, line, sign)
             every = np.arange(len(line.row))
-            take(searched(line, along, along(every, line.place), still.T[wrong]), end, wrong, False)
+            take(searched(line, along, along(every, line.place), still[wrong]), end, wrong, False)
 
 
 def _errors(motion: Motion, line: PoseLine, sign: int) -> Along:

@@ -15,9 +15,8 @@ from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer
 from mechdesign.analyses.optimize.goals import conditions_of, goals_of
-from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
+from mechdesign.analyses.optimize.judge import Designs, Judge
 from mechdesign.analyses.optimize.tables import (
-    Comparison,
     best_table,
     bounds_table,
     designs_table,
@@ -31,13 +30,12 @@ from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, Study
 from mechdesign.journal import Journal
 from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
-from mechdesign.parallel import workers
+from mechdesign.parallel import one_thread, workers
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
 from mechdesign.study.variants import changed_data, rewritten, variant
-from mechdesign.threads import one_thread
 
 # Numbers that a search keeps of the rows behind its goals.
 MAX_KEPT_ROWS = 10_000_000
@@ -94,30 +92,29 @@ def optimize(
         judge = Judge(study, evaluator, compute, progress, journal)
         try:
             doubts = _ask(study, judge, evaluator, weights, budget, study.seed if seed is None else seed)
-            designs = judge.designs()
+            designs = judge.designs(weights, meanings)
             if not designs.feasible.any():
                 raise AssemblyError(_none_feasible(designs))
-            compared = Comparison(study, designs, weights, meanings)
-            sensitivity = sensitivity_table(compared, judge)
+            sensitivity = sensitivity_table(designs, judge)
         except KeyboardInterrupt:
             if journal is not None:
                 journal.save()
-            partial = judge.designs()
+            partial = judge.designs(weights, meanings)
             if not len(partial):
                 raise
-            raise Interrupted(_finished_part(study, partial, meanings)) from None
+            raise Interrupted(_finished_part(partial)) from None
     tables = [
-        optimum_table(compared), designs_table(compared), bounds_table(compared),
-        best_table(compared), sensitivity,
+        optimum_table(designs), designs_table(designs), bounds_table(designs),
+        best_table(designs), sensitivity,
     ]  # fmt: skip
     marked: dict[str, int] = {}
     if section.method == "pareto":
-        table, marked["knee"] = pareto.pareto_table(compared)
+        table, marked["knee"] = pareto.pareto_table(designs)
         tables.insert(0, table)
-    files, wrong = optimum_files(study, compared, marked)
+    files, wrong = optimum_files(study, designs, marked)
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
-    warnings = (*doubts, *_warnings(study, evaluator, designs), *wrong)
-    drawn = {"compared": compared, "best": lambda: best_design(compared)}
+    warnings = (*doubts, *_warnings(evaluator, designs), *wrong)
+    drawn = {"designs": designs, "best": lambda: best_design(designs)}
     return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files, drawn=drawn)
 
 
@@ -166,7 +163,7 @@ def _doubts(ending: searching.Ending, budget: int) -> Iterator[str]:
                    f"{100 * searching.AGREEMENT:g} % of the best{lost}; {more}")  # fmt: skip
 
 
-def _none_feasible(designs: JudgedDesigns) -> str:
+def _none_feasible(designs: Designs) -> str:
     reasons = designs.counted()
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
@@ -174,13 +171,13 @@ def _none_feasible(designs: JudgedDesigns) -> str:
     return f"no design of {len(designs)} is feasible: {told}"
 
 
-def _finished_part(study: Study, designs: JudgedDesigns, meanings: Mapping[str, tuple[str, str]]) -> Result:
-    table = designs_table(Comparison(study, designs, np.ones((1, len(designs.goals))), meanings))
+def _finished_part(designs: Designs) -> Result:
+    table = designs_table(designs)
     told = f"interrupted after {len(designs)} designs; --resume goes on"
     return Result("optimize", {table.name: table}, (told,), {"designs": len(designs)}, interrupted=told)
 
 
-def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Iterator[str]:
+def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[str]:
     reasons = designs.counted()
     for reason, count, first in reasons[:MAX_REASONS]:
         place = in_words(designs.numbers(first))
@@ -190,28 +187,28 @@ def _warnings(study: Study, evaluator: Evaluator, designs: JudgedDesigns) -> Ite
     if evaluator.question is None or evaluator.question.rule != "gauss":
         return
     for each, error in designs.errors.items():
-        loose = designs.feasible & (error > 2 * evaluator.question.tolerance * np.abs(designs.values[each]))
+        loose = designs.feasible & (error > 2 * evaluator.question.tolerance * np.abs(designs.found[each]))
         if loose.any():
             told = f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for"
             yield f"{told}; see {each.name}_error"
 
 
-def optimum_files(study: Study, compared: Comparison, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
+def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
     """Texts by file name, ``optimum.yaml`` for the first row of weights, ``optimum_2.yaml`` ..., and what is wrong.
 
     `marked` are further designs worth a file, by its name without the suffix.
     """
-    goals = [each.name for each in compared.designs.goals]
+    goals = [each.name for each in designs.goals]
     wanted = {}
-    for row, winner in enumerate(compared.winners.tolist()):
-        weights = ", ".join(f"{each} {weight:g}" for each, weight in zip(goals, compared.weights[row], strict=True))
+    for row, winner in enumerate(designs.winners.tolist()):
+        weights = ", ".join(f"{each} {weight:g}" for each, weight in zip(goals, designs.weights[row], strict=True))
         name = f"optimum_{row + 1}" if row else "optimum"
         wanted[name] = winner, f"Optimum of {study.name} for the weights {weights}"
     wanted |= {name: (k, f"{name.capitalize()} of the Pareto front of {study.name}") for name, k in marked.items()}
     files: dict[str, str] = {}
     doubts = []
     for name, (k, heading) in wanted.items():
-        numbers = compared.designs.numbers(k)
+        numbers = designs.numbers(k)
         heading = f"{heading}: {in_words(numbers)}"
         data = changed_data(study, numbers)
         try:
@@ -239,10 +236,10 @@ def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]
     return alone.mechanism.forward.modes == mechanism.forward.modes
 
 
-def best_design(compared: Comparison) -> tuple[Study, Result]:
+def best_design(designs: Designs) -> tuple[Study, Result]:
     """The design that is best on the whole as a study, and its workspace where that was judged, or else its motion."""
-    best = variant(compared.study, compared.designs.numbers(compared.best))
-    if best.workspace is not None and any(each.command == "workspace" for each in compared.designs.goals):
+    best = variant(designs.study, designs.numbers(designs.best))
+    if best.workspace is not None and any(each.command == "workspace" for each in designs.goals):
         # The region is drawn, not its indices.
         plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)

@@ -312,10 +312,19 @@ class _Program:
         steepest = np.abs(slopes[2]).max(axis=1, initial=0.0)
         self.lengths = np.maximum(steepest, np.maximum(FLAT_SLOPE * np.abs(np.nan_to_num(values[2])), TINY))
         self._scales = [np.array([scale]), np.full(len(values[1]), scale), self.lengths]
-        self._at, self._slopes = begin.copy(), [a / b[:, None] for a, b in zip(slopes, self._scales, strict=True)]
-        self._values = [np.nan_to_num(a / b) for a, b in zip(values, self._scales, strict=True)]
+        values, self._slopes = self._in_parts(values, slopes)
+        self._at, self._values = begin.copy(), [np.nan_to_num(part) for part in values]
         self._known: dict[bytes, list[Floats]] = {}
         self._known_slopes = {self._at.tobytes(): self._slopes}
+
+    def _in_parts(self, values: list[Floats], slopes: list[Floats]) -> tuple[list[Floats], list[Floats]]:
+        return (
+            [part / scale for part, scale in zip(values, self._scales, strict=True)],
+            [part / scale[:, None] for part, scale in zip(slopes, self._scales, strict=True)],
+        )
+
+    def _straight(self, u: Floats) -> list[Floats]:
+        return [part + slope @ (u - self._at) for part, slope in zip(self._values, self._slopes, strict=True)]
 
     def terms(self, u: Floats) -> list[Floats]:
         """The smooth sum, the rows that bound each worst, and what may not be positive."""
@@ -323,10 +332,9 @@ class _Program:
         if key not in self._known:
             rows = self._descent.at(u, self._step)[:1]
             found = [part[0] / scale for part, scale in zip(self._descent.terms(rows), self._scales, strict=True)]
-            straight = [a + b @ (u - self._at) for a, b in zip(self._values, self._slopes, strict=True)]
             impossible = np.isnan(found[0]).any() or np.isnan(found[1]).any()
             told = bool((found[2] > 0).any())
-            found = [np.where(np.isnan(new), line, new) for new, line in zip(found, straight, strict=True)]
+            found = [np.where(np.isnan(new), line, new) for new, line in zip(found, self._straight(u), strict=True)]
             if impossible and not told:
                 found[0] = found[0] + NO_VALUE_COST
             self._known = {key: found}
@@ -336,11 +344,8 @@ class _Program:
         """Slopes of the terms, each of shape (columns, n)."""
         key = u.tobytes()
         if key not in self._known_slopes:
-            values, slopes = self._descent.linear(u, self._step)
-            values = [a / b for a, b in zip(values, self._scales, strict=True)]
-            slopes = [a / b[:, None] for a, b in zip(slopes, self._scales, strict=True)]
-            known = [np.isfinite(part) for part in values]
-            straight = [a + b @ (u - self._at) for a, b in zip(self._values, self._slopes, strict=True)]
+            values, slopes = self._in_parts(*self._descent.linear(u, self._step))
+            known, straight = [np.isfinite(part) for part in values], self._straight(u)
             self._slopes = [
                 np.where(good[:, None], new, old) for good, new, old in zip(known, slopes, self._slopes, strict=True)
             ]

@@ -16,7 +16,7 @@ from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
 from mechdesign.analyses.poses import POSES_AT_ONCE, solve_poses, study_poses
-from mechdesign.analyses.region.panels import BATCH
+from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, split
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.expressions import Number

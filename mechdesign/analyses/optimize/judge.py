@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -10,13 +10,15 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube
 from mechdesign.journal import Journal, digest
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
+from mechdesign.results import Column
 from mechdesign.study import Study
 
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
@@ -26,26 +28,34 @@ SLOW_DESIGNS_AT_ONCE = 16
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedDesigns:
-    """Evaluated designs; arrays are of shape (designs,).
+class Designs:
+    """Evaluated designs, compared by the weighted sums of their normalised goals [S1, eqs. 27, 28].
+
+    Arrays are of shape (designs,).
 
     Parameters
     ----------
-    values : dict of Goal to ndarray
-        Of the goals and of what the conditions bound; nan where there is none.
+    found : dict of Goal to ndarray
+        Values of the goals and of what the conditions bound; nan where there is none.
     errors : dict of Goal to ndarray
         Estimated errors, of goals that have any.
     codes, words : ndarray of int, list of str
         Why a design cannot be built: ``words[code]``, empty where it can.
+    weights : ndarray, shape (rows, goals)
+    meanings : mapping
+        Unit and meaning of indices of the workspace, by column.
     """
 
+    study: Study
     variables: dict[str, Floats]
     goals: tuple[Goal, ...]
     conditions: tuple[Goal, ...]
-    values: dict[Goal, Floats]
+    found: dict[Goal, Floats]
     errors: dict[Goal, Floats]
     codes: NDArray[np.int32]
     words: list[str]
+    weights: Floats
+    meanings: Mapping[str, tuple[str, str]]
 
     def __len__(self) -> int:
         return len(self.codes)
@@ -59,7 +69,7 @@ class JudgedDesigns:
         """Designs by why they are infeasible: that they cannot be built, else every condition that they miss."""
         found = {word: self.codes == code for code, word in enumerate(self.words) if word}
         built = self.codes == 0
-        return found | {f"not {each.name}": built & ~each.met(self.values[each]) for each in self.conditions}
+        return found | {f"not {each.name}": built & ~each.met(self.found[each]) for each in self.conditions}
 
     @cached_property
     def reasons(self) -> NDArray[np.object_]:
@@ -78,6 +88,83 @@ class JudgedDesigns:
         """Why designs are infeasible, the most frequent first: reason, how many designs, and the first."""
         found = [(word, int(rows.sum()), int(rows.argmax())) for word, rows in self.failures.items() if rows.any()]
         return sorted(found, key=lambda each: (-each[1], each[0]))
+
+    @cached_property
+    def values(self) -> Floats:
+        """Values of the goals, shape (designs, goals)."""
+        return np.stack([self.found[each] for each in self.goals], axis=1)
+
+    @cached_property
+    def _ends(self) -> tuple[Floats, Floats]:
+        """Smallest and largest value of each goal over the feasible designs; without one no range is left."""
+        inside = self.values[self.feasible]
+        return inside.min(axis=0, initial=np.inf), inside.max(axis=0, initial=-np.inf)
+
+    @cached_property
+    def cpi(self) -> Floats:
+        """Sum of the normalised goals; nan where a design is not feasible."""
+        return self.score(np.ones(len(self.goals)))
+
+    @cached_property
+    def winners(self) -> Ints:
+        """The best design for each row of weights, the first of equals."""
+        scores = [np.where(self.feasible, self.score(row), -np.inf) for row in self.weights]
+        return np.array([np.argmax(score) for score in scores], dtype=np.intp)
+
+    @property
+    def best(self) -> int:
+        """The optimum that is best on the whole."""
+        return int(self.winners[np.argmax(self.cpi[self.winners])])
+
+    def score(self, row: Floats) -> Floats:
+        """Weighted sum of the normalised goals of every design; nan where it is not feasible."""
+        return np.where(self.feasible, self.score_of(self.values, row), np.nan)
+
+    def score_of(self, values: Floats, row: Floats) -> Floats:
+        """Weighted sums of other designs, of values in the shape (designs, goals), normalised by the same bounds.
+
+        Each goal counts as the fraction of its range over the feasible designs.
+        """
+        total = np.zeros(len(values))
+        for k in np.flatnonzero(row).tolist():
+            total += row[k] * self._normalised(values, k)
+        return total
+
+    def share(self, k: int) -> Floats:
+        """A goal of every design as a fraction of its range over the feasible ones; nan where it is not feasible."""
+        return np.where(self.feasible, self._normalised(self.values, k), np.nan)
+
+    def _normalised(self, values: Floats, k: int) -> Floats:
+        """A goal as a fraction of its range, 1 the best [S1, eq. 27]; 0 where there is none."""
+        low, high = (end[k] for end in self._ends)
+        if not high > low:
+            return np.zeros(len(values))
+        share = (values[:, k] - low) / (high - low)
+        return np.asarray(1 - share if self.goals[k].smallest else share)
+
+    def unit_of(self, name: str) -> str:
+        """Unit of a goal, or of a variable that is a place of the geometry; none for a parameter."""
+        for each in self.goals:
+            if each.name == name:
+                return self._unit_and_meaning(each)[0]
+        place = self.study.mechanism.description.places.get(name)
+        return self.study.units.label(place.quantity) if place is not None else ""
+
+    def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
+        """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
+        for name, column in self.variables.items():
+            yield Column(name, column[rows], self.unit_of(name), "design variable")
+        for each in self.goals:
+            yield Column(each.name, self.found[each][rows], *self._unit_and_meaning(each))
+        for each, error in self.errors.items() if errors else ():
+            if each in self.goals:
+                meaning = f"estimated error of {each.name}"
+                yield Column(f"{each.name}_error", error[rows], self._unit_and_meaning(each)[0], meaning)
+        yield from shared(self.study.units, CPI=self.cpi[rows])
+
+    def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
+        worst = ("", f"worst row of {judged.name}")
+        return self.meanings.get(judged.column, worst) if judged.regional else worst
 
 
 class Judge:
@@ -158,15 +245,15 @@ class Judge:
         found.table[:, self.layout.code] = codes
         return found.table
 
-    def designs(self) -> JudgedDesigns:
-        """Everything evaluated so far."""
+    def designs(self, weights: Floats, meanings: Mapping[str, tuple[str, str]]) -> Designs:
+        """Everything evaluated so far; see `Designs` of the arguments."""
         head = self.layout.head
         found = np.concatenate([np.empty((0, head)), *(rows[:, :head] for rows in self._found)])
         asked = np.concatenate([np.empty((0, len(self._names))), *self._asked])
         errors = zip(self.layout.column, found[:, self.layout.errors].T, strict=True)
-        return JudgedDesigns(
-            dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
+        return Designs(
+            self.study, dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
             dict(zip(self.layout.column, found[:, self.layout.values].T, strict=True)),
             {each: column for each, column in errors if not np.isnan(column).all()},
-            found[:, self.layout.code].astype(np.int32), [*self._words],
+            found[:, self.layout.code].astype(np.int32), [*self._words], weights, meanings,
         )  # fmt: skip

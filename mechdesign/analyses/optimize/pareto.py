@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mechdesign.analyses.optimize.explorer import Explorer, Spent
+from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.search import sample
-from mechdesign.analyses.optimize.tables import Comparison
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table
 
@@ -126,18 +126,17 @@ def crowding(values: Floats) -> Floats:
     return np.asarray(calc_crowding_distance(values) * values.shape[1])
 
 
-def pareto_table(compared: Comparison) -> tuple[Table, int]:
+def pareto_table(designs: Designs) -> tuple[Table, int]:
     """The front over all feasible designs that were evaluated, the best of the first goal first, and its knee's row."""
-    designs = compared.designs
     feasible = np.flatnonzero(designs.feasible)
-    values = compared.values[feasible] * [1 if each.smallest else -1 for each in designs.goals]
+    values = designs.values[feasible] * [1 if each.smallest else -1 for each in designs.goals]
     on_front = front(values)
     on_front = on_front[np.lexsort(values[on_front].T[::-1])]
     on_front = on_front[distinct(values[on_front])]
     rows, values = feasible[on_front], values[on_front]
     marked = np.arange(len(rows)) == knee(values)
     columns = (
-        *compared.columns(rows),
+        *designs.columns(rows),
         Column("knee", marked, "", "1 at the design farthest from the plane through the extremes of the front"),
         Column("crowding", crowding(values), "", "gap between the neighbours on the front; inf at its ends"),
     )

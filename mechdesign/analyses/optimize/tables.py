@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.columns import shared
-from mechdesign.analyses.optimize.goals import Goal
-from mechdesign.analyses.optimize.judge import Judge, JudgedDesigns
+from mechdesign.analyses.optimize.judge import Designs, Judge
 from mechdesign.analyses.optimize.variables import BOUND_ROUNDING, Batch, bounds, steps
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
@@ -22,129 +19,41 @@ BEST_DISTANCE = 0.05
 AT_BOUND = 1e-4
 
 
-class Comparison:
-    """Designs compared by the weighted sums of their normalised goals [S1, eqs. 27, 28].
-
-    Parameters
-    ----------
-    weights : ndarray, shape (rows, goals)
-    meanings : mapping
-        Unit and meaning of indices of the workspace, by column.
-
-    Attributes
-    ----------
-    cpi : ndarray, shape (designs,)
-        Sum of the normalised goals; nan where a design is not feasible.
-    winners : ndarray of int, shape (rows,)
-        The best design for each row of weights, the first of equals.
-    """
-
-    def __init__(
-        self, study: Study, designs: JudgedDesigns, weights: Floats, meanings: Mapping[str, tuple[str, str]]
-    ) -> None:
-        self.study, self.designs, self.weights, self.meanings = study, designs, weights, meanings
-        self.values = np.stack([designs.values[each] for each in designs.goals], axis=1)
-        inside = self.values[designs.feasible]
-        # Without a feasible design no range is left.
-        self._low, self._high = inside.min(axis=0, initial=np.inf), inside.max(axis=0, initial=-np.inf)
-        self.cpi = self.score(np.ones(len(designs.goals)))
-        scores = [np.where(designs.feasible, self.score(row), -np.inf) for row in weights]
-        self.winners: Ints = np.array([np.argmax(score) if len(score) else 0 for score in scores], dtype=np.intp)
-
-    def score(self, row: Floats) -> Floats:
-        """Weighted sum of the normalised goals of every design; nan where it is not feasible."""
-        return np.where(self.designs.feasible, self.score_of(self.values, row), np.nan)
-
-    def score_of(self, values: Floats, row: Floats) -> Floats:
-        """Weighted sums of other designs, of values in the shape (designs, goals), normalised by the same bounds.
-
-        Each goal counts as the fraction of its range over the feasible designs.
-        """
-        total = np.zeros(len(values))
-        for k in np.flatnonzero(row).tolist():
-            total += row[k] * self._normalised(values, k)
-        return total
-
-    def share(self, k: int) -> Floats:
-        """A goal of every design as a fraction of its range over the feasible ones; nan where it is not feasible."""
-        return np.where(self.designs.feasible, self._normalised(self.values, k), np.nan)
-
-    def _normalised(self, values: Floats, k: int) -> Floats:
-        """A goal as a fraction of its range, 1 the best [S1, eq. 27]; 0 where there is none."""
-        low, high = self._low[k], self._high[k]
-        if not high > low:
-            return np.zeros(len(values))
-        share = (values[:, k] - low) / (high - low)
-        return np.asarray(1 - share if self.designs.goals[k].smallest else share)
-
-    @property
-    def best(self) -> int:
-        """The optimum that is best on the whole."""
-        return int(self.winners[np.argmax(self.cpi[self.winners])])
-
-    def unit_of(self, name: str) -> str:
-        """Unit of a goal, or of a variable that is a place of the geometry; none for a parameter."""
-        for each in self.designs.goals:
-            if each.name == name:
-                return self._unit_and_meaning(each)[0]
-        place = self.study.mechanism.description.places.get(name)
-        return self.study.units.label(place.quantity) if place is not None else ""
-
-    def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
-        """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
-        designs = self.designs
-        for name, column in designs.variables.items():
-            yield Column(name, column[rows], self.unit_of(name), "design variable")
-        for each in designs.goals:
-            yield Column(each.name, designs.values[each][rows], *self._unit_and_meaning(each))
-        for each, error in designs.errors.items() if errors else ():
-            if each in designs.goals:
-                meaning = f"estimated error of {each.name}"
-                yield Column(f"{each.name}_error", error[rows], self._unit_and_meaning(each)[0], meaning)
-        yield from shared(self.study.units, CPI=self.cpi[rows])
-
-    def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
-        worst = ("", f"worst row of {judged.name}")
-        return self.meanings.get(judged.column, worst) if judged.regional else worst
-
-
-def optimum_table(compared: Comparison) -> Table:
+def optimum_table(designs: Designs) -> Table:
     """The best design for each row of weights."""
-    study, rows, variables = compared.study, compared.winners, compared.designs.variables
-    scores = [compared.score(row)[winner] for row, winner in zip(compared.weights, rows, strict=True)]
+    study, rows, variables = designs.study, designs.winners, designs.variables
+    scores = [designs.score(row)[winner] for row, winner in zip(designs.weights, rows, strict=True)]
     parameters = {name: column[rows] for name, column in variables.items() if name in study.parameters.nominal}
     following = {
         name: np.asarray(value)
         for name, value in study.parameters.values(parameters).items()
         if name not in variables and np.ndim(value)
     }
-    weights = zip(compared.designs.goals, compared.weights.T, strict=True)
+    weights = zip(designs.goals, designs.weights.T, strict=True)
     columns = (
         *(Column(f"w_{each.name}", column, "", f"weight of {each.name}") for each, column in weights),
-        *compared.columns(rows),
+        *designs.columns(rows),
         *shared(study.units, score=scores),
         *(Column(name, value, "", "parameter that follows from the variables") for name, value in following.items()),
-        Column("active", _active(compared), "", "bounds and conditions that the optimum lies at"),
+        Column("active", _active(designs), "", "bounds and conditions that the optimum lies at"),
     )
     return Table("optimum", columns, "the best design for each set of weights")
 
 
-def designs_table(compared: Comparison) -> Table:
+def designs_table(designs: Designs) -> Table:
     """Every design that was evaluated."""
-    designs = compared.designs
     columns = (
-        *compared.columns(slice(None), errors=True),
+        *designs.columns(slice(None), errors=True),
         Column("feasible", designs.feasible, "", "1 where the design can be built and meets every requirement"),
         Column("reason", designs.reasons, "", "why it is not feasible"),
     )
     return Table("designs", columns, "every design that was evaluated")
 
 
-def bounds_table(compared: Comparison) -> Table:
+def bounds_table(designs: Designs) -> Table:
     """Extremes of each goal, by which it is normalised, and where they are."""
-    designs = compared.designs
     names = [*(each.name for each in designs.goals), "CPI"]
-    values = np.where(designs.feasible[:, None], np.column_stack([compared.values, compared.cpi]), np.nan)
+    values = np.where(designs.feasible[:, None], np.column_stack([designs.values, designs.cpi]), np.nan)
     low, high = np.nanargmin(values, axis=0), np.nanargmax(values, axis=0)
     columns = [
         Column("index", np.array(names), "", "index"),
@@ -152,7 +61,7 @@ def bounds_table(compared: Comparison) -> Table:
         Column("max", values[high, np.arange(len(names))], "", "largest value"),
     ]
     for name, column in designs.variables.items():
-        unit = compared.unit_of(name)
+        unit = designs.unit_of(name)
         columns += [
             Column(f"{name}_at_min", column[low], unit, f"{name} of the design with the smallest value"),
             Column(f"{name}_at_max", column[high], unit, f"{name} of the design with the largest value"),
@@ -160,14 +69,14 @@ def bounds_table(compared: Comparison) -> Table:
     return Table("bounds", tuple(columns), "extremes of each index over the feasible designs")
 
 
-def best_table(compared: Comparison) -> Table:
+def best_table(designs: Designs) -> Table:
     """The best designs for each row of weights, of which none is next to a better one."""
-    designs, section = compared.designs, compared.study.optimize
-    step = steps(compared.study, {name: column[compared.winners] for name, column in designs.variables.items()})
+    section = designs.study.optimize
+    step = steps(designs.study, {name: column[designs.winners] for name, column in designs.variables.items()})
     gridded = section is not None and section.method == "grid"
     chosen: list[tuple[int, int, int, float]] = []
-    for row, weights in enumerate(compared.weights):
-        score = np.where(designs.feasible, compared.score(weights), -np.inf)
+    for row, weights in enumerate(designs.weights):
+        score = np.where(designs.feasible, designs.score(weights), -np.inf)
         for rank in range(MAX_BEST):
             k = int(np.argmax(score))
             if score[k] == -np.inf:
@@ -182,18 +91,18 @@ def best_table(compared: Comparison) -> Table:
     columns = (
         Column("optimum", row_numbers, "", "row of optimum.csv whose weights are taken"),
         Column("rank", ranks, "", "1 is the optimum"),
-        *compared.columns(picked),
-        *shared(compared.study.units, score=scores),
+        *designs.columns(picked),
+        *shared(designs.study.units, score=scores),
     )
     return Table("best", columns, "the best designs for each set of weights, none of them next to a better one")
 
 
-def _active(compared: Comparison) -> NDArray[np.object_]:
+def _active(designs: Designs) -> NDArray[np.object_]:
     """Which bounds and conditions each optimum lies at, in words: ``l_a from, workspace.area at least 4``.
 
     On a grid an upper bound holds a design that it leaves no further step.
     """
-    study, designs, rows = compared.study, compared.designs, compared.winners
+    study, rows = designs.study, designs.winners
     assert study.optimize is not None
     at = {name: column[rows] for name, column in designs.variables.items()}
     step = steps(study, at)
@@ -206,17 +115,17 @@ def _active(compared: Comparison) -> NDArray[np.object_]:
             sides = ["from"] * bool(at[name][k] - low[k] <= near[k]) + ["to"] * bool(high[k] - at[name][k] <= above[k])
             words += [f"{name} {' and '.join(sides)}"] if sides else []
     for each in designs.conditions:
-        values = designs.values[each]
+        values = designs.found[each]
         far = AT_BOUND * max(abs(each.bound), np.ptp(values[designs.feasible]))
         for words, value in zip(held, values[rows].tolist(), strict=True):
             words += [each.name] if abs(value - each.bound) <= far else []
     return np.array([", ".join(words) for words in held], dtype=object)
 
 
-def sensitivity_table(compared: Comparison, judge: Judge) -> Table:
+def sensitivity_table(designs: Designs, judge: Judge) -> Table:
     """How the score changes a step down and a step up each variable, the others held."""
-    study, names = compared.study, list(compared.designs.variables)
-    at = {name: column[compared.winners] for name, column in compared.designs.variables.items()}
+    study, names = designs.study, list(designs.variables)
+    at = {name: column[designs.winners] for name, column in designs.variables.items()}
     step = np.stack([*steps(study, at).values()], axis=1)
     optima = np.stack([*at.values()], axis=1)
     # By optimum, variable and direction.
@@ -233,8 +142,8 @@ def sensitivity_table(compared: Comparison, judge: Judge) -> Table:
     which = np.full(inside.shape, len(asked))
     which[inside] = back.ravel()
     changes = np.empty(inside.shape)
-    for row, (weights, winner) in enumerate(zip(compared.weights, compared.winners, strict=True)):
-        gained = compared.score_of(values, weights) - compared.score_of(compared.values[[winner]], weights)
+    for row, (weights, winner) in enumerate(zip(designs.weights, designs.winners, strict=True)):
+        gained = designs.score_of(values, weights) - designs.score_of(designs.values[[winner]], weights)
         changes[row] = np.append(np.where(feasible, gained, np.nan), np.nan)[which[row]]
     down, up = changes.reshape(-1, 2).T
     meaning = "change of the score one step {}, nan where that leaves the bounds or is infeasible"

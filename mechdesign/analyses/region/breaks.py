@@ -70,7 +70,7 @@ def signatures(intervals: Intervals, margins: int) -> Ints:
 
 
 def all_breaks(
-    designs: Designs, reach: Floats, samples: int, intervals: Intervals, design: Ints, angle: Floats
+    designs: Designs, reach: Floats, intervals: Intervals, design: Ints, angle: Floats
 ) -> tuple[Ints, Floats]:
     """All breaks between neighbouring rays of a design that differ, also where several lie between two rays.
 
@@ -80,8 +80,6 @@ def all_breaks(
     Parameters
     ----------
     reach : ndarray, shape (designs,)
-    samples : int
-        Samples along each ray.
     intervals, design, angle
         What was traced: rays ascending by design and angle.
 
@@ -138,7 +136,7 @@ def all_breaks(
                 f"seen from ({centre.real:g}, {centre.imag:g}) the boundary of the region is lost in rounding: "
                 "move scan.about nearer to the region or into it"
             )
-        intervals = trace(designs, both, rays, reach[both], samples)
+        intervals = trace(designs, both, rays, reach[both])
         codes = signatures(intervals, len(field.labels))
         left = np.flatnonzero((codes[1:] != codes[:-1]) & (of[1:] == of[:-1]))
         believed = np.isin(group, about[left])
@@ -150,14 +148,9 @@ def all_breaks(
 
 
 def _meetings(intervals: Intervals, codes: Ints, left: Ints, leading: Flags) -> Meetings:
-    """What may meet between the rays `left` and those that follow them, by how they differ.
+    """What may meet between the rays `left` and those that follow them, by how their signatures `codes` differ.
 
-    Parameters
-    ----------
-    codes : ndarray of int, shape (rays,)
-        Signatures.
-    leading : ndarray of bool, shape (margins,)
-        Margins to be followed rather than others, which may end at them.
+    Margins that are `leading` are followed rather than others, which may end at them.
     """
     found = [np.zeros(0, dtype=MEETING)]
     kinds = np.unique(np.stack([codes[left], codes[left + 1]]), axis=1, return_inverse=True)[1].ravel()

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.region.panels import SINGLE, Panels, find_panels
+from mechdesign.analyses.region.panels import Panels, find_panels
 from mechdesign.analyses.region.pieces import Pieces
-from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, ray_through, trace
+from mechdesign.analyses.region.rays import SAME_ROOT, SINGLE, Designs, Intervals, ray_through
 from mechdesign.analyses.region.regions import RAYS, Region, regions
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -25,6 +25,8 @@ BESIDE = 1e-9
 GRID = 33
 # An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
 INSET = 1e-6
+# Places of a ray's nodes between both curves.
+FRACTIONS = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
 # Poses of all regions together, about (a question may cost much at each), and rays of a patch at least.
 MAX_POSES = 2000
 MIN_RAYS = 3
@@ -53,7 +55,7 @@ class Patch:
 
     def grid(self, about: complex) -> Complexes:
         """Nodes, shape (rays, GRID), denser towards both curves."""
-        radius = self.inner[:, None] + self.fractions() * (self.outer - self.inner)[:, None]
+        radius = self.inner[:, None] + FRACTIONS * (self.outer - self.inner)[:, None]
         return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
 
     def middle(self, about: complex) -> complex:
@@ -67,12 +69,8 @@ class Patch:
         inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
         return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
 
-    def fractions(self) -> Floats:
-        """Places of a ray's nodes between both curves."""
-        return np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
 
-
-def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterator[Patch]:
+def patches(panels: Panels, rays: int) -> Iterator[Patch]:
     """Patches of a single design, with about `rays` rays over all panels (both ends of each included)."""
     total = float(np.sum(panels.high - panels.low))
     for low, high in zip(panels.low, panels.high, strict=True):
@@ -80,14 +78,14 @@ def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterat
         # Denser towards the ends, where cusps are thin and corners sharp.
         theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
         zero = np.zeros(number, dtype=np.intp)
-        traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
+        traced = panels.trace(zero, theta, SLACK)
         if (traced.counts[[0, -1]] != traced.counts[number // 2]).any():
             # At its very ends a panel meets its neighbour, or an interval vanishes.
             theta = np.clip(theta, low + BESIDE * (high - low), high - BESIDE * (high - low))
-            traced = trace(designs, zero, theta, panels.reach[zero], samples, SLACK)
+            traced = panels.trace(zero, theta, SLACK)
         ray, inner, outer, enters, leaves = _whole(traced, SAME_ROOT * float(panels.reach[0]))
         counts = np.bincount(ray, minlength=number)
-        usual = int(np.argmax(np.bincount(counts)))
+        usual = _most(counts)
         kept = np.flatnonzero(counts == usual)
         first = np.searchsorted(ray, kept)
         for slot in range(usual):
@@ -95,13 +93,13 @@ def patches(designs: Designs, panels: Panels, rays: int, samples: int) -> Iterat
             yield Patch(theta[kept], inner[at], outer[at], _most(enters[at]), _most(leaves[at]))
 
 
-def patches_of_pieces(pieces: Pieces, rays: int, samples: int) -> list[Patch]:
+def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:
     """Patches of a single design, piece by piece; about `rays` rays over all panels."""
     total = float(np.sum(pieces.panels.high - pieces.panels.low))
     found = []
-    for number, (designs, panels) in enumerate(pieces.all(), start=1):
+    for number, panels in enumerate(pieces.all(), start=1):
         own = round(rays * float(np.sum(panels.high - panels.low)) / total)
-        found += [replace(patch, piece=number) for patch in patches(designs, panels, own, samples)]
+        found += [replace(patch, piece=number) for patch in patches(panels, own)]
     return found
 
 
@@ -113,9 +111,9 @@ def _whole(traced: Intervals, near: float) -> tuple[Ints, Floats, Floats, Ints, 
     return ray[begins], traced.inner[begins], traced.outer[ends], traced.enters[begins], traced.leaves[ends]
 
 
-def _most(margins: Ints) -> int:
-    """The margin that most rays name: single rays may meet another (a corner)."""
-    names, counts = np.unique(margins, return_counts=True)
+def _most(values: Ints) -> int:
+    """What most rays have: single rays may meet another margin (a corner)."""
+    names, counts = np.unique(values, return_counts=True)
     return int(names[np.argmax(counts)])
 
 
@@ -151,13 +149,12 @@ def workspace_nodes(study: Study) -> Poses:
 
 def _grids(region: Region, most: int) -> list[Complexes]:
     """Nodes of the patches of one region, shape (rays, GRID), on about `most` rays."""
-    designs = Designs(region.field, {}, 1, region.about)
-    panels = find_panels(designs, region.scan, SINGLE)
+    panels = find_panels(Designs(region.field, {}, 1, region.about, region.scan, SINGLE))
     if region.field.same_assembly:
-        designs, panels = Pieces.of(designs, panels, region.scan, SINGLE.samples).only(0)
+        panels = Pieces.of(panels).only(0)
     if not panels.closes[0]:
         return []
-    found = list(patches(designs, panels, min(region.rays or RAYS, most), SINGLE.samples))
+    found = list(patches(panels, min(region.rays or RAYS, most)))
     # Every panel has a fewest number of rays: of too many some are left out, never the ends of a patch: others begin.
     total = sum(float(np.ptp(patch.theta)) for patch in found)
     grids = []

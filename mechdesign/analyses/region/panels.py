@@ -26,31 +26,6 @@ MIDDLE = 0.4871
 NARROW = 1e-3
 
 
-@dataclass(frozen=True)
-class Effort:
-    """How finely the region is looked for.
-
-    Parameters
-    ----------
-    rays : int
-        Rays over the scan.
-    samples : int
-        Samples of each interval, for margins that are not quadratic along rays.
-    cells : int
-        Cells of the raster over the width and height of what the point can reach at most: pieces and holes that hold
-        a circle around a cell are never lost.
-    """
-
-    rays: int
-    samples: int
-    cells: int
-
-
-# One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
-SINGLE = Effort(128, 48, 192)
-BATCH = Effort(16, 12, 24)
-
-
 @dataclass(frozen=True, eq=False)
 class Panels:
     """Panels of all designs, ordered by design and angle.
@@ -69,6 +44,7 @@ class Panels:
         Area that the raster is sure of: that of its cells inside, less what it is not known to.
     """
 
+    designs: Designs
     design: Ints
     low: Floats
     high: Floats
@@ -77,8 +53,12 @@ class Panels:
     intervals: Ints
     seen: Floats
 
+    def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
+        """Rays of designs, as long as they need be; `slack` as in `mechdesign.analyses.region.rays.trace`."""
+        return trace(self.designs, design, theta, self.reach[design], slack)
 
-def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cuts: tuple[float, ...] = ()) -> Panels:
+
+def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     """Divide the scan of every design into panels; `cuts` are further angles where panels end.
 
     Raises
@@ -86,22 +66,22 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     AssemblyError
         If the region has no end.
     """
-    count, samples = designs.count, effort.samples
-    raster = Raster.of(designs, effort.cells, scan)
-    least = raster.farthest(designs.about)
-    design = np.repeat(np.arange(count), effort.rays + 1)
-    angle = np.tile(np.linspace(*scan, effort.rays + 1), count)
-    reach = np.where(least > 0, least, raster.reach(designs.about))
-    reach, intervals = _extent(designs, design, angle, reach, least, samples)
+    count, scan, number = designs.count, designs.scan, designs.effort.rays + 1
+    raster = Raster.of(designs)
+    least = raster.farthest
+    design = np.repeat(np.arange(count), number)
+    angle = np.tile(np.linspace(*scan, number), count)
+    reach = np.where(least > 0, least, raster.reach)
+    reach, intervals = _extent(designs, design, angle, reach, least)
     owner = np.arange(count)
     for _ in range(LOOKS):
-        owner, hidden = raster.hidden(np.unique(owner), designs.about, scan, design, angle, intervals)
+        owner, hidden = raster.hidden(np.unique(owner), design, angle, intervals)
         rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * hidden]))
         if len(rays) == len(design):
             break
         design, angle = rays.real.astype(np.intp), rays.imag
-        reach, intervals = _extent(designs, design, angle, reach, least, samples)
-    found, breaks = all_breaks(designs, reach, samples, intervals, design, angle)
+        reach, intervals = _extent(designs, design, angle, reach, least)
+    found, breaks = all_breaks(designs, reach, intervals, design, angle)
     fixed = np.tile([*scan, *cuts], count)
     owner = np.concatenate([np.repeat(np.arange(count), 2 + len(cuts)), found])
     place, firm = np.concatenate([fixed, breaks]), np.arange(len(fixed) + len(breaks)) < len(fixed)
@@ -117,22 +97,20 @@ def find_panels(designs: Designs, scan: tuple[float, float], effort: Effort, cut
     owner, low, high = owner[:-1][keep], place[:-1][keep], place[1:][keep]
     # A panel is empty where a ray inside it meets nothing; a narrow one may hold a tip that is lost in rounding.
     middle = low + MIDDLE * (high - low)
-    counts = trace(designs, owner, middle, reach[owner], samples).counts
+    counts = trace(designs, owner, middle, reach[owner]).counts
     full = (counts > 0) | (high - low < NARROW)
     closes = np.bincount(design, intervals.counts, count) > 0
     area, doubt = raster.area
-    return Panels(owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
+    return Panels(designs, owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
 
 
-def _extent(
-    designs: Designs, design: Ints, theta: Floats, reach: Floats, least: Floats, samples: int
-) -> tuple[Floats, Intervals]:
+def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats, least: Floats) -> tuple[Floats, Intervals]:
     """Trace rays, doubling the reach until no ray ends inside; returns the reach needed and the intervals.
 
     The reach of a design is `least` at least.
     """
     for _ in range(DOUBLINGS):
-        intervals = trace(designs, design, theta, reach[design], samples)
+        intervals = trace(designs, design, theta, reach[design])
         beyond = np.bincount(design, intervals.beyond, designs.count) > 0
         if not beyond.any():
             break

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.region.panels import MIDDLE, Panels
-from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, is_turn, ray_through, trace
+from mechdesign.analyses.region.rays import SAME_ROOT, Intervals, is_turn, ray_through
 from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -39,7 +39,6 @@ class Pieces:
 
     Parameters
     ----------
-    scan : (float, float)
     number : ndarray of int, shape (designs,)
         How many pieces each region has; 0 where it is empty.
     drawn : ndarray of bool, shape (designs,)
@@ -50,68 +49,47 @@ class Pieces:
         Of each interval of each panel, outwards; -1 where there is none, or it has no area.
     """
 
-    designs: Designs
     panels: Panels
-    scan: tuple[float, float]
     number: Ints
     drawn: Flags
     counts: Ints
     piece: Ints
 
     @staticmethod
-    def of(designs: Designs, panels: Panels, scan: tuple[float, float], samples: int) -> Pieces:
-        """Find the pieces of all regions.
-
-        Parameters
-        ----------
-        scan : (float, float)
-            First and last angle of the rays.
-        samples : int
-            Samples of each ray.
-        """
-        counts = np.zeros(len(panels.low), dtype=np.intp)
-        found = Pieces(
-            designs, panels, scan, panels.closes.astype(np.intp), np.ones(designs.count, dtype=bool), counts,
-            np.zeros((len(counts), 0), dtype=np.intp),
-        )  # fmt: skip
-        panel = np.flatnonzero(_doubtful(panels, scan, designs.count)[panels.design])
+    def of(panels: Panels) -> Pieces:
+        """Find the pieces of all regions."""
+        counts, designs = np.zeros(len(panels.low), dtype=np.intp), len(panels.closes)
+        number, drawn = panels.closes.astype(np.intp), np.ones(designs, dtype=bool)
+        found = Pieces(panels, number, drawn, counts, np.zeros((len(counts), 0), dtype=np.intp))
+        panel = np.flatnonzero(_doubtful(panels)[panels.design])
         if not panel.size:
             return found
         counts[panel] = panels.intervals[panel]
-        label = found._joined(samples)
+        label = found._joined()
         owner = np.full(label.max(initial=-1) + 1, -1)
         owner[label[label >= 0]] = np.repeat(panels.design, counts)
-        number = np.bincount(owner, minlength=designs.count)
+        number = np.bincount(owner, minlength=designs)
         several = number > 1
         found = replace(
             found, piece=label, number=np.where(several, number, found.number),
             counts=np.where(several[panels.design], counts, 0),
         )  # fmt: skip
-        return found._ordered(owner, np.flatnonzero(several), samples) if several.any() else found
+        return found._ordered(owner, np.flatnonzero(several)) if several.any() else found
 
-    def only(self, piece: int) -> tuple[Designs, Panels]:
-        """The designs with their regions taken for one piece of each (from 0), and its panels."""
+    def only(self, piece: int) -> Panels:
+        """The panels of one piece of each design (from 0), whose rays meet nothing else."""
+        whole = self.panels
         if not self.counts.any():
-            return self.designs, self.panels
+            return whole
         use = (self.piece == piece).any(axis=1) | (self.counts == 0)
-        panels = replace(
-            self.panels, design=self.panels.design[use], low=self.panels.low[use], high=self.panels.high[use],
-            intervals=self.panels.intervals[use],
-        )  # fmt: skip
-        whole = self.designs
-        return _OnePiece(whole.field, whole.places, whole.count, whole.about, self, piece), panels
+        own = {name: getattr(whole, name)[use] for name in ("design", "low", "high", "intervals")}
+        return _OnePiece(**{**vars(whole), **own}, pieces=self, piece=piece)
 
-    def all(self) -> Iterator[tuple[Designs, Panels]]:
-        """Each piece of a single design, as `only`."""
+    def all(self) -> Iterator[Panels]:
+        """The panels of each piece of a single design."""
         return (self.only(piece) for piece in range(int(self.number[0])))
 
-    def _traced(self, panel: Ints, place: Floats, samples: int) -> Intervals:
-        """Rays of panels, at a part of their width."""
-        panels = self.panels
-        theta = panels.low[panel] + place * (panels.high - panels.low)[panel]
-        return trace(self.designs, panels.design[panel], theta, panels.reach[panels.design[panel]], samples)
-
-    def _joined(self, samples: int) -> Ints:
+    def _joined(self) -> Ints:
         """A label for each interval of each panel, the same where they hang together; -1 where there is none."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
@@ -120,12 +98,13 @@ class Pieces:
         number = np.where(has, np.cumsum(has).reshape(has.shape) - 1, -1)
         one = np.flatnonzero((panels.design[1:] == panels.design[:-1]) & (panels.high[:-1] == panels.low[1:]))
         other = one + 1
-        if is_turn(self.scan):
-            start, stop = np.flatnonzero(panels.low == self.scan[0]), np.flatnonzero(panels.high == self.scan[1])
+        if is_turn(panels.designs.scan):
+            begin, end = panels.designs.scan
+            start, stop = np.flatnonzero(panels.low == begin), np.flatnonzero(panels.high == end)
             _, at_start, at_stop = np.intersect1d(panels.design[start], panels.design[stop], return_indices=True)
             one, other = np.concatenate([one, stop[at_stop]]), np.concatenate([other, start[at_start]])
-        before = self._ends(1, samples)[:, :, one, :, None]
-        after = self._ends(-1, samples)[:, :, other, None, :]
+        before = self._ends(1)[:, :, one, :, None]
+        after = self._ends(-1)[:, :, other, None, :]
         near, far = np.minimum(before[1], after[1]) - np.maximum(before[0], after[0])
         pair, a, b = np.nonzero((near > 0) & (far < TOUCHES * near))
         edges, total = (number[one[pair], a], number[other[pair], b]), int(has.sum())
@@ -134,15 +113,17 @@ class Pieces:
         label[has] = connected_components(graph, directed=False)[1]
         return label
 
-    def _ends(self, side: int, samples: int) -> Floats:
+    def _ends(self, side: int) -> Floats:
         """Both radii of each interval, beside an end of its panel and twice as far; (2, 2, panels, most intervals)."""
-        width = self.panels.high - self.panels.low
+        panels = self.panels
+        width = panels.high - panels.low
         radii = np.full((2, 2, len(width), self.counts.max()), np.nan)
         panel = np.flatnonzero(self.counts)
         for step in BESIDE:
             part = np.minimum(step / width[panel], PART)
-            place = np.concatenate([part, 2 * part])
-            found = self._traced(np.tile(panel, 2), place if side < 0 else 1 - place, samples)
+            place, both = np.concatenate([part, 2 * part]), np.tile(panel, 2)
+            theta = panels.low[both] + (place if side < 0 else 1 - place) * width[both]
+            found = panels.trace(panels.design[both], theta)
             fits = (found.counts.reshape(2, -1) == self.counts[panel]).all(axis=0)
             far, of = np.divmod(found.ray, len(panel))
             use = fits[of]
@@ -153,22 +134,22 @@ class Pieces:
                 break
         return radii
 
-    def _ordered(self, owner: Ints, several: Ints, samples: int) -> Pieces:
+    def _ordered(self, owner: Ints, several: Ints) -> Pieces:
         """Pieces numbered within each design: the sketch's first, then by area."""
-        parts, designs = len(owner), self.designs
+        parts, designs = len(owner), len(self.number)
         panel = np.flatnonzero(self.counts)
         nodes, weights = np.polynomial.legendre.leggauss(NODES)
         low, high = self.panels.low[panel], self.panels.high[panel]
         theta, density = spread(low, high, 0.5 + 0.5 * nodes[:, None], cubic)
         weight = (0.5 * density * weights[:, None]).ravel()
         design = np.tile(self.panels.design[panel], NODES)
-        found = trace(designs, design, theta.ravel(), self.panels.reach[design], samples)
-        label = self.of_intervals(design, theta.ravel(), found, samples)
+        found = self.panels.trace(design, theta.ravel())
+        label = self.of_intervals(design, theta.ravel(), found)
         sector = 0.5 * weight[found.ray] * (found.outer - found.inner) * (found.outer + found.inner)
         area = np.bincount(label[label >= 0], sector[label >= 0], parts)
         with np.errstate(invalid="ignore", divide="ignore"):
-            share = area / np.bincount(owner, area, designs.count)[owner]
-        held = self._holding(several, samples)
+            share = area / np.bincount(owner, area, designs)[owner]
+        held = self._holding(several)
         share[held[held >= 0]] = np.inf
         slit = share < SLIT
         drawn = self.drawn.copy()
@@ -178,22 +159,23 @@ class Pieces:
         rank = np.empty(parts + 1, dtype=np.intp)
         rank[order] = np.arange(parts) - np.searchsorted(owner[order], owner[order])
         rank[:-1][slit] = rank[-1] = -1
-        number = self.number - np.bincount(owner[slit], minlength=designs.count)
+        number = self.number - np.bincount(owner[slit], minlength=designs)
         return replace(self, piece=rank[self.piece], drawn=drawn, number=number)
 
-    def _holding(self, design: Ints, samples: int) -> Ints:
+    def _holding(self, design: Ints) -> Ints:
         """The piece that holds the point's place in the sketch; -1 where none does."""
-        place = self._sketched(design) - self.designs.about
+        (begin, end), about = self.panels.designs.scan, self.panels.designs.about
+        place = self._sketched(design) - about
         reach = self.panels.reach[design]
-        theta = ray_through(place, self.scan[0])
+        theta = ray_through(place, begin)
         # At the centre of the scan one ray is as good as another.
         centre = np.abs(place) <= SAME_ROOT * reach
-        theta = np.where(centre, self.scan[0] + MIDDLE * (self.scan[1] - self.scan[0]), theta)
+        theta = np.where(centre, begin + MIDDLE * (end - begin), theta)
         radius = np.where(centre, 0.0, np.abs(place))
         held = np.full(len(design), -1, dtype=np.intp)
-        known = np.flatnonzero(np.isfinite(place) & (theta <= self.scan[1]))
-        found = trace(self.designs, design[known], theta[known], reach[known], samples)
-        piece = self.of_intervals(design[known], theta[known], found, samples)
+        known = np.flatnonzero(np.isfinite(place) & (theta <= end))
+        found = self.panels.trace(design[known], theta[known])
+        piece = self.of_intervals(design[known], theta[known], found)
         at = radius[known][found.ray]
         inside = (found.inner <= at) & (at <= found.outer)
         held[known[found.ray[inside]]] = piece[inside]
@@ -201,7 +183,7 @@ class Pieces:
 
     def _sketched(self, design: Ints) -> Complexes:
         """The point's place in the sketch of each design: its drives as drawn, as far as it can be assembled so."""
-        field, places = self.designs.field, self.designs.of(design)
+        field, places = self.panels.designs.field, self.panels.designs.of(design)
         mechanism, (x, y) = field.mechanism, field.outputs[:2]
         poses = drawn(mechanism, places)
         valid = np.broadcast_to(poses.valid, design.shape)
@@ -211,21 +193,21 @@ class Pieces:
             found[k] = complex(float(pose.value(x)), float(pose.value(y)))
         return found
 
-    def of_intervals(self, design: Ints, theta: Floats, found: Intervals, samples: int) -> Ints:
-        """The piece of each interval of rays of designs with several pieces; -1 where it has no area."""
-        panel = self._panel_at(design, theta)
-        piece = self._of_counted(panel, found)
+    def of_intervals(self, design: Ints, theta: Floats, found: Intervals) -> Ints:
+        """The piece of each interval of rays; -1 where it has no area, 0 for all of a design of one piece."""
+        piece = np.where(self.number[design[found.ray]] > 1, self._of_counted(design, theta, found), 0)
         # Rays through the end of a panel, or through a single point that divides them, are compared with two beside.
         for step in BESIDE:
             left = np.unique(found.ray[piece == UNKNOWN])
             if not left.size:
                 break
             turned = (theta[left] + step * np.array([[-1], [1]])).ravel()
-            if is_turn(self.scan):
-                turned = self.scan[0] + (turned - self.scan[0]) % (2 * np.pi)
+            if is_turn(self.panels.designs.scan):
+                begin = self.panels.designs.scan[0]
+                turned = begin + (turned - begin) % (2 * np.pi)
             owner = np.tile(design[left], 2)
-            beside = trace(self.designs, owner, turned, self.panels.reach[owner], samples)
-            names = self._of_counted(self._panel_at(owner, turned), beside)
+            beside = self.panels.trace(owner, turned)
+            names = self._of_counted(owner, turned, beside)
             some = np.flatnonzero(np.isin(found.ray, left))
             at = np.searchsorted(left, found.ray[some])
             ends = beside.by_ray(beside.inner, beside.outer, names)
@@ -237,55 +219,40 @@ class Pieces:
                 piece[some] = np.where(np.isinf(overlap[best]), UNKNOWN, told[best])
         return piece
 
-    def _of_counted(self, panel: Ints, found: Intervals) -> Ints:
-        """The piece of each interval of rays within panels; unknown where a ray has more or fewer than its panel."""
-        plain = (found.counts == self.counts[panel]) & (panel >= 0)
+    def _of_counted(self, design: Ints, theta: Floats, found: Intervals) -> Ints:
+        """The piece of each interval of rays; unknown where a ray has more or fewer of them than its panel."""
+        panels = self.panels
+        # NumPy orders complex numbers by both parts.
+        panel = np.searchsorted(panels.design + 1j * panels.low, design + 1j * theta, side="right") - 1
+        plain = (panel >= 0) & (panels.design[panel] == design) & (theta <= panels.high[panel])
+        plain &= found.counts == self.counts[panel]
         slot = np.minimum(found.slot, self.piece.shape[1] - 1)
         return np.where(plain[found.ray], self.piece[panel[found.ray], slot], UNKNOWN)
 
-    def _panel_at(self, design: Ints, theta: Floats) -> Ints:
-        """Panel of each ray; -1 where there is none. NumPy orders complex numbers by both parts."""
-        panels = self.panels
-        at = np.searchsorted(panels.design + 1j * panels.low, design + 1j * theta, side="right") - 1
-        inside = (at >= 0) & (panels.design[at] == design) & (theta <= panels.high[at])
-        return np.where(inside, at, -1)
-
 
 @dataclass(frozen=True, eq=False)
-class _OnePiece(Designs):
-    """Designs whose rays meet one piece of their region only."""
+class _OnePiece(Panels):
+    """Panels whose rays meet one piece of each region only."""
 
     pieces: Pieces
     piece: int
 
-    def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
-        """As `Designs.traced`."""
-        pieces = self.pieces
-        found = pieces.designs.traced(design, theta, reach, samples, slack)
-        rays = np.flatnonzero(pieces.number[design] > 1)
-        if not rays.size:
-            return found
-        some = np.flatnonzero(np.isin(found.ray, rays))
-        part = replace(
-            found, ray=np.searchsorted(rays, found.ray[some]), inner=found.inner[some], outer=found.outer[some],
-            beyond=found.beyond[rays],
-        )  # fmt: skip
-        piece = pieces.of_intervals(design[rays], theta[rays], part, samples)
-        keep = np.ones(len(found.ray), dtype=bool)
-        keep[some] = (piece == self.piece) | ((piece == UNKNOWN) & (self.piece == 0))
-        return found.kept(keep)
+    def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
+        """As `Panels.trace`."""
+        found = super().trace(design, theta, slack)
+        piece = self.pieces.of_intervals(design, theta, found)
+        return found.kept((piece == self.piece) | ((piece == UNKNOWN) & (self.piece == 0)))
 
 
-def _doubtful(panels: Panels, scan: tuple[float, float], count: int) -> Flags:
+def _doubtful(panels: Panels) -> Flags:
     """Designs whose region may have several pieces: several intervals a ray, or rays between that meet nothing."""
+    scan, count = panels.designs.scan, len(panels.closes)
     doubtful = np.bincount(panels.design[panels.intervals != 1], minlength=count) > 0
     apart = panels.low[1:] != panels.high[:-1]
     begins = np.append(True, apart | (panels.design[1:] != panels.design[:-1]))[: len(panels.low)]
     runs = np.bincount(panels.design[begins], minlength=count)
     if is_turn(scan):
-        at_start, at_stop = (
-            np.bincount(panels.design[end], minlength=count)
-            for end in (panels.low == scan[0], panels.high == scan[1])
-        )  # fmt: skip
+        ends = (panels.low == scan[0], panels.high == scan[1])
+        at_start, at_stop = (np.bincount(panels.design[end], minlength=count) for end in ends)
         runs = runs - (at_start & at_stop)
     return np.asarray(doubtful | (runs > 1))

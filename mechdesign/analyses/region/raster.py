@@ -13,8 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.region.rays import Designs, Intervals, ray_through
-from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.model import Term
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # A box is drawn wider by this share, so that rounding leaves nothing outside.
@@ -31,28 +29,25 @@ DOUBLINGS = 12
 class Raster:
     """Cells of a box around the region of each design, by their centres.
 
-    A circle larger than the one around a cell always holds a centre: pieces that hold one are met.
-
-    Parameters
-    ----------
-    low, cell : ndarray of complex, shape (designs,)
-        Lower left corner of the box, and width and height of a cell.
-    inside : ndarray of bool, shape (designs, rows, columns)
-        Whether a cell's centre lies in the region.
+    A circle larger than the one around a cell always holds a centre: pieces that hold one are met. Of each design the
+    lower left corner of the box, width and height of a cell, both complex, and whether the centres of the cells lie in
+    the region, shape (designs, rows, columns).
     """
 
+    designs: Designs
     low: Complexes
     cell: Complexes
     inside: Flags
 
     @staticmethod
-    def of(designs: Designs, cells: int, scan: tuple[float, float]) -> Raster:
-        """Look at `cells` times `cells` places of each design, those within the scan."""
+    def of(designs: Designs) -> Raster:
+        """Look at places of each design, as many as the effort says each way, those within the scan."""
+        cells, (begin, end) = designs.effort.cells, designs.scan
         low, high, bounded = _box(designs)
         for _ in range(DOUBLINGS):
-            found = Raster(low, (high - low) / cells, np.zeros((designs.count, cells, cells), dtype=bool))
+            found = Raster(designs, low, (high - low) / cells, np.zeros((designs.count, cells, cells), dtype=bool))
             for some, z in found._centres(np.arange(designs.count)):
-                inside = designs.inside(z, some) & (ray_through(z - designs.about, scan[0]) <= scan[1])
+                inside = designs.inside(z, some) & (ray_through(z - designs.about, begin) <= end)
                 found.inside[some] = inside.T.reshape(-1, cells, cells)
             rim = found.inside.copy()
             rim[:, 1:-1, 1:-1] = False
@@ -69,52 +64,45 @@ class Raster:
         inside, one = self.inside, self.cell.real * self.cell.imag
         edge = np.zeros(inside.shape, dtype=bool)
         for axis in (1, 2):
-            change = np.diff(inside, axis=axis)
-            one_side, other = [slice(None)] * 3, [slice(None)] * 3
-            one_side[axis], other[axis] = slice(1, None), slice(None, -1)
-            edge[tuple(one_side)] |= change
-            edge[tuple(other)] |= change
+            first, last = inside.take([0], axis), inside.take([-1], axis)
+            edge |= np.diff(inside, axis=axis, prepend=first) | np.diff(inside, axis=axis, append=last)
         return inside.sum(axis=(1, 2)) * one, EDGE * edge.sum(axis=(1, 2)) * one
 
-    def reach(self, about: complex) -> Floats:
-        """Distance from a point to the farthest corner of each box."""
+    @property
+    def reach(self) -> Floats:
+        """Distance from the centre of the rays to the farthest corner of each box."""
         size = self.inside.shape[1] * self.cell
         corners = self.low + np.stack([0 * size, size.real + 0j, 1j * size.imag, size])
-        return np.asarray(np.abs(corners - about).max(axis=0))
+        return np.asarray(np.abs(corners - self.designs.about).max(axis=0))
 
-    def farthest(self, about: complex) -> Floats:
-        """Distance from a point within which all cells inside lie, shape (designs,); 0 where there is none."""
+    @property
+    def farthest(self) -> Floats:
+        """Distance from the centre within which all cells inside lie, shape (designs,); 0 where there is none."""
         found = np.zeros(len(self.low))
         for some, z in self._centres(np.arange(len(self.low))):
-            distance = np.where(self.inside[some].reshape(len(some), -1).T, np.abs(z - about), 0.0).max(axis=0)
+            inside = self.inside[some].reshape(len(some), -1).T
+            distance = np.where(inside, np.abs(z - self.designs.about), 0.0).max(axis=0)
             found[some] = np.where(distance > 0, distance + np.abs(self.cell[some]), 0.0)
         return found
 
-    def hidden(
-        self, some: Ints, about: complex, scan: tuple[float, float], design: Ints, angle: Floats, intervals: Intervals
-    ) -> tuple[Ints, Floats]:
-        """Design and angle of further rays, to what rays have passed by: pieces and holes between two of them.
+    def hidden(self, some: Ints, design: Ints, angle: Floats, intervals: Intervals) -> tuple[Ints, Floats]:
+        """Design and angle of further rays of some designs, to what rays passed by: pieces and holes between two.
 
-        Parameters
-        ----------
-        some : ndarray of int
-            Designs that are looked at.
-        design, angle, intervals
-            The rays, ascending by both; for each design at least those at both ends of the scan.
+        The rays ascend by design and angle; each design has at least those at both ends of the scan.
         """
-        every = np.arange(len(self.low) + 1)
+        every, (begin, end) = np.arange(len(self.low) + 1), self.designs.scan
         first, ends = np.searchsorted(design, every), intervals.by_ray(intervals.inner, intervals.outer)
         owners, angles = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
         for block, z in self._centres(some):
             inside = self.inside[block].reshape(len(block), -1).T
-            way = z - about
-            theta, radius = ray_through(way, scan[0]), np.abs(way)
+            way = z - self.designs.about
+            theta, radius = ray_through(way, begin), np.abs(way)
             at = np.empty(z.shape, dtype=np.intp)
             for lane, k in enumerate(block):
                 rays = angle[first[k] : first[k + 1]]
                 at[:, lane] = first[k] + np.clip(np.searchsorted(rays, theta[:, lane]) - 1, 0, len(rays) - 2)
             before, after = _hold(ends, at, radius), _hold(ends, at + 1, radius)
-            passed = np.where(inside, ~before & ~after, before & after) & (theta < scan[1]) & (theta > scan[0])
+            passed = np.where(inside, ~before & ~after, before & after) & (theta < end) & (theta > begin)
             if not passed.any():
                 continue
             # Of the places between the same two rays the one farthest from both: a piece, and a hole.
@@ -161,41 +149,29 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
     low, high = np.full((2, len(graph.nodes), count), -np.inf), np.full((2, len(graph.nodes), count), np.inf)
     low[:, 0], high[:, 0] = 0.0, 0.0
     places = {**mechanism.nominal, **designs.places}
-    strokes = {b.coordinate.slide: (b.minimum, b.maximum) for b in mechanism.bounds if b.coordinate.kind == "slide"}
-
-    def value(term: Term) -> Value:
-        return places[term] if isinstance(term, str) else term
-
+    strokes = {b.coordinate.slide: b.ends(places) for b in mechanism.bounds if b.coordinate.kind == "slide"}
     # Steps from one node to another: the least and largest in x and y.
     steps: list[tuple[int, int, Floats, Floats]] = []
     for edge, w, d in zip(graph.edges, vectors.w, vectors.d, strict=True):
-        least, most = (np.full(count, np.inf * sign) for sign in (-1, 1))
+        stroke = np.zeros((2, 1, count))
         if edge.slide is not None:
-            for end, term in zip((least, most), strokes.get(edge.slide, (None, None)), strict=True):
-                if term is not None:
-                    end[:] = value(term)
+            shortest, longest = strokes.get(edge.slide, (None, None))
+            stroke[0] = -np.inf if shortest is None else shortest
+            stroke[1] = np.inf if longest is None else longest
             if edge.slide in graph.telescopic:
-                least = np.maximum(least, 0.0)
-        along = np.broadcast_to(np.asarray(w, dtype=complex), (count,))
+                stroke[0] = np.maximum(stroke[0], 0.0)
         if edge.frame:
-            size = np.abs(along)
-            if edge.slide is not None:
-                size = size + np.maximum(np.abs(least), np.abs(most))
-            steps.append((edge.tail, edge.head, np.stack([-size, -size]), np.stack([size, size])))
-            continue
-        both = np.stack([along.real, along.imag])
-        if edge.slide is None:
-            steps.append((edge.tail, edge.head, both, both))
+            size = np.abs(w) + np.abs(stroke).max(axis=0)
+            steps.append((edge.tail, edge.head, -size, size))
         else:
-            turn = np.broadcast_to(np.asarray(d, dtype=complex), (count,))
+            along, turn = (np.stack([np.real(v), np.imag(v)]).reshape(2, -1) for v in (w, d))
             with np.errstate(invalid="ignore"):
-                ends = np.stack([np.stack([turn.real, turn.imag]) * end for end in (least, most)])
-            ends = np.where(np.isnan(ends), 0.0, ends)
-            steps.append((edge.tail, edge.head, both + ends.min(axis=0), both + ends.max(axis=0)))
+                ends = np.nan_to_num(turn * stroke, nan=0.0, posinf=np.inf, neginf=-np.inf)
+            steps.append((edge.tail, edge.head, along + ends.min(axis=0), along + ends.max(axis=0)))
     for bound in mechanism.bounds:
         if bound.coordinate.kind == "distance" and bound.maximum is not None:
-            size = np.abs(np.broadcast_to(np.asarray(value(bound.maximum), dtype=float), (count,)))
-            steps.append((bound.coordinate.node, bound.coordinate.other, np.stack([-size] * 2), np.stack([size] * 2)))
+            size = np.abs(np.asarray(bound.ends(places)[1], dtype=float))
+            steps.append((bound.coordinate.node, bound.coordinate.other, -size, size))
     for _ in graph.nodes:
         for tail, head, least, most in steps:
             low[:, head] = np.maximum(low[:, head], low[:, tail] + least)
@@ -204,14 +180,14 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
             high[:, tail] = np.minimum(high[:, tail], high[:, head] - least)
     node = field.outputs[0].node
     bounded = np.isfinite(low[:, node]).all(axis=0) & np.isfinite(high[:, node]).all(axis=0)
-    least, most = (np.where(bounded, side[:, node], 0.0) for side in (low, high))
-    corner, other = least[0] + 1j * least[1], most[0] + 1j * most[1]
     sketch = mechanism.sketch_configuration
     drawn = complex(*(float(sketch.value(c)) for c in field.outputs[:2]))
     guess = sum(float(np.abs(z)) for z in sketch.nodes) + sum(np.abs(w) for w in vectors.w)
     guess = np.broadcast_to(np.asarray(guess, dtype=float), (count,))
-    corner = np.where(bounded, corner, drawn - guess * (1 + 1j))
-    other = np.where(bounded, other, drawn + guess * (1 + 1j))
+    corner, other = (
+        np.where(bounded, side[0, node] + 1j * np.where(bounded, side[1, node], 0.0), drawn + sign * guess * (1 + 1j))
+        for side, sign in ((low, -1), (high, 1))
+    )
     middle, size = 0.5 * (corner + other), 0.5 * (other - corner)
     # Where dimensions cannot close at all the corners are exchanged, or one.
     least = 1e-9 * guess

@@ -32,6 +32,31 @@ INSET = 1e-10
 FIVE = np.linspace(0.0, 1.0, 5)
 
 
+@dataclass(frozen=True)
+class Effort:
+    """How finely the region is looked for.
+
+    Parameters
+    ----------
+    rays : int
+        Rays over the scan.
+    samples : int
+        Samples of each interval, for margins that are not quadratic along rays.
+    cells : int
+        Cells of the raster over the width and height of what the point can reach at most: pieces and holes that hold
+        a circle around a cell are never lost.
+    """
+
+    rays: int
+    samples: int
+    cells: int
+
+
+# One design is looked at closely; of thousands each a little less, refined where the error estimate asks for it.
+SINGLE = Effort(128, 48, 192)
+BATCH = Effort(16, 12, 24)
+
+
 def is_turn(scan: tuple[float, float]) -> bool:
     """Whether a scan goes all the way round, but for rounding."""
     return scan[1] - scan[0] >= 2 * np.pi * (1 - 1e-12)
@@ -54,12 +79,16 @@ class Designs:
         Number of designs.
     about : complex
         Where the rays start.
+    scan : (float, float)
+        First and last angle of the rays (radians).
     """
 
     field: Field
     places: Places
     count: int
     about: complex
+    scan: tuple[float, float]
+    effort: Effort
 
     def of(self, index: Ints) -> Places:
         """Dimensions of the designs `index`, in the shape of `index`."""
@@ -77,9 +106,9 @@ class Designs:
             good[place, lane] = (margins > 0).all(axis=0)
         return good
 
-    def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
+    def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
         """Intersect a block of rays with the region, as `trace` does."""
-        return _trace_block(self, design, theta, reach, samples, slack)
+        return _trace_block(self, design, theta, reach, slack)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,20 +158,18 @@ class Intervals:
                        enters=self.enters[keep], leaves=self.leaves[keep])  # fmt: skip
 
 
-def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float = 0.0) -> Intervals:
+def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, slack: float = 0.0) -> Intervals:
     """Intersect rays with the region.
 
     Parameters
     ----------
     design, theta, reach : ndarray, shape (rays,)
         Design, direction (radians) and length of each ray.
-    samples : int
-        Samples of each interval, for margins that are not quadratic along rays.
     slack : float
         Intervals that rounding closed, up to this fraction of the reach, are kept (for rays through a cusp).
     """
     parts = [
-        designs.traced(design[k : k + BLOCK], theta[k : k + BLOCK], reach[k : k + BLOCK], samples, slack)
+        designs.traced(design[k : k + BLOCK], theta[k : k + BLOCK], reach[k : k + BLOCK], slack)
         for k in range(0, max(len(theta), 1), BLOCK)
     ]
     if len(parts) == 1:
@@ -156,7 +183,7 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples:
     return Intervals(join("ray") + first, *(join(end) for end in ("inner", "outer", "enters", "leaves", "beyond")))
 
 
-def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
+def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
     """First what is quadratic along a ray, whose roots are known; then the other margins, within what is left.
 
     Each ray is judged by itself: what else is traced with it changes nothing.
@@ -170,7 +197,7 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
     margin, ray, turn, x, start = _quadratic_roots(a, b, c)
     found = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
     if not (quadratic.all() and not designs.field.same_assembly):
-        found = _others(designs, places, direction, found, quadratic, samples, slack * reach, reach)
+        found = _others(designs, places, direction, found, quadratic, slack * reach, reach)
     return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
 
 
@@ -207,7 +234,6 @@ def _others(
     direction: Complexes,
     found: Intervals,
     quadratic: Flags,
-    samples: int,
     thin: Floats,
     reach: Floats,
 ) -> Intervals:
@@ -217,7 +243,7 @@ def _others(
     sampled = np.flatnonzero(~np.asarray(known.all(axis=0))[found.ray])
     owner, inner, width = found.ray[sampled], found.inner[sampled], (found.outer - found.inner)[sampled]
     local = {name: value[owner] for name, value in places.items()}
-    fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, samples))), INSET, 1 - INSET)
+    fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, designs.effort.samples))), INSET, 1 - INSET)
     radii = inner + fraction[:, None] * width
     rows = np.flatnonzero(~known.all(axis=1))
 

@@ -41,16 +41,12 @@ class Rule:
         extrapolated from the slowest decay between the last groups of degree below n, as a power of the degree: the
         decay of what is not analytic (isotropic points), and safe for what is.
         """
-        last, decay = self.tail(self.spectrum @ values)
-        return self.weights @ values, self.safety * last * decay**self.power
-
-    def tail(self, spectrum: Floats) -> tuple[Floats, Floats]:
-        """Size of the last group of Legendre coefficients, and the slowest decay from group to group before it."""
-        size = np.abs(spectrum[-(len(self.nodes) // self.window) * self.window :])
-        groups = size.reshape(len(size) // self.window, self.window, spectrum.shape[1]).max(axis=1)[-4:]
+        size = np.abs((self.spectrum @ values)[-(len(self.nodes) // self.window) * self.window :])
+        groups = size.reshape(-1, self.window, values.shape[1]).max(axis=1)[-4:]
         with np.errstate(divide="ignore", invalid="ignore"):
             decay = np.minimum((groups[1:] / groups[:-1]).max(axis=0), 1.0)
-        return groups[-1], np.where(np.isfinite(decay), decay, 1.0)
+        decay = np.where(np.isfinite(decay), decay, 1.0)
+        return self.weights @ values, self.safety * groups[-1] * decay**self.power
 
 
 def cosine(v: Floats) -> tuple[Floats, Floats]:

@@ -25,13 +25,13 @@ from mechdesign.analyses.reliability.cheapest import (
     cheapest,
     tolerances,
 )
-from mechdesign.analyses.reliability.engine.problem import Estimate, Precision
+from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.tables import at_poses
 from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import Clearance, Dimension, ReliabilitySection
+from mechdesign.study.schema.reliability import Clearance, Dimension, Precision, ReliabilitySection
 from mechdesign.study.text.document import plain
 from mechdesign.study.variants import rewritten
 
@@ -91,7 +91,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     free = np.array([k for k, tolerance in enumerate(found) if tolerance.cost is not None], dtype=np.intp)
     task = replace(task, settings=[replace(setting, scale=None, followed=False) for setting in task.settings])
     if section.precision is None:
-        task = replace(task, precision=Precision(_PRECISION, None))
+        task = replace(task, precision=Precision(relative=_PRECISION))
     model = ToleranceModel(task, found, free, np.full(len(free), WIDEST))
     method = "auto" if "auto" in section.methods or task.samples * asked < _ENOUGH_FAILURES else "monte_carlo"
     allowed = np.full(len(task.settings), asked)

@@ -16,7 +16,7 @@ from mechdesign.analyses.reliability import methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
-from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, Precision
+from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, reached
 from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
 from mechdesign.analyses.reliability.methods.auto import FACTOR, disagree
 from mechdesign.analyses.reliability.question import ask, unsaid
@@ -26,13 +26,12 @@ from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MAX_SAMPLES, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Reason
-from mechdesign.parallel import keep_freed_memory
+from mechdesign.parallel import keep_freed_memory, one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS
-from mechdesign.threads import one_thread
 
 # Poses whose sensitivities are computed together.
 _POSES_TOGETHER = 2048
@@ -84,7 +83,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         most=section.samples if "samples" in section.model_fields_set else MAX_SAMPLES, jobs=jobs, progress=progress,
     )  # fmt: skip
     if section.precision is not None:
-        task = replace(task, precision=Precision(section.precision.relative, section.precision.half_width))
+        task = replace(task, precision=section.precision)
     found: list[MethodResult] = []
     interrupted = ""
     indices: dict[int, SobolIndices] = {}
@@ -283,21 +282,21 @@ def _unreached(found: Sequence[MethodResult], task: Task) -> list[str]:
         for pose in each.rungs:
             estimate = each.estimates[pose]
             # Where no failure was seen, `_unseen` says so.
-            if estimate.failures and not precision.reached(estimate.failure, estimate.low, estimate.high):
+            if estimate.failures and not reached(precision, estimate.failure, estimate.low, estimate.high):
                 half = 0.5 * (estimate.high - estimate.low)
                 short[pose] = half / (WIDTH * estimate.failure) if precision.half_width is None else half
     if not short:
         return []
     pose = max(short, key=lambda each: short[each])
     if precision.half_width is None:
-        asked, reached = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
+        asked, there = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
         what = "the coefficient of variation"
     else:
-        asked, reached = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
+        asked, there = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
         what = "half the interval"
     others = f" (the worst of {len(short)} poses)" if len(short) > 1 else ""
     return [
-        f"auto: {what} is {reached} at {task.where(pose)}{others}, not the {asked} asked; it ends at {task.most} "
+        f"auto: {what} is {there} at {task.where(pose)}{others}, not the {asked} asked; it ends at {task.most} "
         "samples, which reliability.samples sets"
     ]
 
@@ -344,5 +343,5 @@ def _of_cycles(found: Sequence[MethodResult], task: Task) -> list[str]:
         f"{method}: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at {last.failure:.3g}, "
         f"not as precise as asked; it ends at {last.samples} made mechanisms, which reliability.samples sets"
         for method, last in simulated.items()
-        if METHODS[method].precise and last.failures and not task.precision.reached(last.failure, last.low, last.high)
+        if METHODS[method].precise and last.failures and not reached(task.precision, last.failure, last.low, last.high)
     ]

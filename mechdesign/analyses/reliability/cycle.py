@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.reliability.engine.problem import Estimate, counted
+from mechdesign.analyses.reliability.engine.problem import Estimate, counted, reached
 from mechdesign.analyses.reliability.simulation import CHUNK, Setting, errors_of, generator
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
@@ -80,7 +80,7 @@ def _simulated(found: MethodResult, task: Task) -> MethodResult:
                 task.progress.update(int(part[1]))
             done, until = until, min(chunks, 2 * until)
             estimate = counted(*total.tolist())
-            if precise and task.precision.reached(estimate.failure, estimate.low, estimate.high):
+            if precise and reached(task.precision, estimate.failure, estimate.low, estimate.high):
                 break
     except KeyboardInterrupt:
         raise Partial(replace(found, cycle=counted(*total.tolist()) if total[1] else None)) from None

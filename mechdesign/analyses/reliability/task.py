@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.deflection import Elastic
-from mechdesign.analyses.reliability.engine.problem import Estimate, Precision
+from mechdesign.analyses.reliability.engine.problem import Estimate
 from mechdesign.analyses.reliability.first_order import ORDERS, FirstOrder
 from mechdesign.analyses.reliability.question import ReliabilityQuestion
 from mechdesign.analyses.reliability.simulation import Setting, Sums
@@ -22,6 +22,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import ORDERS as QUANTITIES
+from mechdesign.study.schema.reliability import Precision
 
 Strings = NDArray[np.str_]
 
@@ -58,7 +59,7 @@ class Task:
     seed: int = 0
     samples: int = 0
     most: int = MAX_SAMPLES
-    precision: Precision = field(default_factory=lambda: Precision(RELATIVE_PRECISION, None))
+    precision: Precision = field(default_factory=lambda: Precision(relative=RELATIVE_PRECISION))
     jobs: int | None = 1
     progress: Progress = NULL
 

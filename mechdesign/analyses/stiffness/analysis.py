@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -10,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
-from mechdesign.analyses.stiffness.bodies import build_bodies
 from mechdesign.analyses.stiffness.compliance import Held, put
-from mechdesign.analyses.stiffness.elements import Guide, Hinge, beams_of
+from mechdesign.analyses.stiffness.elements import Guide, Hinge, corners_of
 from mechdesign.analyses.stiffness.force_method import Effects, Loaded, effects_of, load, twists_of
 from mechdesign.analyses.stiffness.legs import Leg, find_legs, hold_by_legs
-from mechdesign.analyses.stiffness.network import Network, build_network, carrying_edges
+from mechdesign.analyses.stiffness.network import Network, build_bodies, build_network
 from mechdesign.analyses.stiffness.tables import (
     Springs,
     compliance_table,
@@ -29,13 +29,12 @@ from mechdesign.analyses.stiffness.tables import (
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.parallel import map_chunks
+from mechdesign.parallel import map_chunks, one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.threads import one_thread
 
 # Poses solved together.
 CHUNK = 8192
@@ -137,7 +136,10 @@ def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
     for name, pose in (("first", solved.first), ("loose", solved.loose)):
         if pose is not None:
             row, configuration = pose
-            twists = dict(zip(body.network.paths, solved.effects.twists[row], strict=True)) if solved.effects else {}
+            moved = _loaded(body, configuration).displacements if body.section.loads else {}
+            twists = {
+                vertex: (each @ np.array(body.section.loads)[:, : body.size].T)[0] for vertex, each in moved.items()
+            }
             drawn[name] = Drawn(body, row, configuration, solved.springs.take(solved.springs.row == row), twists)
     return drawn
 
@@ -211,8 +213,8 @@ def ask(study: Study) -> Body:
         link = bearers[0]
     standing = build_bodies(mechanism, link, section.at, section)
     pinned = build_bodies(mechanism, None, section.at, section) if condensed else standing
-    legs = find_legs(carrying_edges(mechanism, standing, section), standing, list(mechanism.description.links))
-    network = build_network(mechanism, pinned, section)
+    legs = find_legs(standing, list(mechanism.description.links))
+    network = build_network(pinned)
     return Body(section, legs, network, 2 if section.link is None else 3, condensed, _spread(mechanism, network))
 
 
@@ -222,7 +224,7 @@ def _spread(mechanism: Mechanism, network: Network) -> float:
     return max((abs(place - places[0]) for place in places), default=0.0) or mechanism.size or 1.0
 
 
-def hold(body: Body, configuration: Configuration) -> tuple[Held, list[Springs]]:
+def hold(body: Body, configuration: Configuration) -> tuple[Held, Iterable[Springs]]:
     """Stiffness and springs in a batch of assembled poses of shape (n,).
 
     By the reciprocal wrenches of its legs where these hold the body in closed form (six times as fast), else by the
@@ -237,13 +239,13 @@ def hold(body: Body, configuration: Configuration) -> tuple[Held, list[Springs]]
     return held, springs
 
 
-def evaluate(body: Body, configuration: Configuration) -> tuple[Held, list[Springs], Effects | None]:
+def evaluate(body: Body, configuration: Configuration) -> tuple[Held, Iterable[Springs], Effects | None]:
     """As `hold`, and what the study's loads do."""
     section = body.section
     if not section.loads:
         return *hold(body, configuration), None
     loaded = _loaded(body, configuration)
-    held, springs = (loaded.held, []) if body.legs is None else hold(body, configuration)
+    held, springs = (loaded.held, ()) if body.legs is None else hold(body, configuration)
     return held, springs, effects_of(body.network, loaded, section.at, configuration, section.loads)
 
 
@@ -257,7 +259,7 @@ def _cautions(study: Study, poses: Poses, body: Body, held: Held) -> list[str]:
     cautions = [
         f"link '{name}' has a single point, and so no beam: it is rigid, though 'elastic' names it; give it two ends"
         for name in body.section.elastic
-        if len(beams_of(links[name]).corners) < 2
+        if len(corners_of(links[name])) < 2
     ]
     loose = np.flatnonzero(known & (held.rank < body.size))
     if len(loose):

@@ -54,7 +54,7 @@ class Held:
 
         Nothing is inverted, so that a point may be far away: C' = M C M^T, K' = M^-T K M^-1  [S4].
         """
-        if self.compliance.shape[1] == 2:
+        if self.compliance.shape[1] == 2 or not arm.any():
             return self
         there, back = moved_to(arm), moved_to(-arm)
         return replace(
@@ -94,21 +94,35 @@ def by_wrenches(
     """
     scale = np.array([1.0, 1.0, 1.0 / length])[:size]
     outer = np.outer(scale, scale)
-    legs = [w[:size] * scale[:, None, None] for w in wrenches]
-    inverse, regular = _inverse(np.concatenate(legs, axis=1))
-    return _sum_of_legs(legs, compliances) / outer, _exact(inverse, compliances) * outer, regular
+    inverse, regular = _inverse(np.concatenate([w[:size] for w in wrenches], axis=1) * scale[:, None, None])
+    total, first = np.zeros_like(inverse), 0
+    for block in compliances:
+        rows = inverse[first : first + len(block)]
+        first += len(block)
+        total += np.einsum("ian,ijn,jbn->abn", rows, block, rows)
+    compliance = np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
+    return stiffness_of(compliance) / outer, compliance * outer, regular
 
 
-def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
-    """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi)."""
-    mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
-    radius = np.hypot(half, soft[:, 0, 1])
-    with np.errstate(divide="ignore"):
-        stiffest = mean - radius
-        high = np.where(stiffest > 1e-13 * mean, 1 / stiffest, np.where(np.isnan(mean), np.nan, np.inf))
-        low = 1 / (mean + radius)
-    angle = np.mod(np.arctan2(soft[:, 0, 1], half) / 2 + np.pi / 2, np.pi)
-    return low, high, angle
+def stiffness_of(compliance: Floats) -> Floats:
+    """Inverses of compliances, nan where one is rigid in some direction."""
+    inverse, soft = inverses(compliance, RIGID)
+    return np.where(soft[:, None, None], (inverse + inverse.swapaxes(1, 2)) / 2, np.nan)
+
+
+def inverses(matrix: Floats, limit: float) -> tuple[Floats, Flags]:
+    """Inverses, and where the smallest singular value is certainly above this share of the largest; 0 elsewhere."""
+    inverse, regular = np.zeros(matrix.shape), np.ones(len(matrix), dtype=bool)
+    try:
+        inverse[:] = np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        # Some pose is exactly singular; the answers of the others are not to hang on the company they are in.
+        regular = np.linalg.det(matrix) != 0
+        inverse[regular] = np.linalg.inv(matrix[regular])
+    one, other = (np.einsum("nij,nij->n", part, part) for part in (inverse, matrix))
+    regular &= one * other < 1 / limit**2
+    inverse[~regular] = 0.0
+    return inverse, regular
 
 
 def directional(soft: Floats, direction: float) -> Floats:
@@ -131,41 +145,3 @@ def _inverse(matrix: Floats) -> tuple[Floats, Flags]:
         determinant = (x * adjugate[0]).sum(axis=0)
     regular = np.abs(determinant) > REGULAR * norms
     return adjugate / np.where(regular, determinant, 1.0), regular
-
-
-def _exact(inverse: Floats, compliances: Sequence[Floats]) -> Floats:
-    """C = W^-T C_c W^-1, poses first."""
-    total, first = np.zeros_like(inverse), 0
-    for block in compliances:
-        rows = inverse[first : first + len(block)]
-        first += len(block)
-        total += np.einsum("ian,ijn,jbn->abn", rows, block, rows)
-    return np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
-
-
-def _sum_of_legs(legs: Sequence[Floats], compliances: Sequence[Floats]) -> Floats:
-    """K = sum W C_c^-1 W^T, poses first; nan where a C_c is singular  [S4, eq. 22]."""
-    size, n = legs[0].shape[0], legs[0].shape[2]
-    total = np.zeros((size, size, n))
-    for wrenches, block in zip(legs, compliances, strict=True):
-        if len(block) == 1:
-            with np.errstate(divide="ignore"):
-                inverse = np.where(block > 0, 1 / block, np.nan)
-        elif len(block) == 2:
-            determinant = block[0, 0] * block[1, 1] - block[0, 1] ** 2
-            good = determinant > RIGID * block[0, 0] * block[1, 1]
-            adjugate = np.stack([np.stack([block[1, 1], -block[0, 1]]), np.stack([-block[0, 1], block[0, 0]])])
-            with np.errstate(divide="ignore", invalid="ignore"):
-                inverse = np.where(good, adjugate / determinant, np.nan)
-        elif len(block):
-            inverse = _inverse_of_three(block)
-        if len(block):
-            total += np.einsum("ain,ijn,bjn->abn", wrenches, inverse, wrenches)
-    return np.moveaxis((total + total.swapaxes(0, 1)) / 2, 2, 0)
-
-
-def _inverse_of_three(block: Floats) -> Floats:
-    values, vectors = np.linalg.eigh(np.moveaxis(block, 2, 0))
-    with np.errstate(divide="ignore"):
-        inverse = np.where(values > RIGID * values[:, -1:], 1 / values, np.nan)
-    return np.moveaxis(np.einsum("nij,nj,nkj->nik", vectors, inverse, vectors), 0, 2)

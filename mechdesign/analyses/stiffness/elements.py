@@ -26,18 +26,9 @@ NEAREST = 1e-9
 _FAR_FROM_JOINTS = 10.0
 
 
-@dataclass(frozen=True)
-class Beams:
-    """The points between which the beams of a link run; a telescopic one has a direction however short it is."""
-
-    link: str
-    corners: tuple[str, ...]
-    telescopic: bool
-
-
-def beams_of(link: Link) -> Beams:
-    """The beams of an elastic link; a telescopic one is a single beam of its current length."""
-    return Beams(link.name, link.ends or tuple(link.points), link.telescopic)
+def corners_of(link: Link) -> tuple[str, ...]:
+    """The points between which the beams of an elastic link run; a telescopic one is a single beam."""
+    return link.ends or tuple(link.points)
 
 
 @dataclass(frozen=True)
@@ -60,7 +51,7 @@ class Guide:
 class Beam:
     """The beams of an elastic link between the feet of two points."""
 
-    beams: Beams
+    link: Link
     tail: str
     head: str
     section: str
@@ -127,17 +118,18 @@ class BeamLine:
                 yield corner + ((first + last) / 2 - start) * along, along, last - first
 
 
-def course_of(beams: Beams, configuration: Configuration) -> BeamLine:
-    """The beams of a link in any batch of poses."""
-    corners = np.array([configuration.point(name) for name in beams.corners])
+def course_of(link: Link, configuration: Configuration) -> BeamLine:
+    """The beams of a link in any batch of poses; a telescopic one has a direction however short it is."""
+    names = corners_of(link)
+    corners = np.array([configuration.point(name) for name in names])
     spans = np.diff(corners, axis=0)
     lengths = np.abs(spans)
-    if beams.telescopic:
-        along = configuration.rotation(beams.link)[None]
+    if link.telescopic:
+        along = configuration.rotation(link.name)[None]
     else:
         along = np.divide(spans, lengths, out=np.ones(spans.shape, dtype=complex), where=lengths > 0)
     starts = np.concatenate([np.zeros((1, *corners.shape[1:])), np.cumsum(lengths, axis=0)])
-    return BeamLine(beams.corners, corners, along, starts)
+    return BeamLine(names, corners, along, starts)
 
 
 def looked_at_from(points: Iterable[str], at: Complexes, configuration: Configuration, length: float) -> Complexes:
@@ -190,7 +182,7 @@ def _slide_direction(slide: int, configuration: Configuration) -> Complexes:
 def _beam(
     beam: Beam, section: StiffnessSection, configuration: Configuration, at: Complexes
 ) -> Iterator[tuple[Floats, Value]]:
-    course = course_of(beam.beams, configuration)
+    course = course_of(beam.link, configuration)
     tail, head = (course.foot(point, configuration.point(point)) for point in (beam.tail, beam.head))
     profile = section.sections[beam.section]
     yield from bending(course, np.minimum(tail, head), np.maximum(tail, head), profile, at)

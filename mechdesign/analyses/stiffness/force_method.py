@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.compliance import REGULAR, Held, moved_to, poses_by
+from mechdesign.analyses.stiffness.compliance import REGULAR, Held, inverses, moved_to, poses_by, stiffness_of
 from mechdesign.analyses.stiffness.elements import bending, course_of, freedoms, looked_at_from
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import RANK, RIGID
@@ -142,7 +142,7 @@ def _beam_freedoms(
     What slides changes its order along the beams from pose to pose: the parts are sorted in each.
     """
     beams = [beam for k in ways if (beam := network.edges[k].beam)]
-    course = course_of(beams[0].beams, configuration)
+    course = course_of(beams[0].link, configuration)
     feet = np.array([course.foot(beam.head, configuration.point(beam.head)) for beam in beams])
     cuts = np.sort(np.concatenate([np.zeros((1, feet.shape[1])), feet]), axis=0)
     for low, high in pairwise(cuts):
@@ -216,7 +216,7 @@ class _Statics:
         n, rows, columns = unit.shape
         inverse, regular = np.zeros((n, columns, rows)), np.zeros(n, dtype=bool)
         if rows == columns:
-            inverse, regular = _inverses(unit)
+            inverse, regular = inverses(unit, REGULAR)
         margin, stress, lost = np.full(n, np.inf), None, None
         rest = np.flatnonzero(~regular)
         if len(rest):
@@ -224,8 +224,8 @@ class _Statics:
             keep = values > RANK
             margin[rest] = np.where(keep, values, np.inf).min(axis=1, initial=np.inf)
             upright, count = right.swapaxes(1, 2), values.shape[1]
-            inverses = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
-            inverse[rest] = (upright[:, :, :count] * inverses[:, None]) @ left[:, :, :count].swapaxes(1, 2)
+            upside = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
+            inverse[rest] = (upright[:, :, :count] * upside[:, None]) @ left[:, :, :count].swapaxes(1, 2)
             stresses, idle = (_unkept(vectors, keep) for vectors in (left, upright))
             if stresses.any():
                 stress = np.zeros((n, rows, rows))
@@ -236,19 +236,6 @@ class _Statics:
         return _Statics(
             inverse / norm.swapaxes(1, 2), inverse.swapaxes(1, 2) @ along.swapaxes(1, 2), stress, lost, margin
         )
-
-
-def _inverses(matrix: Floats) -> tuple[Floats, Flags]:
-    """Inverses, and where the smallest singular value is certainly above `REGULAR`."""
-    n, size, _ = matrix.shape
-    inverse, regular = np.zeros((n, size, size)), np.ones(n, dtype=bool)
-    try:
-        inverse[:] = np.linalg.inv(matrix)
-    except np.linalg.LinAlgError:
-        # Some pose is exactly singular; the answers of the others are not to hang on the company they are in.
-        regular = np.linalg.det(matrix) != 0
-        inverse[regular] = np.linalg.inv(matrix[regular])
-    return inverse, regular & ((inverse**2).sum(axis=(1, 2)) < 1 / REGULAR**2)
 
 
 def _unkept(vectors: Floats, keep: Flags) -> Floats:
@@ -299,14 +286,13 @@ def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> He
     for count, rows in poses_by(freedom):
         basis = axes[rows][:, :, : size - count]
         inner = basis.swapaxes(1, 2) @ compliance[rows] @ basis
-        values, vectors = np.linalg.eigh(inner)
-        soft = (values > RIGID * values[:, -1:]).all(axis=1) & (values > 0).all(axis=1)
+        inverse = stiffness_of(inner)
+        soft = np.isfinite(inverse).all(axis=(1, 2))
         # What is rigid in some direction is so in a corner of the matrix: rounding there is no softness.
         stiff = rows[~soft]
         largest = np.abs(compliance[stiff]).max(axis=(1, 2), keepdims=True, initial=0.0)
         compliance[stiff] = np.where(np.abs(compliance[stiff]) > RIGID * largest, compliance[stiff], 0.0)
-        turned = basis[soft] @ vectors[soft]
-        stiffness[rows[soft]] = (turned / values[soft][:, None]) @ turned.swapaxes(1, 2)
+        stiffness[rows[soft]] = basis[soft] @ inverse[soft] @ basis[soft].swapaxes(1, 2)
         if count:
             compliance[rows] = np.nan
             twist[rows] = axes[rows][:, :, -1]
@@ -327,35 +313,21 @@ class Effects:
     ----------
     forces : ndarray, shape (n, joints, loads, 3)
         Force and moment about the joint's place, on the first body by the second, in the order of `joints_of`.
-    twists : ndarray, shape (n, vertices, 3, loads)
-        How the vertices of `Network.paths` shift and turn, about the asked point.
     places : complex ndarray, shape (n, points)
         Where the points that `points_of` names are without a load.
-    origin : complex ndarray, shape (n,)
-        Where the asked point is.
+    moves : complex ndarray, shape (n, points, loads)
+        Their displacements.
     """
 
     forces: Floats
-    twists: Floats
     places: Complexes
-    origin: Complexes
+    moves: Complexes
 
     @staticmethod
     def unknown(network: Network, poses: int, loads: int) -> Effects:
         """Room for effects, all nan."""
-        joints, points = len(joints_of(network)), len(points_of(network))
-        return Effects(
-            np.full((poses, joints, loads, 3), np.nan),
-            np.full((poses, len(network.paths), 3, loads), np.nan),
-            np.full((poses, points), complex(np.nan, np.nan)),
-            np.full(poses, complex(np.nan, np.nan)),
-        )
-
-    def moved(self, network: Network) -> Complexes:
-        """Displacements of the points that `points_of` names, shape (n, points, loads)."""
-        vertices = list(network.paths)
-        dx, dy, turn = np.moveaxis(self.twists[:, [vertices.index(v) for _, _, v in points_of(network)]], 2, 0)
-        return np.asarray(dx + 1j * dy + 1j * turn * (self.places - self.origin[:, None])[:, :, None])
+        nowhere = np.full((poses, len(points_of(network)), loads), complex(np.nan, np.nan))
+        return Effects(np.full((poses, len(joints_of(network)), loads, 3), np.nan), nowhere[:, :, 0].copy(), nowhere)
 
 
 def joints_of(network: Network) -> list[int]:
@@ -376,14 +348,13 @@ def effects_of(
     applied = np.array(loads)[:, :size].T
     origin = configuration.point(at)
     effects = Effects.unknown(network, len(origin), len(loads))
-    effects.origin[:] = origin
     for row, k in enumerate(joints_of(network)):
         wrench = loaded.wrenches[:, k] @ applied
         arm = (configuration.point(network.edges[k].point) - origin)[:, None]
         moment = wrench[:, 2] - (arm.real * wrench[:, 1] - arm.imag * wrench[:, 0])
         effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
-    for row, vertex in enumerate(network.paths):
-        effects.twists[:, row] = loaded.displacements[vertex] @ applied
-    for row, (_, point, _) in enumerate(points_of(network)):
+    for row, (_, point, vertex) in enumerate(points_of(network)):
+        dx, dy, turn = np.moveaxis(loaded.displacements[vertex] @ applied, 1, 0)
         effects.places[:, row] = configuration.point(point)
+        effects.moves[:, row] = dx + 1j * dy + 1j * turn * (effects.places[:, row] - origin)[:, None]
     return effects

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.bodies import Bodies
-from mechdesign.analyses.stiffness.compliance import Held, by_wrenches, poses_by
+from mechdesign.analyses.stiffness.compliance import Held, by_wrenches, poses_by, stiffness_of
 from mechdesign.analyses.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, looked_at_from
-from mechdesign.analyses.stiffness.network import NetworkEdge
+from mechdesign.analyses.stiffness.network import Bodies, NetworkEdge, carrying, is_pin, link_of
 from mechdesign.analyses.stiffness.screws import (
-    RIGID,
     LegScrews,
     constraint_compliance,
     equivalent_springs,
@@ -26,7 +24,7 @@ from mechdesign.analyses.stiffness.screws import (
 from mechdesign.analyses.stiffness.tables import Springs
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.study.schema.stiffness import StiffnessSection
 
 
@@ -44,20 +42,20 @@ class Leg:
     elements: tuple[Element, ...]
 
 
-def find_legs(edges: Sequence[NetworkEdge], bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
-    """The legs among the edges that carry, in the order of their `links`; None where they are not serial chains."""
+def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
+    """The legs among what carries, in the order of their `links`; None where they are not serial chains."""
     found: list[tuple[int, Leg]] = []
-    for piece in _pieces(edges, bodies.asked):
+    for piece in _pieces(carrying(bodies), bodies.asked):
         ends = {end for edge in piece for end in (edge.a, edge.b)}
         if not {GROUND, bodies.asked} <= ends:
             continue
         path = _path(piece, bodies.asked)
         if path is None or any(isinstance(element, Shift) for edge in piece for element in edge.elements):
             return None
-        names = [name for end in path[1:-1] if (name := bodies.link_of(end.split("@")[0]))]
+        names = [name for end in path[1:-1] if (name := link_of(end.split("@")[0]))]
         first = min(map(links.index, names), default=len(links))
         name = "+".join(dict.fromkeys(names)) or piece[0].name
-        found.append((first, Leg(name, piece[0].point, piece[-1].point, tuple(_elements(piece, path, bodies)))))
+        found.append((first, Leg(name, piece[0].point, piece[-1].point, tuple(_elements(piece, path)))))
     return tuple(leg for _, leg in sorted(found, key=lambda each: each[0]))
 
 
@@ -90,26 +88,26 @@ def _path(piece: list[NetworkEdge], asked: str) -> list[str] | None:
     return None if left else path
 
 
-def _elements(edges: Sequence[NetworkEdge], path: Sequence[str], bodies: Bodies) -> Iterator[Element]:
+def _elements(edges: Sequence[NetworkEdge], path: Sequence[str]) -> Iterator[Element]:
     """What gives along a path: of an elastic link its beams from the one joint to the other."""
     entry: str | None = None
     for k, (edge, vertex) in enumerate(zip(edges, path, strict=False)):
         beam = edge.beam
         if beam is None:
             # The two hinges of a massless pin are one.
-            yield from (e for e in edge.elements if not (bodies.is_pin(vertex) and isinstance(e, Hinge)))
+            yield from (e for e in edge.elements if not (is_pin(vertex) and isinstance(e, Hinge)))
             continue
         tail, head = (beam.tail, beam.head) if edge.a == vertex else (beam.head, beam.tail)
         entry = entry or tail
         if edges[k + 1].name != edge.name or not edges[k + 1].beam:
-            yield Beam(beam.beams, entry, head, beam.section)
+            yield Beam(beam.link, entry, head, beam.section)
             entry = None
 
 
 def hold_by_legs(
     legs: Sequence[Leg], section: StiffnessSection, configuration: Configuration, length: float, size: int,
     condensed: bool,
-) -> tuple[Held, list[Springs]]:  # fmt: skip
+) -> tuple[Held, Iterator[Springs]]:  # fmt: skip
     """Springs in a batch of assembled poses of shape (n,), and how they hold the body: rank 0 where not in closed form.
 
     `length`, `size` and `condensed` are those of the `Body`.
@@ -120,8 +118,8 @@ def hold_by_legs(
     origin = at if body == 2 else looked_at_from(ends, at, configuration, length)
     chains = [_chain(leg, section, configuration, origin) for leg in legs]
     ranks = [np.broadcast_to(joint_rank(chain.passive, length), (n,)) for chain in chains]
-    springs: list[Springs] = []
     held = Held.unknown(n, body)
+    found: list[tuple[Ints, int, Floats, LegScrews]] = []
     # Ranks are at most 3: together they are one number to the base 4.
     for _, rows in poses_by(np.array(ranks).T @ 4 ** np.arange(len(legs))):
         signature = [int(rank[rows[0]]) for rank in ranks]
@@ -134,25 +132,18 @@ def hold_by_legs(
             blocks = [constraint_compliance(w, chain) for w, chain in zip(wrenches, here, strict=True)]
             held.stiffness[rows], held.compliance[rows], regular = by_wrenches(wrenches, blocks, length, body)
             held.rank[rows] = body * regular
-        for k, (w, chain) in enumerate(zip(wrenches, here, strict=True)):
-            for spring in equivalent_springs(w, chain, length):
-                springs.append(
-                    Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + origin[rows], spring.angle)
-                )
-    return _restrict(held.seen_from(at - origin), condensed), springs
-
-
-def _restrict(held: Held, condensed: bool) -> Held:
-    """Only displacements of the point, the link free to turn: the compliance is a part, its inverse the stiffness."""
-    if not condensed:
-        return held
-    compliance = held.compliance[:, :2, :2]
-    stiffness = np.full(compliance.shape, np.nan)
-    determinant = np.linalg.det(compliance)
-    with np.errstate(invalid="ignore"):
-        good = determinant > RIGID * compliance[:, 0, 0] * compliance[:, 1, 1]
-    stiffness[good] = np.linalg.inv(compliance[good])
-    return Held(stiffness, compliance, np.minimum(held.rank, 2), held.free[:, :2], held.margin)
+        found += [(rows, k, w, chain) for k, (w, chain) in enumerate(zip(wrenches, here, strict=True))]
+    springs = (
+        Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + origin[rows], spring.angle)
+        for rows, k, w, chain in found
+        for spring in equivalent_springs(w, chain, length)
+    )
+    held = held.seen_from(at - origin)
+    if condensed:
+        # Only displacements of the point, the link free to turn.
+        soft = held.compliance[:, :2, :2]
+        held = Held(stiffness_of(soft), soft, np.minimum(held.rank, 2), held.free[:, :2], held.margin)
+    return held, springs
 
 
 def _chain(leg: Leg, section: StiffnessSection, configuration: Configuration, at: Complexes) -> LegScrews:

@@ -204,17 +204,20 @@ def _pin_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
     with np.errstate(divide="ignore", invalid="ignore"):
         place = vector(-twist[1] / twist[2], twist[0] / twist[2])
         basis = _one_joint(np.stack([place.imag, -place.real, np.ones(place.shape)]))
-        compliance = constraint_compliance(basis, chain)
-        mean = (compliance[0, 0] + compliance[1, 1]) / 2
-        half = (compliance[0, 0] - compliance[1, 1]) / 2
-        radius = np.hypot(half, compliance[0, 1])
-        soft = np.arctan2(compliance[0, 1], half) / 2
-        small = mean - radius
-        stiff = np.where(small > RIGID * mean, 1 / small, np.inf)
-        return [
-            Spring(stiff, place, np.mod(soft + np.pi / 2, np.pi)),
-            Spring(1 / (mean + radius), place, np.mod(soft, np.pi)),
-        ]
+        low, high, angle = principal(np.moveaxis(constraint_compliance(basis, chain), 2, 0))
+    return [Spring(high, place, angle), Spring(low, place, np.mod(angle + np.pi / 2, np.pi))]
+
+
+def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
+    """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi)."""
+    mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
+    radius = np.hypot(half, soft[:, 0, 1])
+    with np.errstate(divide="ignore"):
+        stiffest = mean - radius
+        high = np.where(stiffest > 1e-13 * mean, 1 / stiffest, np.where(np.isnan(mean), np.nan, np.inf))
+        low = 1 / (mean + radius)
+    angle = np.mod(np.arctan2(soft[:, 0, 1], half) / 2 + np.pi / 2, np.pi)
+    return low, high, angle
 
 
 def _scaled(twist: Floats, length: float) -> Floats:

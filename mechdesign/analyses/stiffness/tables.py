@@ -9,17 +9,18 @@ import numpy as np
 
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
-from mechdesign.analyses.stiffness.compliance import Held, directional, principal
+from mechdesign.analyses.stiffness.compliance import Held, directional
 from mechdesign.analyses.stiffness.force_method import Effects, joints_of, points_of
 from mechdesign.analyses.stiffness.network import Network
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.analyses.stiffness.screws import principal
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, Lanes
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 
 @dataclass(frozen=True, eq=False)
-class Springs:
+class Springs(Lanes):
     """Rows of the table of springs."""
 
     row: Ints
@@ -28,16 +29,11 @@ class Springs:
     place: Complexes
     angle: Floats
 
-    def take(self, rows: Ints | Flags) -> Springs:
-        """Some of them."""
-        return Springs(*(values[rows] for values in vars(self).values()))
-
     @staticmethod
     def sorted(parts: Sequence[Springs]) -> Springs:
         """All together, by pose and leg."""
         none = Springs(*(np.zeros(0, dtype) for dtype in (np.intp, np.intp, float, complex, float)))
-        each = zip(*(vars(part).values() for part in (none, *parts)), strict=True)
-        whole = Springs(*(np.concatenate(values) for values in each))
+        whole = Springs.joined([none, *parts])
         return whole.take(np.lexsort((whole.leg, whole.row)))
 
 
@@ -146,10 +142,10 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
     applied = np.tile(loads, (poses.count, 1))
     columns = pose_columns(study, poses, repeat)
     force, moment, length = units.label("force"), units.label("moment"), units.label("length")
-    for k, (name, unit) in enumerate(zip(("fx", "fy", "mz")[:size], (force, force, moment), strict=False)):
-        columns.append(Column(name, applied[:, k], unit, "load at the asked point"))
-    for k, (name, unit) in enumerate(zip(("dx", "dy", "dphi")[:size], (length, length, "rad"), strict=False)):
-        columns.append(Column(name, moved[:, k], unit, "deflection of the asked point"))
+    for name, values, unit in zip(("fx", "fy", "mz")[:size], applied.T, (force, force, moment), strict=False):
+        columns.append(Column(name, values, unit, "load at the asked point"))
+    for name, values, unit in zip(("dx", "dy", "dphi")[:size], moved.T, (length, length, "rad"), strict=False):
+        columns.append(Column(name, values, unit, "deflection of the asked point"))
     return Table("deflections", tuple(columns), "deflections under the study's loads")
 
 
@@ -161,15 +157,14 @@ def forces_table(study: Study, poses: Poses, network: Network, effects: Effects)
     units = study.units
     body = "a link, 'asked' (the asked point), or the pin of a slot ('slot:') or of several links ('pin:')"
     columns = _of_loads(study, poses, loads, joints)
+    for name, words, meaning in (
+        ("joint", [edge.name for edge in edges], "point or slide"),
+        ("on", [_link(edge.a) for edge in edges], f"what the force acts on: {body}"),
+        ("by", [_link(edge.b) for edge in edges],
+         "what exerts it; in a telescopic leg its rod, on the part at its first end"),
+    ):  # fmt: skip
+        columns.append(Column(name, np.tile(words, count * loads), "", meaning))
     columns += [
-        Column("joint", np.tile([edge.name for edge in edges], count * loads), "", "point or slide"),
-        Column("on", np.tile([_link(edge.a) for edge in edges], count * loads), "", f"what the force acts on: {body}"),
-        Column(
-            "by",
-            np.tile([_link(edge.b) for edge in edges], count * loads),
-            "",
-            "what exerts it; in a telescopic leg its rod, on the part at its first end",
-        ),
         Column("fx", values[:, 0], units.label("force"), "force on the one by the other, axes of the world"),
         Column("fy", values[:, 1], units.label("force"), "force on the one by the other, axes of the world"),
         Column("mz", values[:, 2], units.label("moment"), "moment likewise, about the joint's point"),
@@ -180,9 +175,8 @@ def forces_table(study: Study, poses: Poses, network: Network, effects: Effects)
 def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
     """``displacements.csv``: where every point goes, a row a pose, load and point of a link."""
     points = points_of(network)
-    moves = effects.moved(network)
-    count, number, loads = moves.shape
-    moved = moves.swapaxes(1, 2).ravel()
+    count, number, loads = effects.moves.shape
+    moved = effects.moves.swapaxes(1, 2).ravel()
     places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
     length = study.units.label("length")
     columns = _of_loads(study, poses, loads, number)
@@ -200,12 +194,8 @@ def displacements_table(study: Study, poses: Poses, network: Network, effects: E
 def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]:
     """Pose columns and the number of the load, for so many rows of each."""
     repeat = np.repeat(np.arange(poses.count), loads * rows)
-    return [
-        *pose_columns(study, poses, repeat),
-        Column(
-            "load", np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count), "", "which of the study's loads"
-        ),
-    ]
+    numbers = np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count)
+    return [*pose_columns(study, poses, repeat), Column("load", numbers, "", "which of the study's loads")]
 
 
 def _link(vertex: str) -> str:

@@ -10,8 +10,7 @@ import numpy as np
 from mechdesign.analyses.columns import SHARED, shared
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
-from mechdesign.analyses.region.panels import SINGLE, Effort
-from mechdesign.analyses.region.rays import Designs
+from mechdesign.analyses.region.rays import SINGLE, Designs, Effort
 from mechdesign.analyses.region.regions import RAYS
 from mechdesign.analyses.workspace.index import Local, determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
@@ -42,11 +41,11 @@ from mechdesign.analyses.workspace.tables import (
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.indices import index
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
-from mechdesign.threads import one_thread
 
 # An error of the area beyond this part of it is told.
 AREA_SURE = 1e-3
@@ -70,7 +69,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     Raises
     ------
     StudyError
-        If the section lacks what cannot be assumed.
+        If the section lacks what cannot be assumed, or over a range the inverse problem has no closed form.
     AssemblyError
         If no point of the scan can be reached, or the region has no end.
     """
@@ -78,11 +77,10 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     if section is not None and study.mechanism.mobility == 1:
         return point_path(study)
     if section is not None and any(isinstance(values, Over) for values in section.at.values()):
-        return reachable(study, progress)
+        return _reachable(study, progress)
     asked = questions(study)
     progress.start(len(asked), "regions")
     answers: list[Evaluation] = []
-    local: list[list[Column]] = []
     regions: list[tuple[Study, Question, list[Patch]]] = []
     shapes: list[Floats] = []
     pieces: list[list[Column]] = []
@@ -99,9 +97,8 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             warnings += _doubts(question, given)
         answers.append(given)
         if given.panels.closes[0]:
-            found, columns = _pieces(study, question, given, SINGLE, warnings)
+            found, columns = _pieces(study, question, given, warnings)
             pieces.append(columns)
-            local.append(_local(study, question, found))
             counted = [patch for patch in found if patch.piece == 1 or not question.field.same_assembly]
             others = [patch for patch in found if patch not in counted]
             shapes.append(inscribed(question.field, question.about, question.scan, counted, others))
@@ -114,12 +111,13 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
         else:
             shapes.append(np.full(len(INSCRIBED), np.nan))
         progress.update(1)
-    if not local:
+    if not regions:
         raise AssemblyError(_unreachable(study, asked))
     tables = [
         Table("indices", (*_indices(study, asked, answers), *inscribed_columns(study, shapes)),
               "performance indices over the region"),
-        Table("local", stacked(local), "local indices on a grid that follows the boundary"),
+        Table("local", stacked([_local(*region) for region in regions]),
+              "local indices on a grid that follows the boundary"),
         *outlines(regions),
         *_several(pieces),
     ]  # fmt: skip
@@ -130,12 +128,12 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 
 def _pieces(
-    study: Study, question: Question, given: Evaluation, effort: Effort, warnings: list[str]
+    study: Study, question: Question, given: Evaluation, warnings: list[str]
 ) -> tuple[list[Patch], list[Column]]:
     """Patches and pieces of a region, and a warning where pieces are left out."""
     assert given.pieces is not None
-    found = patches_of_pieces(given.pieces, question.rays or RAYS, effort.samples)
-    areas, drawn = areas_of_pieces(question, given, effort), bool(given.pieces.drawn[0])
+    found = patches_of_pieces(given.pieces, question.rays or RAYS)
+    areas, drawn = areas_of_pieces(question, given), bool(given.pieces.drawn[0])
     if len(areas) > 1 and question.field.same_assembly:
         warnings.append(left_out(study, question, areas, drawn))
     return found, piece_columns(study, question, found, areas, drawn)
@@ -151,8 +149,7 @@ def _several(pieces: Sequence[Sequence[Column]]) -> Iterator[Table]:
 def _unreachable(study: Study, asked: Sequence[Question]) -> str:
     assert study.workspace is not None
     field, about = asked[0].field, asked[0].about
-    held = [", ".join(f"{name} = {value:g}" for name, value in question.held.items()) for question in asked]
-    there = f" at {'; '.join(held)}" if held[0] else ""
+    there = " at" * bool(asked[0].held) + ";".join(where(question).removeprefix(" at") for question in asked)
     if field.rootless:
         return f"point {study.workspace.point} reaches nothing{there}: {ROOTLESS}"
     assembly = " in the sketch's assembly" if field.same_assembly else ""
@@ -248,16 +245,8 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     ]
 
 
-def reachable(study: Study, progress: Progress) -> Result:
-    """Region of a point over a range of a held coordinate: area, the rectangle around it, and its boundary.
-
-    Raises
-    ------
-    StudyError
-        If the section lacks what cannot be assumed, or the inverse problem has no closed form.
-    AssemblyError
-        If nothing can be reached, or the region has no end.
-    """
+def _reachable(study: Study, progress: Progress) -> Result:
+    """Region of a point over a range of a held coordinate: area, the rectangle around it, and its boundary."""
     section = study.workspace
     assert section is not None
     name, over = next((name, value) for name, value in section.at.items() if isinstance(value, Over))
@@ -271,7 +260,7 @@ def reachable(study: Study, progress: Progress) -> Result:
         given = answer(question, {}, 1, OVER_RANGE)
         answers.append(given)
         if given.panels.closes[0]:
-            found, columns = _pieces(study, question, given, OVER_RANGE, warnings)
+            found, columns = _pieces(study, question, given, warnings)
             pieces.append(columns)
             boundaries.append(_outline(study, question, name, found))
         progress.update(1)

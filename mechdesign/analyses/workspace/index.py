@@ -11,11 +11,12 @@ import numpy as np
 
 from mechdesign import indices
 from mechdesign.analyses.region.field import Field, Places
+from mechdesign.analyses.region.rays import Designs
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.derivatives import Jacobian
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
@@ -38,6 +39,11 @@ class Local(Jacobian):
             configuration = field.configuration(z, places)
             jacobian = Jacobian.of(field.mechanism.linearize(configuration), field.outputs, field.length)
             return Local(jacobian.entries, jacobian.homogeneous, jacobian.shape, configuration)
+
+    @staticmethod
+    def on_rays(designs: Designs, design: Ints, theta: Floats, radius: Floats) -> Local:
+        """The same at places of rays, each of a design."""
+        return Local.at(designs.field, designs.about + radius * np.exp(1j * theta), designs.of(design))
 
 
 Evaluate = Callable[[Local], Value]

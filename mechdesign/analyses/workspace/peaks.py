@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.region.panels import Panels
-from mechdesign.analyses.region.rays import Designs, trace
 from mechdesign.analyses.region.rules import cosine, cubic, spread
 from mechdesign.analyses.workspace.index import Local, Prepared
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -60,9 +59,7 @@ PLACE = np.dtype([("design", np.intp), ("panel", np.intp), ("slot", np.intp), ("
 Places = NDArray[Any]
 
 
-def find_peaks(
-    designs: Designs, panels: Panels, indices: Sequence[Prepared], samples: int, tolerance: float, wanted: Flags
-) -> Peaks:
+def find_peaks(panels: Panels, indices: Sequence[Prepared], tolerance: float, wanted: Flags) -> Peaks:
     """Extremes of indices over the regions.
 
     Parameters
@@ -72,21 +69,22 @@ def find_peaks(
     wanted : ndarray of bool, shape (2, indices)
         Whether the infimum, and the supremum of each index is searched for; else only its order is found.
     """
-    shape = (len(indices), designs.count)
+    count = len(panels.closes)
+    shape = (len(indices), count)
     value, order = np.stack([np.full(shape, np.inf), np.full(shape, -np.inf)]), np.zeros(shape)
-    _at_ends(designs, panels, indices, samples, value, order)
-    places, local = _grid(designs, panels, samples)
-    _at_crossings(designs, indices, places["design"], local, value, order)
+    _at_ends(panels, indices, value, order)
+    places, local = _grid(panels)
+    _at_crossings(indices, places["design"], local, value, order)
     error = np.zeros(value.shape)
     lanes = []
     for sense, k in np.argwhere(wanted):
-        start = _best(places["design"], (2 * sense - 1) * np.asarray(indices[k].values(local)), designs.count)
+        start = _best(places["design"], (2 * sense - 1) * np.asarray(indices[k].values(local)), count)
         # What lies at the bound of the index already needs no search.
         design = np.flatnonzero((start >= 0) & (value[sense, k] != indices[k].index.bounds[sense]))
         lanes.append((np.full(len(design), sense), np.full(len(design), k), design, start[design]))
     if lanes:
         sense, k, design, start = (np.concatenate(column) for column in zip(*lanes, strict=True))
-        peak, doubt = _climb(designs, panels, indices, 2.0 * sense - 1, k, samples, tolerance, places[start])
+        peak, doubt = _climb(panels, indices, 2.0 * sense - 1, k, tolerance, places[start])
         sign = 2.0 * sense - 1
         value[sense, k, design] = sign * np.fmax(sign * value[sense, k, design], sign * peak)
         error[sense, k, design] = doubt
@@ -94,22 +92,20 @@ def find_peaks(
     return Peaks(value, error, order)
 
 
-def _at_ends(
-    designs: Designs, panels: Panels, indices: Sequence[Prepared], samples: int, value: Floats, order: Floats
-) -> None:
+def _at_ends(panels: Panels, indices: Sequence[Prepared], value: Floats, order: Floats) -> None:
     """Note the indices that vanish or have no bound where the region ends in a singularity."""
     u = np.array([0.2, 0.5, 0.8])[:, None]
     theta = (panels.low + u * (panels.high - panels.low)).ravel()
     design = np.tile(panels.design, len(u))
-    traced = trace(designs, design, theta, panels.reach[design], samples)
-    singular = np.append([kind != "limit" for kind, _ in designs.field.labels], False)
+    traced = panels.trace(design, theta)
+    singular = np.append([kind != "limit" for kind, _ in panels.designs.field.labels], False)
     for margin, end, side in ((traced.enters, traced.inner, 1.0), (traced.leaves, traced.outer, -1.0)):
         at = np.flatnonzero(singular[margin])
         if not at.size:
             continue
         ray = traced.ray[at]
         radius = end[at] + side * NEAR[:, None] * (traced.outer - traced.inner)[at]
-        local = Local.at(designs.field, designs.about + radius * np.exp(1j * theta[ray]), designs.of(design[ray]))
+        local = Local.on_rays(panels.designs, design[ray], theta[ray], radius)
         for k, index in enumerate(indices):
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 near, far = np.broadcast_to(np.asarray(index.values(local), dtype=float), radius.shape)
@@ -120,16 +116,15 @@ def _at_ends(
             np.maximum.at(order[k], design[ray[grows]], np.round(-2 * power[grows]) / 2)
 
 
-def _at_crossings(
-    designs: Designs, indices: Sequence[Prepared], design: Ints, local: Local, value: Floats, order: Floats
-) -> None:
+def _at_crossings(indices: Sequence[Prepared], design: Ints, local: Local, value: Floats, order: Floats) -> None:
     """Note them too where a forward singularity lies inside: the determinant has both signs."""
     determinant = np.broadcast_to(local.determinant, design.shape)
-    crossed, size = np.ones(designs.count, dtype=bool), np.zeros(designs.count)
+    count = value.shape[-1]
+    crossed, size = np.ones(count, dtype=bool), np.zeros(count)
     known = np.flatnonzero(np.isfinite(determinant))
     np.maximum.at(size, design[known], np.abs(determinant[known]))
     for sign in (1, -1):
-        crossed &= np.bincount(design[sign * determinant > ROUNDING * size[design]], minlength=designs.count) > 0
+        crossed &= np.bincount(design[sign * determinant > ROUNDING * size[design]], minlength=count) > 0
     for k, index in enumerate(indices):
         limit = index.index.crossing
         if limit is not None:
@@ -138,20 +133,19 @@ def _at_crossings(
             order[k, crossed] = np.maximum(order[k, crossed], float(sense))
 
 
-def _grid(designs: Designs, panels: Panels, samples: int) -> tuple[Places, Local]:
+def _grid(panels: Panels) -> tuple[Places, Local]:
     """The first nodes of all regions."""
     u = np.tile(ANGLES[:, None], len(panels.low))
     panel = np.tile(np.arange(len(panels.low)), len(ANGLES))
     theta = spread(panels.low, panels.high, u, cubic)[0].ravel()
     design = panels.design[panel]
-    traced = trace(designs, design, theta, panels.reach[design], samples)
+    traced = panels.trace(design, theta)
     radius = spread(traced.inner, traced.outer, RADII[:, None], cosine)[0].ravel()
     ray = np.tile(traced.ray, len(RADII))
     places = np.zeros(len(ray), dtype=PLACE)
     places["design"], places["panel"], places["u"] = design[ray], panel[ray], u.ravel()[ray]
     places["slot"], places["v"] = np.tile(traced.slot, len(RADII)), np.repeat(RADII, len(traced.ray))
-    z = designs.about + radius * np.exp(1j * theta[ray])
-    return places, Local.at(designs.field, z, designs.of(design[ray]))
+    return places, Local.on_rays(panels.designs, design[ray], theta[ray], radius)
 
 
 def _best(design: Ints, height: Floats, count: int) -> Ints:
@@ -164,14 +158,7 @@ def _best(design: Ints, height: Floats, count: int) -> Ints:
 
 
 def _climb(
-    designs: Designs,
-    panels: Panels,
-    indices: Sequence[Prepared],
-    sign: Floats,
-    which: Ints,
-    samples: int,
-    tolerance: float,
-    at: Places,
+    panels: Panels, indices: Sequence[Prepared], sign: Floats, which: Ints, tolerance: float, at: Places
 ) -> tuple[Floats, Floats]:
     """Largest value of `sign` times the index `which` near each place, by shrinking grids, and its error."""
     u, v = at["u"].copy(), at["v"].copy()
@@ -179,7 +166,7 @@ def _climb(
     best, doubt = np.full(len(u), -np.inf), np.full(len(u), np.inf)
 
     def look(lanes: Ints, us: Floats, vs: Floats) -> Floats:
-        found = sign[lanes] * _values(designs, panels, indices, which[lanes], samples, at[lanes], us, vs)
+        found = sign[lanes] * _values(panels, indices, which[lanes], at[lanes], us, vs)
         return np.where(np.isfinite(found), found, -np.inf).reshape(-1, len(lanes))
 
     left = np.arange(len(u))
@@ -213,27 +200,18 @@ def _climb(
     return np.where(endless, np.where(sign > 0, np.inf, 0.0), sign * best), np.where(endless, 0.0, doubt)
 
 
-def _values(
-    designs: Designs,
-    panels: Panels,
-    indices: Sequence[Prepared],
-    which: Ints,
-    samples: int,
-    at: Places,
-    us: Floats,
-    vs: Floats,
-) -> Floats:
+def _values(panels: Panels, indices: Sequence[Prepared], which: Ints, at: Places, us: Floats, vs: Floats) -> Floats:
     """Indices `which` on grids, shape (angles, radii, places); nan where the interval is not met."""
     theta = spread(panels.low[at["panel"]], panels.high[at["panel"]], us, cubic)[0].ravel()
     design, slot = np.tile(at["design"], len(us)), np.tile(at["slot"], len(us))
-    traced = trace(designs, design, theta, panels.reach[design], samples)
+    traced = panels.trace(design, theta)
     met = slot < traced.counts
     place = np.where(met, np.searchsorted(traced.ray, np.arange(len(theta))) + slot, len(traced.ray))
     shape = (len(us), 1, len(at))
     inner, outer = (np.append(end, np.nan)[place].reshape(shape) for end in (traced.inner, traced.outer))
-    z = designs.about + spread(inner, outer, vs, cosine)[0] * np.exp(1j * theta.reshape(shape))
-    local = Local.at(designs.field, z, designs.of(at["design"]))
-    found = np.full(z.shape, np.nan)
+    radius = spread(inner, outer, vs, cosine)[0]
+    local = Local.on_rays(panels.designs, at["design"], theta.reshape(shape), radius)
+    found = np.full(radius.shape, np.nan)
     for k in np.unique(which):
         found = np.where(which == k, indices[k].values(local), found)
     return found

@@ -175,12 +175,8 @@ def _paths(study: Study, drive: str, outputs: tuple[str, str]) -> list[_Path]:
 
 def _range(study: Study, drive: str) -> tuple[float, float]:
     """The limits of a drive that is no angle."""
-    sizes = study.mechanism.nominal
-    bounds = [b for b in study.mechanism.bounds if b.coordinate.name == drive]
-    lows, highs = (
-        [sizes[term] if isinstance(term, str) else term for term in terms if term is not None]
-        for terms in ([b.minimum for b in bounds], [b.maximum for b in bounds])
-    )
+    bounds = [b.ends(study.mechanism.nominal) for b in study.mechanism.bounds if b.coordinate.name == drive]
+    lows, highs = ([float(ends[k]) for ends in bounds if ends[k] is not None] for k in (0, 1))
     if not lows or not highs:
         message = f"the path of a point needs the range of drive {drive}: give it limits, {{drive: {drive}, min, max}}"
         raise StudyError((Problem(message, "mechanism.limits", str(study.path or "")),))

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.region.panels import Panels
-from mechdesign.analyses.region.rays import Designs, Intervals, trace
+from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.region.rules import Rule, cosine, cubic, spread
 from mechdesign.analyses.workspace.index import Local, Prepared
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -43,6 +43,8 @@ SLIVER = 1e-3
 MOST_CELLS = 1000
 # Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
 SINGLE_RAY = 0.01
+# Rays, and nodes of each, of the rules of comparison unless the study says how many.
+RAYS, RADIAL_NODES = {"sector_mean": 101, "midpoint": 300}, {"sector_mean": 49, "midpoint": 200}
 # Segments evaluated at once (11 nodes each).
 BLOCK = 4096
 # Nearer to the boundary than this fraction of the radius, rounding spoils an index that is infinite there.
@@ -53,7 +55,9 @@ STEP = 0.01
 # Parts of panels: which of [low, high] for u in [start, stop], and whether the means count it.
 CELL = np.dtype([("design", np.intp), *((name, float) for name in ("low", "high", "start", "stop", "counted"))])
 # Parts of intervals of rays: those of [inner, outer] for v in [start, stop].
-SEGMENT = np.dtype([("ray", np.intp), *((name, float) for name in ("inner", "outer", "start", "stop"))])
+SEGMENT = np.dtype([
+    ("ray", np.intp), ("design", np.intp), *((name, float) for name in ("theta", "inner", "outer", "start", "stop"))
+])  # fmt: skip
 Parts = NDArray[Any]
 
 
@@ -101,15 +105,9 @@ def _divided(parts: Parts, at: Floats) -> Parts:
 
 
 def integrate(
-    designs: Designs,
-    panels: Panels,
-    tolerance: float,
-    samples: int,
-    counted: tuple[float, float],
-    integrands: Sequence[Integrand],
-    endless: Flags,
+    panels: Panels, tolerance: float, counted: tuple[float, float], integrands: Sequence[Integrand], endless: Flags,
     whole: float = 0.0,
-) -> Integral:
+) -> Integral:  # fmt: skip
     """Area and means of local indices of every design, to a relative tolerance.
 
     Parameters
@@ -123,7 +121,7 @@ def integrate(
     whole : float
         Where the region is a piece of a larger one, the area of that: of a sliver it is wanted to `SLIVER` of it only.
     """
-    count = designs.count
+    count = len(panels.closes)
     middle = 0.5 * (panels.low + panels.high)
     fresh = np.zeros(len(middle), dtype=CELL)
     fresh["design"], fresh["low"], fresh["high"], fresh["stop"] = panels.design, panels.low, panels.high, 1.0
@@ -137,7 +135,7 @@ def integrate(
     allowed: Floats | None = None
     boundary: tuple[Ints, Floats, Floats] | None = None
     for _ in range(MOST_PASSES):
-        value, error, allowed, met = _evaluate(designs, integrands, fresh, panels.reach, samples, each, allowed, span)
+        value, error, allowed, met = _evaluate(panels, integrands, fresh, each, allowed, span)
         boundary = met if boundary is None else boundary
         done = np.concatenate([done, fresh])
         values, errors = np.concatenate([values, value], axis=1), np.concatenate([errors, error], axis=1)
@@ -173,15 +171,9 @@ def integrate(
 
 
 def _evaluate(
-    designs: Designs,
-    integrands: Sequence[Integrand],
-    cells: Parts,
-    reach: Floats,
-    samples: int,
-    tolerance: Floats,
-    allowed: Floats | None,
+    panels: Panels, integrands: Sequence[Integrand], cells: Parts, tolerance: Floats, allowed: Floats | None,
     span: Floats,
-) -> tuple[Floats, Floats, Floats, tuple[Ints, Floats, Floats]]:
+) -> tuple[Floats, Floats, Floats, tuple[Ints, Floats, Floats]]:  # fmt: skip
     """Values and errors (rows, cells) of new cells, the error allowed along rays (integrands, designs), the boundary.
 
     `tolerance` is of each integrand and design.
@@ -191,18 +183,22 @@ def _evaluate(
     place, density = spread(cells["low"], cells["high"], middle + half * ANGLES.nodes[:, None], cubic)
     theta, weight = place.ravel(), (half * density).ravel()
     design, counted = np.tile(cells["design"], nodes), np.tile(cells["counted"], nodes)
-    intervals = trace(designs, design, theta, reach[design], samples)
+    intervals = panels.trace(design, theta)
     ray, inner, outer = intervals.ray, intervals.inner, intervals.outer
     area = np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta))
     value = error = np.zeros((len(integrands), len(theta)))
     if integrands:
-        first = _segments(designs, integrands, design, theta, _whole(intervals))
+        segments = np.zeros(len(ray), dtype=SEGMENT)
+        for name, part in (("design", design[ray]), ("theta", theta[ray]), ("stop", 1.0)):
+            segments[name] = part
+        segments["ray"], segments["inner"], segments["outer"] = ray, inner, outer
+        first = _segments(panels.designs, integrands, segments)
         if allowed is None:
             share = weight * np.repeat(ANGLES.weights, count)
-            sums = [np.bincount(design[ray], row * share[ray], designs.count) for row in first[0]]
+            sums = [np.bincount(design[ray], row * share[ray], len(panels.closes)) for row in first[0]]
             allowed = np.asarray(ALONG * tolerance * np.maximum(sums, np.finfo(float).tiny), dtype=float)
         each = allowed[:, design] * np.maximum(1 / span[design], SINGLE_RAY / weight)
-        value, error = _along(designs, integrands, design, theta, _whole(intervals), first, each)
+        value, error = _along(panels.designs, integrands, segments, first, each)
     rows = (area, area * counted, *(value * counted))
     total, doubt = np.empty((2, len(rows), count))
     for k, row in enumerate(rows):
@@ -213,33 +209,15 @@ def _evaluate(
     return total, doubt, np.zeros_like(tolerance) if allowed is None else allowed, met
 
 
-def _whole(intervals: Intervals) -> Parts:
-    """Every interval as one segment."""
-    segments = np.zeros(len(intervals.ray), dtype=SEGMENT)
-    segments["ray"], segments["stop"] = intervals.ray, 1.0
-    segments["inner"], segments["outer"] = intervals.inner, intervals.outer
-    return segments
-
-
 def _along(
-    designs: Designs,
-    integrands: Sequence[Integrand],
-    design: Ints,
-    theta: Floats,
-    segments: Parts,
-    evaluated: tuple[Floats, Floats, Floats],
+    designs: Designs, integrands: Sequence[Integrand], segments: Parts, evaluated: tuple[Floats, Floats, Floats],
     allowed: Floats,
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Integrals along rays and their estimated errors, both of shape (integrands, rays).
 
-    Parameters
-    ----------
-    evaluated
-        What `_segments` gives for the segments.
-    allowed : ndarray, shape (integrands, rays)
-        Error that a segment may have; those with a larger one are divided.
+    `evaluated` is what `_segments` gives. A segment is divided if its error is larger than `allowed` on its ray.
     """
-    value, error = np.zeros((2, len(integrands), len(theta)))
+    value, error = np.zeros((2, *allowed.shape))
     found, doubt, crossing = evaluated
     with np.errstate(divide="ignore", invalid="ignore"):
         # What an inverse square root has within `NEAREST` of the boundary.
@@ -248,23 +226,20 @@ def _along(
         ray = segments["ray"]
         split = (doubt > np.maximum(allowed[:, ray], noise)).any(axis=0) & (halvings < MOST_HALVINGS)
         for k in range(len(integrands)):
-            value[k] += np.bincount(ray[~split], found[k, ~split], len(theta))
-            error[k] += np.bincount(ray[~split], doubt[k, ~split], len(theta))
+            value[k] += np.bincount(ray[~split], found[k, ~split], allowed.shape[1])
+            error[k] += np.bincount(ray[~split], doubt[k, ~split], allowed.shape[1])
         if not split.any():
             break
         rough, at = segments[split], 0.5 * (segments["start"] + segments["stop"])[split]
         crossed = np.flatnonzero(np.isfinite(crossing[split]))
         if crossed.size:
-            there = rough[crossed]
-            at[crossed] = _crossing(designs, design[there["ray"]], theta[there["ray"]], there, crossing[split][crossed])
+            at[crossed] = _crossing(designs, rough[crossed], crossing[split][crossed])
         segments, noise = _divided(rough, at), np.tile(noise[:, split], 2)
-        found, doubt, crossing = _segments(designs, integrands, design, theta, segments)
+        found, doubt, crossing = _segments(designs, integrands, segments)
     return value, error
 
 
-def _segments(
-    designs: Designs, integrands: Sequence[Integrand], design: Ints, theta: Floats, segments: Parts
-) -> tuple[Floats, Floats, Floats]:
+def _segments(designs: Designs, integrands: Sequence[Integrand], segments: Parts) -> tuple[Floats, Floats, Floats]:
     """Integrals of indices times radius over segments, and their errors, both of shape (integrands, segments).
 
     And v near which a forward singularity divides a segment; nan where none does.
@@ -274,15 +249,14 @@ def _segments(
     for k in range(0, len(segments), BLOCK):
         at = slice(k, k + BLOCK)
         part = segments[at]
-        ray, inner, outer = part["ray"], part["inner"], part["outer"]
+        inner, outer = part["inner"], part["outer"]
         half = 0.5 * (part["stop"] - part["start"])
         v = part["start"] + half * (1 + RADII.nodes[:, None])
         r, slope = spread(inner, outer, v, cosine)
         # In an interval so narrow, rounding leaves nothing of the closures: it only exists at a cusp.
         measure = np.where(outer - inner > 100 * NEAREST * outer, r * slope * half, 0.0)
         gap = np.minimum(NEAREST * outer, 0.5 * (outer - inner))
-        z = designs.about + np.clip(r, inner + gap, outer - gap) * np.exp(1j * theta[ray])
-        local = Local.at(designs.field, z, designs.of(design[ray]))
+        local = Local.on_rays(designs, part["design"], part["theta"], np.clip(r, inner + gap, outer - gap))
         for j, integrand in enumerate(integrands):
             found[j, at], doubt[j, at] = RADII.apply(integrand.values(local) * measure)
         if not designs.field.same_assembly:
@@ -302,12 +276,12 @@ def _sign_change(x: Floats, values: Floats) -> Floats:
     return np.where(known & change.any(axis=0), root, np.nan)
 
 
-def _crossing(designs: Designs, design: Ints, theta: Floats, segments: Parts, v: Floats) -> Floats:
+def _crossing(designs: Designs, segments: Parts, v: Floats) -> Floats:
     """Where a forward singularity divides segments, by a step of Newton's method from `v`."""
     step = STEP * (segments["stop"] - segments["start"])
     around = v + step * np.array([-1.0, 0.0, 1.0])[:, None]
     r = spread(segments["inner"], segments["outer"], around, cosine)[0]
-    local = Local.at(designs.field, designs.about + r * np.exp(1j * theta), designs.of(design))
+    local = Local.on_rays(designs, segments["design"], segments["theta"], r)
     with np.errstate(divide="ignore", invalid="ignore"):
         low, middle, high = np.broadcast_to(1 / local.determinant, r.shape)
         shift = 2 * middle / (low - high)
@@ -315,28 +289,24 @@ def _crossing(designs: Designs, design: Ints, theta: Floats, segments: Parts, v:
 
 
 def simple_means(
-    designs: Designs,
-    integrands: Sequence[Integrand],
-    reach: Floats,
-    samples: int,
-    theta: Floats,
-    fractions: Floats,
-    by_area: bool,
-) -> Floats:
-    """Means of indices (integrands, designs) by fixed nodes: the sums that papers use, for comparison.
+    panels: Panels, integrands: Sequence[Integrand], rule: str, nodes: int | None, rays: int | None,
+    counted: tuple[float, float],
+) -> Floats:  # fmt: skip
+    """Means of indices (integrands, designs) by the sums that papers use, for comparison.
 
-    Parameters
-    ----------
-    theta : ndarray
-        Directions of equal weight.
-    fractions : ndarray
-        Nodes of each interval, as fractions of its width.
-    by_area : bool
-        Nodes weighted by their radius (the midpoint rule for the area integral), or equally within each sector
-        [S1, Tables 1 and 2]; sectors are weighted by outer^2 - inner^2 either way.
+    Rays of equal weight and nodes of equal steps along each interval, weighted by their radius as the area integral is
+    (``midpoint``) or equally within each sector (``sector_mean``) [S1, Tables 1 and 2]. Sectors are weighted by
+    outer^2 - inner^2 either way.
     """
-    design, angle = np.repeat(np.arange(designs.count), len(theta)), np.tile(theta, designs.count)
-    intervals = trace(designs, design, angle, reach[design], samples)
+    by_area, (low, high) = rule == "midpoint", counted
+    nodes, rays = nodes or RADIAL_NODES[rule], rays or RAYS[rule]
+    if by_area:
+        theta, fractions = low + (high - low) * (np.arange(rays) + 0.5) / rays, (np.arange(nodes) + 0.5) / nodes
+    else:
+        theta, fractions = np.linspace(low, high, rays), np.arange(1, nodes + 1) / (nodes + 1)
+    count = len(panels.closes)
+    design, angle = np.repeat(np.arange(count), len(theta)), np.tile(theta, count)
+    intervals = panels.trace(design, angle)
     owner = design[intervals.ray]
     sector = (intervals.outer - intervals.inner) * (intervals.outer + intervals.inner)
     total = np.zeros((len(integrands), len(owner)))
@@ -344,11 +314,10 @@ def simple_means(
     for k in range(0, len(owner), block):
         at = slice(k, k + block)
         r = intervals.inner[at] + fractions[:, None] * (intervals.outer - intervals.inner)[at]
-        z = designs.about + r * np.exp(1j * angle[intervals.ray[at]])
         weight = r / r.sum(axis=0) if by_area else np.full(r.shape, 1 / len(fractions))
-        local = Local.at(designs.field, z, designs.of(owner[at]))
+        local = Local.on_rays(panels.designs, owner[at], angle[intervals.ray[at]], r)
         for index, integrand in enumerate(integrands):
             total[index, at] = (integrand.values(local) * weight).sum(axis=0)
-    area = np.bincount(owner, sector, designs.count)
+    area = np.bincount(owner, sector, count)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.array([np.bincount(owner, row * sector, designs.count) for row in total]) / area
+        return np.array([np.bincount(owner, row * sector, count) for row in total]) / area

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.region.field import Places
-from mechdesign.analyses.region.panels import Effort, Panels, find_panels
+from mechdesign.analyses.region.panels import Panels, find_panels
 from mechdesign.analyses.region.pieces import Pieces
-from mechdesign.analyses.region.rays import Designs, trace
+from mechdesign.analyses.region.rays import Designs, Effort
 from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
@@ -21,8 +21,6 @@ from mechdesign.numerics.roots import dips
 from mechdesign.parallel import keep_freed_memory
 from mechdesign.study import Study
 
-SECTOR_RAYS, MIDPOINT_RAYS = 101, 300
-RADIAL_NODES = {"sector_mean": 49, "midpoint": 200}
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6
 # Relative tolerance of the integrals where the study says none: of one region, and of each design of many.
@@ -69,15 +67,10 @@ class Question(Region):
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The wanted columns for each design, and their estimated errors (0 where the rule has none).
+    """The wanted columns for each design, their estimated errors (0 where the rule has none), and the counted panels.
 
-    Parameters
-    ----------
-    panels : Panels
-        Those that are counted.
-    pieces : Pieces or None
-        All pieces of the regions; the first of each design is counted, or all are in any assembly. None for several
-        designs whose pieces all count.
+    Of all pieces of the regions the first of each design is counted, or all are in any assembly; there are none for
+    several designs whose pieces all count.
     """
 
     values: dict[str, Floats]
@@ -147,66 +140,57 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
         If a region has no end.
     """
     keep_freed_memory()
-    designs = question.rays_through(question.field, places, count, question.about)
+    designs = question.rays_through(question.field, places, count, question.about, question.scan, effort)
     cuts = tuple(sorted(set(question.counted) - set(question.scan)))
-    panels = find_panels(designs, question.scan, effort, cuts)
+    panels = find_panels(designs, cuts)
     pieces = None
     if count == 1 or question.field.same_assembly:
-        pieces = Pieces.of(designs, panels, question.scan, effort.samples)
+        pieces = Pieces.of(panels)
         if question.field.same_assembly:
-            designs, panels = pieces.only(0)
+            panels = pieces.only(0)
     if not panels.closes.any():
         nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
         errors = {name: np.maximum(panels.seen, 0.0) * (name == "area") for name in question.wanted}
         return Evaluation(nothing, errors, panels, pieces)
-    samples, gauss = effort.samples, question.rule == "gauss"
+    gauss = question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
-    integrands, peaks = _integrands(question), _peaks(question, designs, panels, samples)
+    integrands, peaks = _integrands(question), _peaks(question, panels)
     endless = _endless(question, integrands, peaks, count)
     means, doubts = np.full(endless.shape, np.inf), np.zeros(endless.shape)
     means[:, ~panels.closes] = np.nan
     # What is infinite for every design need not be looked at.
     some = np.flatnonzero(~endless[:, panels.closes].all(axis=1))
     finite = [integrands[k] for k in some]
-    integral = integrate(
-        designs,
-        panels,
-        tolerance,
-        samples,
-        question.counted,
-        finite if gauss else (),
-        endless[some[: len(some) * gauss]],
-    )
+    of_means = slice(None if gauss else 0)
+    integral = integrate(panels, tolerance, question.counted, finite[of_means], endless[some[of_means]])
     if gauss:
         means[some], doubts[some] = integral.mean, integral.mean_error
     else:
-        means[some] = _simple(question, designs, panels, samples, finite)
+        means[some] = simple_means(panels, finite, question.rule, question.nodes, question.rays, question.counted)
     # Where all pieces count, the raster tells if one is missing.
     every = pieces is None or not question.field.same_assembly or pieces.number <= 1
     missing = np.where(every, panels.seen - integral.area, 0.0)
-    values: dict[str, Floats] = {"area": integral.area}
-    errors = {"area": np.maximum(integral.area_error, missing)}
+    found = {"area": (integral.area, np.maximum(integral.area_error, missing))}
     if {"SUI", "box_area"} & set(question.wanted):
-        box = bounding_box(designs, panels, integral.boundary, samples)
-        values["box_area"], errors["box_area"] = box, np.zeros(count)
+        box = bounding_box(panels, integral.boundary)
         with np.errstate(invalid="ignore", divide="ignore"):
-            values["SUI"], errors["SUI"] = integral.area / box, integral.area_error / box
+            found |= {"box_area": (box, np.zeros(count)), "SUI": (integral.area / box, integral.area_error / box)}
     for column in question.wanted:
         name, kind = split(column)
         if name:
-            values[column], errors[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
-    pick = question.wanted
-    return Evaluation({name: values[name] for name in pick}, {name: errors[name] for name in pick}, panels, pieces)
+            found[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
+    values, errors = ({name: found[name][k] for name in question.wanted} for k in (0, 1))
+    return Evaluation(values, errors, panels, pieces)
 
 
-def areas_of_pieces(question: Question, given: Evaluation, effort: Effort) -> list[float]:
+def areas_of_pieces(question: Question, given: Evaluation) -> list[float]:
     """Area of each piece of a single design's region."""
     assert given.pieces is not None
     if given.pieces.number[0] == 1 and "area" in given.values:
         return [float(given.values["area"][0])]
     none, whole = np.zeros((0, 1), dtype=bool), float(given.values["area"][0])
     return [
-        float(integrate(*part, question.tolerance, effort.samples, question.scan, (), none, whole).area[0])
+        float(integrate(part, question.tolerance, question.scan, (), none, whole).area[0])
         for part in given.pieces.all()
     ]
 
@@ -222,14 +206,14 @@ def _integrands(question: Question) -> tuple[Integrand, ...]:
     )
 
 
-def _peaks(question: Question, designs: Designs, panels: Panels, samples: int) -> Peaks | None:
+def _peaks(question: Question, panels: Panels) -> Peaks | None:
     """Extremes, where they are wanted or an integral may be infinite."""
     asked = {split(column) for column in question.wanted}
     wanted = np.array([[(index.name, kind) in asked for index in question.indices] for kind in ("min", "max")])
     squares = any(kind == "std" for _, kind in asked)
     if not wanted.any() and not squares and all(index.index.crossing != np.inf for index in question.indices):
         return None
-    return find_peaks(designs, panels, question.indices, samples, PEAK_TOLERANCE, wanted)
+    return find_peaks(panels, question.indices, PEAK_TOLERANCE, wanted)
 
 
 def _endless(question: Question, integrands: Sequence[Integrand], peaks: Peaks | None, count: int) -> Flags:
@@ -263,37 +247,20 @@ def _statistic(
     return spread, error
 
 
-def _simple(
-    question: Question, designs: Designs, panels: Panels, samples: int, integrands: Sequence[Integrand]
-) -> Floats:
-    nodes = question.nodes or RADIAL_NODES[question.rule]
-    low, high = question.counted
-    if question.rule == "sector_mean":
-        theta = np.linspace(low, high, question.rays or SECTOR_RAYS)
-        fractions = np.arange(1, nodes + 1) / (nodes + 1)
-    else:
-        rays = question.rays or MIDPOINT_RAYS
-        theta = low + (high - low) * (np.arange(rays) + 0.5) / rays
-        fractions = (np.arange(nodes) + 0.5) / nodes
-    return simple_means(
-        designs, integrands, panels.reach, samples, theta, fractions, by_area=question.rule == "midpoint"
-    )
-
-
-def bounding_box(designs: Designs, panels: Panels, boundary: tuple[Ints, Floats, Floats], samples: int) -> Floats:
+def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> Floats:
     """Areas of the rectangles, shape (designs,) [S1, eq. 26]; 0 where the region is empty.
 
     The farthest point in each direction is either at the end of a panel (a corner or cusp), where a ray is traced, or
     on a smooth curve, where parabolas through the nearest boundary points lead to it.
     """
-    count = designs.count
+    count, about = len(panels.closes), panels.designs.about
     owner, ends = np.tile(panels.design, 2), np.concatenate([panels.low, panels.high])
-    traced = trace(designs, owner, ends, panels.reach[owner], samples, SLACK)
+    traced = panels.trace(owner, ends, SLACK)
     corner = np.tile(traced.ray, 2)
     design = np.concatenate([boundary[0], owner[corner]])
     theta = np.concatenate([boundary[1], ends[corner]])
     radius = np.concatenate([boundary[2], traced.inner, traced.outer])
-    place = designs.about + radius * np.exp(1j * theta)
+    place = about + radius * np.exp(1j * theta)
     at_end = np.arange(len(place)) >= len(boundary[0])
     farthest = np.zeros((len(SIDES), count))
     for side, turn in enumerate(SIDES):
@@ -303,7 +270,7 @@ def bounding_box(designs: Designs, panels: Panels, boundary: tuple[Ints, Floats,
         corners = at_end & ((place * turn).real >= (best - ROUNDING * np.abs(best))[design])
         smooth[design[corners]] = False
         if smooth.any():
-            climbed = _climb(designs, panels.reach, np.nonzero(smooth)[0], low, middle, high, turn, samples)
+            climbed = _climb(panels, np.nonzero(smooth)[0], low, middle, high, turn)
             best[smooth] = np.maximum(best[smooth], climbed)
         farthest[side] = best
     size = (farthest[0] + farthest[1]) * (farthest[2] + farthest[3])
@@ -312,29 +279,24 @@ def bounding_box(designs: Designs, panels: Panels, boundary: tuple[Ints, Floats,
 
 def _best(distance: Floats, design: Ints, theta: Floats, count: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Per design the largest distance, the angle where it is, and the angles of the rays on either side of it."""
-    top = np.full(count, -np.inf)
+    top, low, middle, high = (np.full(count, value) for value in (-np.inf, -np.inf, np.nan, np.inf))
     np.maximum.at(top, design, distance)
-    middle = np.full(count, np.nan)
     here = distance == top[design]
     middle[design[here]] = theta[here]
-    low, high = np.full(count, -np.inf), np.full(count, np.inf)
     below, above = theta < middle[design], theta > middle[design]
     np.maximum.at(low, design[below], theta[below])
     np.minimum.at(high, design[above], theta[above])
-    low, high = np.where(np.isfinite(low), low, middle), np.where(np.isfinite(high), high, middle)
-    return top, low, middle, high
+    return top, np.where(np.isfinite(low), low, middle), middle, np.where(np.isfinite(high), high, middle)
 
 
-def _climb(
-    designs: Designs, reach: Floats, which: Ints, low: Floats, middle: Floats, high: Floats, turn: complex, samples: int
-) -> Floats:
+def _climb(panels: Panels, which: Ints, low: Floats, middle: Floats, high: Floats, turn: complex) -> Floats:
     """Largest distance of designs between two rays."""
 
     def depth(lane: Ints, theta: Floats) -> Floats:
-        traced = trace(designs, which[lane], theta, reach[which[lane]], samples, SLACK)
+        traced = panels.trace(which[lane], theta, SLACK)
         found = np.full(len(lane), np.inf)
         for radius in (traced.inner, traced.outer):
-            place = designs.about + radius * np.exp(1j * theta[traced.ray])
+            place = panels.designs.about + radius * np.exp(1j * theta[traced.ray])
             np.minimum.at(found, traced.ray, -(place * turn).real)
         return found
 

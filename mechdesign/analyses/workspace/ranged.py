@@ -240,11 +240,8 @@ def _highest(y: Floats, low: Floats | float, high: Floats | float) -> tuple[Floa
         value = (a[:, None] + place * (b[:, None] + place * c[:, None])).min(axis=0)
     best, lane = value.argmax(axis=0), np.arange(y.shape[2])
     place, top = place[best, lane], value[best, lane]
-    lowest = np.argsort(a + place * (b + place * c), axis=0)[0]
-    count = len(rival)
-    crossing = best >= count + 2
-    names = np.array([(0, 0)] * (count + 2) + [pair for pair in meets for _ in range(2)]).T[:, best]
-    pair = np.where(crossing, np.sort(rival[names, lane], axis=0), lowest)
+    lowest = np.argsort(a + place * (b + place * c), axis=0)
+    pair = np.where(best >= len(rival) + 2, np.sort(lowest[:2], axis=0), lowest[0])
     return place, top, pair
 
 
@@ -261,7 +258,7 @@ class SomeDesigns(Designs):
         """As `Designs.inside`."""
         return np.asarray(self._over.deciding(z)[0][0] > 0)
 
-    def traced(self, design: Ints, theta: Floats, reach: Floats, samples: int, slack: float) -> Intervals:
+    def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
         """As `Designs.traced`: between places of each ray of which some samples of the range tell that they matter."""
         over, rays = self._over, np.arange(len(theta))
         direction = np.exp(1j * theta)
@@ -270,7 +267,7 @@ class SomeDesigns(Designs):
             found: Floats = over.deciding(self.about + radius * direction[ray])[0][0]
             return found
 
-        x = self._places(theta, reach, samples)
+        x = self._places(theta, reach)
         values = height(np.broadcast_to(rays, x.shape), x)
         positive = values > 0
         cell, ray = np.nonzero(positive[1:] != positive[:-1])
@@ -288,12 +285,13 @@ class SomeDesigns(Designs):
         found = intervals_between(label, ray, turn, radius, (~positive[0]).astype(np.intp), reach, slack)
         return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
 
-    def _places(self, theta: Floats, reach: Floats, samples: int) -> Floats:
+    def _places(self, theta: Floats, reach: Floats) -> Floats:
         """Radii of each ray, ascending, shape (places, rays), of which two neighbours hold at most one end."""
         over, rays = self._over, len(theta)
         lanes = np.arange(rays * SAMPLES)
-        slices = Designs(over.sliced, {VALUE: np.tile(over.values, rays)}, len(lanes), self.about)
-        found = trace(slices, lanes, np.repeat(theta, SAMPLES), np.repeat(reach, SAMPLES), samples)
+        values = {VALUE: np.tile(over.values, rays)}
+        slices = Designs(over.sliced, values, len(lanes), self.about, self.scan, self.effort)
+        found = trace(slices, lanes, np.repeat(theta, SAMPLES), np.repeat(reach, SAMPLES))
         # Stretches that some sample of the range reaches, by how many do.
         ray, radius = np.tile(found.ray // SAMPLES, 2), np.concatenate([found.inner, found.outer])
         turn = np.repeat([1, -1], len(found.ray))

@@ -195,12 +195,8 @@ def curves(table: Table) -> Iterator[Ints]:
 def poses_along(study: Study, held: Mapping[str, float], boundary: Table) -> Configuration:
     """Poses at places a little inside the boundary, evenly along each of its sides, shape (places,).
 
-    Parameters
-    ----------
-    held : mapping of str to float
-        Values of the held coordinates, in the study's units, for which the boundary is meant.
-    boundary : Table
-        For all values; pieces that are left out do not count.
+    Of a boundary for all values of the held coordinates, that at `held` (in the study's units) is meant; pieces that
+    are left out do not count.
     """
     assert study.workspace is not None
     mechanism, point = study.mechanism, study.workspace.point

@@ -41,15 +41,10 @@ def extent(places: Complexes | Iterable[complex]) -> tuple[complex, float, float
     return middle, max(float(np.ptp(x)), 1e-9), max(float(np.ptp(y)), 1e-9)
 
 
-def scale_of(wide: float, tall: float, width: float, height: float, pad: float = PAD) -> float:
-    """Inches a length, so that what is `wide` by `tall` fits into that many inches."""
-    return min((width - 2 * pad) / wide, (height - 2 * pad) / tall)
-
-
 def fit(places: Complexes | Iterable[complex], width: float, height: float, pad: float = PAD) -> Window:
     """A window `width` inches wide and at most `height` inches high that shows all of the places."""
     middle, wide, tall = extent(places)
-    scale = scale_of(wide, tall, width, height, pad)
+    scale = min((width - 2 * pad) / wide, (height - 2 * pad) / tall)
     return Window(middle, scale, width, max(scale * tall + 2 * pad, min(MIN_HEIGHT, height)))
 
 

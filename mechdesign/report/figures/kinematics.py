@@ -1,7 +1,8 @@
-"""Pictures of a motion: curves over the sweep, the mechanism in several poses, and its other assemblies."""
+"""Pictures of a motion: curves over the sweep, the mechanism in several poses, its other assemblies, an animation."""
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -11,12 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from PIL import Image
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, extent, fit, framed, scale_of, windows
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, fit, framed, windows
 from mechdesign.report.figures.panels import abscissa, moving_names, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
@@ -50,6 +52,14 @@ _PANEL_TITLE = 0.3
 _NOTE = 0.3
 _GAP = 0.12
 _SMALL_SYMBOLS = 0.6
+# Of the animation: frames at most, colours, milliseconds, and dots an inch, 640 pixels wide.
+FRAMES = 60
+_GIF_COLORS = 128
+_WHITE = 244  # brightness of 255 from which on a colour is white
+_CYCLE = 3600  # of the whole
+_MIN_FRAME = 50
+_MAX_FRAME = 160
+_DPI = 80
 
 
 def figures(study: Study, result: Result) -> Gallery:
@@ -111,12 +121,12 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
 def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
     """Columns by kind and unit, in the order of `_RANKS`, the most informative first."""
     section = study.kinematics
-    asked = section.outputs if section is not None and section.outputs is not None else ()
+    asked = section is not None and section.outputs
     values = {column.name: column.values for column in columns}
     unit_of = {column.name: column.unit for column in columns}
     units = study.units
     sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): study.mechanism.size}
-    rank = ranks(study.mechanism, tuple(asked))
+    rank = ranks(study)
     # The condition of a single number is 1, that of each pose is for its table.
     left_out = {"conditioning"} | ({"inverse_condition"} if len(study.mechanism.drives) == 1 else set())
     panels: dict[tuple[str, str], list[_Curve]] = {}
@@ -258,9 +268,7 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
 
 def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
     """Draw the path of every moving point, bold ones for outputs and coupler points, as `ranks` has them."""
-    section = sweep.study.kinematics
-    asked = section.outputs if section is not None and section.outputs is not None else ()
-    ranked = ranks(sweep.mechanism, tuple(asked))
+    ranked = ranks(sweep.study)
     # Where all points are of a low rank, none is thin.
     lift = 2 - max(ranked.values(), default=2)
     colors = link_colors(sweep.mechanism)
@@ -291,12 +299,11 @@ def modes_figure(study: Study, result: Result) -> Figure:
     if found > moving:
         notes.append(f"{found - moving} of {found} assemblies have no valid pose")
     places = np.concatenate([sweep.extent for _, sweep in shown])
-    _, wide, tall = extent(places)
-    columns = max(
-        range(1, min(len(shown), _MAX_COLUMNS) + 1),
-        key=lambda count: scale_of(wide, tall, *_room(count, math.ceil(len(shown) / count)), _pad(count)),
-    )
-    window = fit(places, *_room(columns, math.ceil(len(shown) / columns)), _pad(columns))
+    fitted = {
+        columns: fit(places, *_room(columns, math.ceil(len(shown) / columns)), 0.4 if columns == 1 else 0.2)
+        for columns in range(1, min(len(shown), _MAX_COLUMNS) + 1)
+    }
+    columns, window = max(fitted.items(), key=lambda item: item[1].scale)
     unit, top = study.units.label("length"), _NOTE if notes else 0.0
     figure, grid = windows(window, unit, len(shown), columns, gap=_GAP, above=_PANEL_TITLE, top=top)
     for axes, (title, sweep) in zip(grid, shown, strict=True):
@@ -310,12 +317,85 @@ def modes_figure(study: Study, result: Result) -> Figure:
     return figure
 
 
-def _pad(columns: int) -> float:
-    """Inches around what a panel shows."""
-    return 0.4 if columns == 1 else 0.2
-
-
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches: all of them on about one screen."""
     width = (style.WIDTH - LEFT - RIGHT - _GAP * (columns - 1)) / columns
     return width, min(max(8.0 / rows, _MIN_HEIGHT), _MAX_HEIGHT)
+
+
+def animation(result: Result) -> bytes:
+    """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
+    sweep = Sweep.of(result.drawn["motion"])
+    return gif(sweep) if sweep.poses.motion and len(sweep.valid) else b""
+
+
+def gif(sweep: Sweep) -> bytes:
+    """The valid poses of a motion as an endless GIF; back again where it does not end where it began.
+
+    At most `FRAMES` frames. Poses that are not valid have none; the title says how many.
+
+    Matplotlib draws what stands still once and what moves in every frame; Pillow gives all frames one small palette, so
+    that a frame stores only what changed: a tenth of the time and the bytes of `matplotlib.animation.PillowWriter`.
+    """
+    valid, closed = in_order(sweep), sweep.closed
+    # A closed motion begins again with its last pose; another shows its inner poses twice.
+    most = FRAMES + 1 if closed else FRAMES // 2 + 1
+    some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
+    figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=HEIGHT, above=TITLE)
+    figure.set_dpi(_DPI)
+    draw_paths(axes, sweep)
+    pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)
+    pictures = pictures if closed else pictures + pictures[-2:0:-1]
+    palette = _palette(pictures)
+    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    pause = min(max(_CYCLE // len(frames), _MIN_FRAME), _MAX_FRAME) // 10 * 10
+    stream = io.BytesIO()
+    frames[0].save(stream, format="GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0)
+    return stream.getvalue()
+
+
+def in_order(sweep: Sweep) -> np.ndarray:
+    """Valid poses; a turn that does not close everywhere begins behind the gap, so that its motion is in one piece."""
+    valid = sweep.valid
+    gaps = np.flatnonzero(np.diff(valid) > 1)
+    if sweep.returns and len(gaps):
+        valid = np.roll(valid[1:], -gaps[0])
+    return valid
+
+
+def _frames(figure: Figure, axes: Axes, sweep: Sweep, indices: np.ndarray) -> list[Image.Image]:
+    canvas: Any = figure.canvas  # the Agg canvas; its own methods have no types
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+    failed = len(sweep.rows) - len(sweep.valid)
+    note = f"   ({failed} of {len(sweep.rows)} poses not valid)" if failed else ""
+    standing = set(axes.get_children())
+    pictures = []
+    for index in indices.tolist():
+        draw_mechanism(
+            axes, sweep.mechanism, sweep.configuration, index, labels=False, drives=False, travel=sweep.travel
+        )
+        axes.text(0.0, 1.02, sweep.words(index) + note, transform=axes.transAxes, fontsize=10.5, color=style.INK)
+        moving = [artist for artist in axes.get_children() if artist not in standing]
+        canvas.restore_region(still)
+        for artist in sorted(moving, key=lambda artist: artist.get_zorder()):
+            axes.draw_artist(artist)
+            artist.remove()
+        pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy()))
+    return pictures
+
+
+def _palette(pictures: list[Image.Image]) -> Image.Image:
+    """Colours that do for all frames, from some of them."""
+    some = pictures[:: max(1, len(pictures) // 4)]
+    width, height = some[0].size
+    sheet = Image.new("RGB", (width, height * len(some)))
+    for k, picture in enumerate(some):
+        sheet.paste(picture, (0, k * height))
+    found = sheet.quantize(colors=_GIF_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    colors = np.array(found.getpalette()).reshape(-1, 3)
+    # Means of the lightest colours are not quite the white of the page.
+    colors[colors.min(axis=1) >= _WHITE] = 255
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colors.ravel().tolist())
+    return palette

@@ -38,7 +38,7 @@ class Label:
     heading : float or None
         Preferred direction from the anchor, radians.
     optional : bool
-        Left out where it would cover something.
+        In italics, and left out where it would cover something.
     """
 
     text: str
@@ -47,7 +47,6 @@ class Label:
     reach: float = 7.0
     heading: float | None = None
     size: float = 10.0
-    italic: bool = False
     optional: bool = False
 
 
@@ -90,7 +89,7 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
         taken[count], count = box, count + 1
         axes.annotate(
             label.text, (anchor.real, anchor.imag), xytext=tuple(offset), textcoords="offset points", ha="center",
-            va="center", color=label.color, fontsize=label.size, fontstyle="italic" if label.italic else "normal",
+            va="center", color=label.color, fontsize=label.size, fontstyle="italic" if label.optional else "normal",
             zorder=order, path_effects=[withStroke(linewidth=2.2, foreground="white")],
         )  # fmt: skip
 

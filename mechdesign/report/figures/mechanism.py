@@ -15,7 +15,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, extent, fit, framed, scale_of, windows
+from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
 from mechdesign.results import Result
@@ -99,14 +99,9 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
         places += scene.points.values()
         for guide in scene.guides:
             places += guide.ends(travel, scene.span)
-    _, wide, tall = extent(places)
     count = len(panels)
-
-    def scale(columns: int) -> float:
-        return scale_of(wide, tall, *_room(columns, count // columns))
-
-    columns = count if count == 1 or scale(count) >= 0.55 * scale(1) else 1
-    window = fit(places, *_room(columns, count // columns))
+    beside, stacked = fit(places, *_room(count, 1)), fit(places, *_room(1, count))
+    columns, window = (count, beside) if beside.scale >= 0.55 * stacked.scale else (1, stacked)
     titles = [textwrap.fill(title, int(window.width * _LETTERS_AN_INCH)) for title, _, _ in panels]
     above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
     figure, grid = windows(window, study.units.label("length"), count, columns, above=above)
@@ -146,15 +141,15 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
 
 def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
     """The beams of a link, all in one line, and its brackets."""
-    from mechdesign.analyses.stiffness.elements import beams_of, course_of
+    from mechdesign.analyses.stiffness.elements import corners_of, course_of
 
     mechanism = study.mechanism
     link = mechanism.description.links[name]
-    beams = beams_of(link)
-    yield "elastic beam", np.array([np.ravel(configuration.point(corner))[index] for corner in beams.corners])
-    if link.telescopic or len(beams.corners) < 2:
+    corners = corners_of(link)
+    yield "elastic beam", np.array([np.ravel(configuration.point(corner))[index] for corner in corners])
+    if link.telescopic or len(corners) < 2:
         return
-    course = course_of(beams, configuration)
+    course = course_of(link, configuration)
     riding = [joint.point for joint in mechanism.description.joints.values()
               if not isinstance(joint, Fixed) and joint.line.link == name]  # fmt: skip
     for point in (*link.points, *riding):

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from matplotlib.tri import Triangulation
 
-from mechdesign.analyses.optimize.tables import Comparison
+from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.kinematics import paths_figure
@@ -38,31 +38,31 @@ _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 def figures(study: Study, result: Result) -> Gallery:
     """``CPI`` (the score over the variables), ``indices``, ``designs``, ``pareto``, ``convergence`` and ``optimum``."""
     assert study.optimize is not None
-    compared: Comparison = result.drawn["compared"]
-    designs, found = compared.designs, Gallery()
+    designs: Designs = result.drawn["designs"]
+    found = Gallery()
     if len(designs.variables) == 2 and len(designs) >= MIN_MAP_DESIGNS:
-        found.add("CPI", score_surface, compared)
+        found.add("CPI", score_surface, designs)
         if len(designs.goals) > 1:
-            found.add("indices", goal_maps, compared)
+            found.add("indices", goal_maps, designs)
     else:
-        found.add("CPI", score_curves, compared)
+        found.add("CPI", score_curves, designs)
     if len(designs.variables) > 2:
-        found.add("designs", parallel_axes, compared)
+        found.add("designs", parallel_axes, designs)
     if "pareto" in result.tables:
-        found.add("pareto", front_figure, compared, result.tables["pareto"])
+        found.add("pareto", front_figure, designs, result.tables["pareto"])
     if study.optimize.method == "search":
-        found.add("convergence", convergence, compared)
-    found.add("optimum", _optimum, result, compared)
+        found.add("convergence", convergence, designs)
+    found.add("optimum", _optimum, result, designs)
     return found
 
 
-def _optimum(result: Result, compared: Comparison) -> Figure:
+def _optimum(result: Result, designs: Designs) -> Figure:
     """The best design itself: in its workspace where that was judged, in its motion where that was."""
-    words = in_words(compared, compared.best)
+    words = in_words(designs, designs.best)
     best, own = result.drawn["best"]()
     if own.command == "workspace":
         return workspace_figure(best, own, regions(best, own)[0], f"the best design, {words}")
-    goals = compared.designs.goals
+    goals = designs.goals
     if any(each.command == "kinematics" for each in goals) and own.drawn["motion"].poses.motion:
         figure = paths_figure(Sweep.of(own.drawn["motion"]), above=0.4)
         figure.axes[0].set_title(f"The best design, {words}", loc="left")
@@ -71,27 +71,27 @@ def _optimum(result: Result, compared: Comparison) -> Figure:
     return mechanism_figure(best, own, f"The best design, {words.replace(' = ', _UNBROKEN_EQUALS)}")
 
 
-def label(compared: Comparison, name: str) -> str:
+def label(designs: Designs, name: str) -> str:
     """Name and unit of a variable or a goal, for an axis."""
-    return style.axis_label(name, compared.unit_of(name))
+    return style.axis_label(name, designs.unit_of(name))
 
 
-def in_words(compared: Comparison, row: int) -> str:
+def in_words(designs: Designs, row: int) -> str:
     """``l_a = 1, l_b = 2.15`` of a design."""
-    return ", ".join(f"{name} = {value:.4g}" for name, value in compared.designs.numbers(row).items())
+    return ", ".join(f"{name} = {value:.4g}" for name, value in designs.numbers(row).items())
 
 
-def score_curves(compared: Comparison) -> Figure:
+def score_curves(designs: Designs) -> Figure:
     """The best score for each value of each variable, with the goals of that design [S1, Fig. 3(a)].
 
     Of scattered designs each is a dot.
     """
-    designs, winner = compared.designs, compared.best
+    winner = designs.best
     many, count, one = len(designs.goals) > 1, len(designs.variables), designs.goals[0]
     across = min(count, 3) if count > 2 else 1
     down = -(-count // across)
     figure = style.new_figure(0.9 + (2.9 if across == 1 else 2.5) * down)
-    score, told = (compared.cpi, "CPI") if many else (compared.values[:, 0], one.name)
+    score, told = (designs.cpi, "CPI") if many else (designs.values[:, 0], one.name)
     for number, (name, column) in enumerate(designs.variables.items()):
         axes = figure.add_subplot(down, across, number + 1)
         inside = column[designs.feasible]
@@ -100,16 +100,16 @@ def score_curves(compared: Comparison) -> Figure:
             axes.plot(inside, score[designs.feasible], ".", color=style.FAINT, markersize=4, markeredgewidth=0,
                       label="designs")  # fmt: skip
         else:
-            order = np.lexsort([-np.where(designs.feasible, compared.cpi, -np.inf), column])
+            order = np.lexsort([-np.where(designs.feasible, designs.cpi, -np.inf), column])
             best = order[np.searchsorted(column[order], values)]
             axes.plot(values, score[best], color=style.INK, linewidth=2.0, label=told)
             for k, color in zip(range(len(designs.goals)) if many else (), style.PALETTE, strict=False):
                 shown = f"{designs.goals[k].name}, normalised"
-                axes.plot(values, compared.share(k)[best], color=color, label=shown)
+                axes.plot(values, designs.share(k)[best], color=color, label=shown)
         axes.plot(column[winner], score[winner], "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
         axes.set_title(f"best: {name} = {column[winner]:.4g}", loc="right", fontsize=9, color=style.VERMILION)
-        axes.set_xlabel(label(compared, name))
-        axes.set_ylabel("" if number % across else "index" if many else label(compared, told))
+        axes.set_xlabel(label(designs, name))
+        axes.set_ylabel("" if number % across else "index" if many else label(designs, told))
         axes.margins(x=0.02)
         if not many and _steep(score[designs.feasible]):
             axes.set_yscale("log")
@@ -128,18 +128,18 @@ def _steep(values: Floats) -> bool:
     return bool((finite > 0).all() and finite.max() > 30 * finite.min())
 
 
-def score_surface(compared: Comparison) -> Figure:
+def score_surface(designs: Designs) -> Figure:
     """The score over two variables as a map, with the best design for each row of weights [S1, Fig. 3(b)]."""
-    goals, (x, y) = [each.name for each in compared.designs.goals], compared.designs.variables.values()
+    goals, (x, y) = [each.name for each in designs.goals], designs.variables.values()
     many = len(goals) > 1
     figure = style.new_figure(5.2)
     axes = figure.add_subplot()
-    filled = _fill(axes, compared, compared.cpi if many else compared.values[:, 0])
-    what = "composite performance index CPI" if many else label(compared, goals[0])
+    filled = _fill(axes, designs, designs.cpi if many else designs.values[:, 0])
+    what = "composite performance index CPI" if many else label(designs, goals[0])
     digits = FuncFormatter(lambda value, _: f"{value:.3g}")
     style.color_bar(figure, filled, what, ax=axes, pad=0.02, format=digits).minorticks_off()
     shown: dict[tuple[float, float], list[str]] = {}
-    for row, weights in zip(compared.winners, compared.weights, strict=True):
+    for row, weights in zip(designs.winners, designs.weights, strict=True):
         shown.setdefault((x[row], y[row]), []).append(f"({', '.join(f'{weight:g}' for weight in weights)})")
     for k, (place, rows) in enumerate(shown.items()):
         words = f"{place[0]:.4g}, {place[1]:.4g}: " + (f"best for {' '.join(rows)}" if many else "best")
@@ -151,35 +151,34 @@ def score_surface(compared: Comparison) -> Figure:
     return figure
 
 
-def goal_maps(compared: Comparison) -> Figure:
+def goal_maps(designs: Designs) -> Figure:
     """Each goal over two variables, side by side."""
-    goals = compared.designs.goals
+    goals = designs.goals
     columns = min(len(goals), 3)
     rows = -(-len(goals) // columns)
     figure = style.new_figure(0.3 + 2.7 * rows)
     for number, goal in enumerate(goals):
         axes = figure.add_subplot(rows, columns, number + 1)
-        filled = _fill(axes, compared, compared.values[:, number])
+        filled = _fill(axes, designs, designs.values[:, number])
         style.color_bar(figure, filled, ax=axes, location="bottom", pad=0.02).ax.locator_params(nbins=4)
-        axes.set_title(label(compared, goal.name), loc="left")
+        axes.set_title(label(designs, goal.name), loc="left")
         if number % columns:
             axes.set_ylabel("")
     return figure
 
 
-def _fill(axes: Axes, compared: Comparison, values: Floats) -> ScalarMappable:
+def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
     """Filled contours over two variables whose bounds may depend on each other; dots where designs are scattered."""
-    designs = compared.designs
     across, up = designs.variables
-    axes.set_xlabel(label(compared, across))
-    axes.set_ylabel(label(compared, up))
+    axes.set_xlabel(label(designs, across))
+    axes.set_ylabel(label(designs, up))
     axes.grid(visible=False)
     inside = designs.feasible & np.isfinite(values)
     x, y, z = (column[inside] for column in (*designs.variables.values(), values))
     steps = [np.unique(np.round(v, 9)) for v in (x, y)]
     on_a_grid = len(steps[0]) * len(steps[1]) <= 4 * len(z)
     if not on_a_grid or len(steps[0]) < 2 or len(steps[1]) < 2 or len(z) < 4:
-        order = np.argsort(compared.cpi[inside] if any(each.smallest for each in designs.goals) else z)
+        order = np.argsort(designs.cpi[inside] if any(each.smallest for each in designs.goals) else z)
         axes.margins(0.03)
         return axes.scatter(x[order], y[order], c=z[order], s=14, cmap=style.COLORMAP, linewidths=0)
     # In steps of the grid triangles are well shaped; those that span missing designs are left out.
@@ -196,23 +195,22 @@ def _fill(axes: Axes, compared: Comparison, values: Floats) -> ScalarMappable:
     return filled
 
 
-def parallel_axes(compared: Comparison) -> Figure:
+def parallel_axes(designs: Designs) -> Figure:
     """Each feasible design a line across its variables and goals, the colour its score, the best of all on top."""
-    designs = compared.designs
     names = [*designs.variables, *(each.name for each in designs.goals)]
     rows = np.flatnonzero(designs.feasible)
-    rows = rows[np.argsort(compared.cpi[rows], kind="stable")]
+    rows = rows[np.argsort(designs.cpi[rows], kind="stable")]
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MAX_LINES)).astype(int))]
-    columns = np.column_stack([*designs.variables.values(), compared.values])
+    columns = np.column_stack([*designs.variables.values(), designs.values])
     low, high = columns[designs.feasible].min(axis=0), columns[designs.feasible].max(axis=0)
     heights = np.where(high > low, (columns - low) / np.where(high > low, high - low, 1.0), 0.5)
     figure = style.new_figure(4.2)
     axes = figure.add_subplot()
     places = np.arange(len(names))
     lines = [np.column_stack([places, heights[row]]) for row in rows]
-    drawn = LineCollection(lines, array=compared.cpi[rows], cmap=style.COLORMAP, linewidths=0.8, alpha=0.75)
+    drawn = LineCollection(lines, array=designs.cpi[rows], cmap=style.COLORMAP, linewidths=0.8, alpha=0.75)
     axes.add_collection(drawn)
-    axes.plot(places, heights[compared.best], "o-", color=style.VERMILION, linewidth=2.2, label="best", clip_on=False,
+    axes.plot(places, heights[designs.best], "o-", color=style.VERMILION, linewidth=2.2, label="best", clip_on=False,
               zorder=4)  # fmt: skip
     for place, ends in enumerate(zip(low, high, strict=True)):
         axes.axvline(place, color=style.INK, linewidth=0.8, zorder=3)
@@ -220,7 +218,7 @@ def parallel_axes(compared: Comparison) -> Figure:
         axes.text(place, 1.03, f"{ends[1]:.4g}", ha="center", va="bottom", fontsize=8.5)
     axes.set_xlim(-0.3, len(names) - 0.7)
     axes.set_ylim(-0.02, 1.02)
-    axes.set_xticks(places, [_folded(label(compared, name)) for name in names])
+    axes.set_xticks(places, [_folded(label(designs, name)) for name in names])
     axes.tick_params(axis="x", length=0, pad=18)
     axes.set_yticks([])
     axes.spines[["left", "bottom"]].set_visible(False)
@@ -242,15 +240,14 @@ def _folded(name: str) -> str:
     return "\n".join(lines)
 
 
-def convergence(compared: Comparison) -> Figure:
+def convergence(designs: Designs) -> Figure:
     """The best score found so far over the number of designs evaluated, a line a row of weights."""
-    designs = compared.designs
     figure = style.new_figure(3.6)
     axes = figure.add_subplot()
     count = np.arange(1, len(designs) + 1)
     if len(designs.goals) > 1:
-        for row in compared.weights:
-            so_far = np.maximum.accumulate(np.nan_to_num(compared.score(row), nan=-np.inf))
+        for row in designs.weights:
+            so_far = np.maximum.accumulate(np.nan_to_num(designs.score(row), nan=-np.inf))
             known = np.isfinite(so_far)
             weights = ", ".join(f"{weight:g}" for weight in row)
             axes.step(count[known], so_far[known] / so_far[-1], where="post", label=f"({weights})")
@@ -260,39 +257,38 @@ def convergence(compared: Comparison) -> Figure:
                     alignment="left")  # fmt: skip
     else:
         (goal,) = designs.goals
-        values = np.where(designs.feasible, compared.values[:, 0], np.inf if goal.smallest else -np.inf)
+        values = np.where(designs.feasible, designs.values[:, 0], np.inf if goal.smallest else -np.inf)
         so_far = (np.minimum if goal.smallest else np.maximum).accumulate(values)
         known = np.isfinite(so_far)
         axes.step(count[known], so_far[known], where="post", color=style.BLUE)
         found = so_far[known]
         if (found > 0).all() and found.max() > 20 * found.min():
             axes.set_yscale("log")
-        axes.set_ylabel(f"best {label(compared, goal.name)} so far")
+        axes.set_ylabel(f"best {label(designs, goal.name)} so far")
     axes.set_xlabel("designs evaluated")
     axes.set_title("Convergence of the search", loc="left")
     axes.margins(x=0.01)
     return figure
 
 
-def front_figure(compared: Comparison, front: Table) -> Figure:
+def front_figure(designs: Designs, front: Table) -> Figure:
     """Every feasible design, those of the front, and the knee; a panel each pair of goals."""
-    pairs = list(combinations(range(len(compared.designs.goals)), 2))
+    pairs = list(combinations(range(len(designs.goals)), 2))
     columns = min(len(pairs), 3)
     rows = -(-len(pairs) // columns)
     figure = style.new_figure(4.8 if len(pairs) == 1 else 0.8 + 2.9 * rows)
     for number, pair in enumerate(pairs):
-        _front(figure.add_subplot(rows, columns, number + 1), compared, front, pair)
+        _front(figure.add_subplot(rows, columns, number + 1), designs, front, pair)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=2 if len(labels) > 2 else 3)
-    number = int(compared.designs.feasible.sum())
+    number = int(designs.feasible.sum())
     figure.suptitle(f"Pareto front: {len(front)} of {number} feasible designs", x=0.01, ha="left", fontsize=11)
     return figure
 
 
-def _front(axes: Axes, compared: Comparison, front: Table, pair: tuple[int, int]) -> None:
-    designs = compared.designs
+def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) -> None:
     goals = [designs.goals[k] for k in pair]
-    x, y = compared.values[designs.feasible][:, pair].T
+    x, y = designs.values[designs.feasible][:, pair].T
     axes.plot(x, y, ".", color=style.FAINT, markersize=3, alpha=0.5, markeredgewidth=0, label="feasible designs")
     along, up = (np.asarray(front[goal.name], dtype=float) for goal in goals)
     order = np.argsort(along, kind="stable")
@@ -303,7 +299,7 @@ def _front(axes: Axes, compared: Comparison, front: Table, pair: tuple[int, int]
         words = ", ".join(f"{name} = {front[name][row]:.4g}" for name in designs.variables)
         axes.plot(along[row], up[row], "*", color=style.VERMILION, markeredgecolor="white", markersize=15,
                   linestyle="none", label=f"knee: {words}", zorder=5)  # fmt: skip
-    across, upwards = (f"{label(compared, g.name)}, {'less' if g.smallest else 'more'} is better" for g in goals)
+    across, upwards = (f"{label(designs, g.name)}, {'less' if g.smallest else 'more'} is better" for g in goals)
     axes.set_xlabel(across)
     axes.set_ylabel(upwards)
     # Designs far worse than the front would press it into a corner.

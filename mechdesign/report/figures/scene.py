@@ -19,6 +19,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Link, Slot
 from mechdesign.numerics.arrays import Complexes, Ints
 from mechdesign.report.figures.framing import extent
+from mechdesign.study import Study
 
 _TRAVEL_POSES = 100  # poses from which the travel of the slides is taken
 # Two poses are one where no point is farther apart than this part of the mechanism's size.
@@ -227,12 +228,13 @@ class Sweep(Shown):
         return words.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
 
 
-def ranks(mechanism: Mechanism, outputs: tuple[str, ...] = ()) -> dict[str, int]:
+def ranks(study: Study) -> dict[str, int]:
     """How boldly the path of each moving point is drawn.
 
     2 for points that are asked for and points of one link only (a coupler point, a tool), 1 for joints between moving
     links, 0 for points that turn about a pivot of the ground or slide along a line of it.
     """
+    mechanism, section = study.mechanism, study.kinematics
     links = mechanism.description.links
     ground = set(link_points(links[GROUND]))
     uses = Counter(point for link in links.values() for point in link_points(link))
@@ -245,7 +247,7 @@ def ranks(mechanism: Mechanism, outputs: tuple[str, ...] = ()) -> dict[str, int]
         points = link_points(link)
         if name != GROUND and not link.telescopic and ground & set(points):
             simple |= set(points)
-    asked = {name.split(".")[0] for name in outputs}
+    asked = {name.split(".")[0] for name in (section and section.outputs) or ()}
     found = {}
     for point in mechanism.points:
         if point in ground:

@@ -14,16 +14,15 @@ from matplotlib.lines import Line2D
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
-from mechdesign.analyses.stiffness.elements import course_of
+from mechdesign.analyses.stiffness.elements import corners_of, course_of
 from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism, link_colors, name_labels
+from mechdesign.report.figures.drawing import draw_mechanism, point_labels
 from mechdesign.report.figures.framing import MAX_HEIGHT, TITLE, framed
 from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.panels import along
-from mechdesign.report.figures.planes import Plane, map_sheet, plane
+from mechdesign.report.figures.panels import Plane, along, map_sheet, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
@@ -69,8 +68,7 @@ def _springs(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
     figure, axes = posed(study, poses, drawn, places, "equivalent springs", labels=False, drives=False)
     draw_coils(axes, coils)
-    points = [label for label in name_labels(scene, link_colors(study.mechanism), ()) if not label.italic]
-    place_labels(axes, coil_labels(coils) + points, covered(axes), order=8)
+    place_labels(axes, [coil.label for coil in coils] + point_labels(scene), covered(axes), order=8)
     return figure
 
 
@@ -190,6 +188,14 @@ class Coil:
         wave = _COIL_SWING * self.length * np.sin(2 * np.pi * _COIL_TURNS * inside)
         return self.place + span * (share + 1j * wave / abs(span))
 
+    @property
+    def label(self) -> Label:
+        """Its stiffness, beside its middle."""
+        span = self.anchor - self.place
+        anchors = tuple(self.place + share * span for share in (0.5, 0.56, 0.44, 0.62, 0.38))
+        heading = float(np.angle(1j * span if (1j * span).real > 0 else -1j * span))
+        return Label(self.text, anchors, style.VERMILION, 11, heading, 9.5)
+
 
 def quantity(value: float, unit: str) -> str:
     """A stiffness with three digits: ``3.74e+07 N/m`` as 3.74·10⁷ N/m."""
@@ -218,17 +224,6 @@ def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:
         _line(axes, np.array([coil.anchor - bar, coil.anchor + bar]), 1.6, 0.1)
         for foot in coil.anchor + np.linspace(-1, 1, 6) * bar:
             _line(axes, np.array([foot, foot + (0.1 + 0.07j) * along]), 1.0, 0.1)
-
-
-def coil_labels(coils: Sequence[Coil]) -> list[Label]:
-    """The stiffness of each spring, beside its middle."""
-    labels = []
-    for coil in coils:
-        span = coil.anchor - coil.place
-        anchors = tuple(coil.place + share * span for share in (0.5, 0.56, 0.44, 0.62, 0.38))
-        heading = float(np.angle(1j * span if (1j * span).real > 0 else -1j * span))
-        labels.append(Label(coil.text, anchors, style.VERMILION, 11, heading, 9.5))
-    return labels
 
 
 def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: object) -> None:
@@ -302,8 +297,8 @@ def _bent(
     """The beams of an elastic link between the places where something sits, and its brackets."""
     beam = ways[0].beam
     assert beam is not None
-    course = course_of(beam.beams, configuration)
-    sitting = [(ways[0].a, beam.beams.corners[0]), *((edge.b, edge.point) for edge in ways)]
+    course = course_of(beam.link, configuration)
+    sitting = [(ways[0].a, corners_of(beam.link)[0]), *((edge.b, edge.point) for edge in ways)]
     feet = [float(course.foot(point, configuration.point(point))[0]) for _, point in sitting]
     bases = [complex(course.place(np.array([foot]))[0]) for foot in feet]
     order = sorted(range(len(feet)), key=feet.__getitem__)

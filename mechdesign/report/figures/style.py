@@ -14,6 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
+from matplotlib.colors import BoundaryNorm
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
@@ -113,6 +115,18 @@ def levels(low: float, high: float, number: int) -> Floats:
     if high - low <= 1e-9 * max(abs(low), abs(high)):
         low, high = low - 0.5 * max(abs(low), 1e-12), high + 0.5 * max(abs(high), 1e-12)
     return np.asarray(MaxNLocator(nbins=number, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
+
+
+def steps(levels: Floats, low: float, high: float) -> BoundaryNorm:
+    """A colour between each two levels, and one beyond each end that values from `low` to `high` pass."""
+    ends: list[Literal["neither", "min", "max", "both"]] = ["neither", "min", "max", "both"]
+    return BoundaryNorm(levels, 256, extend=ends[bool(low < levels[0]) + 2 * bool(high > levels[-1])])
+
+
+def filled(axes: Axes, x: Floats, y: Floats, values: Floats, norm: BoundaryNorm, lines: Floats) -> QuadContourSet:
+    """Fill between the levels of a norm, and draw white lines at some of them, which are returned."""
+    axes.contourf(x, y, values, levels=norm.boundaries, cmap=COLORMAP, norm=norm, extend=norm.extend)
+    return axes.contour(x, y, values, levels=lines, colors="white", linewidths=0.5, linestyles="solid", alpha=0.7)
 
 
 def axis_label(name: str, unit: str = "") -> str:

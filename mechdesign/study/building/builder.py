@@ -75,7 +75,7 @@ class Builder:
         """
         what = {"angle": "link", "distance": "point"}.get(what, what)
         known: Iterable[str] = self.section.owners if what == "point" else getattr(self.section, f"{what}s")
-        # All of them are looked up, so that every mistake is told.
+        # All of them are looked up, so that every mistake is reported.
         found = [self.check_name(name, known, what, (*path, k)) for k, name in enumerate(names)]
         return all(found)
 

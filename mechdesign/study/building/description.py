@@ -163,11 +163,10 @@ def _check_pins(builder: Builder) -> None:
         points = section.points_of(pair[0])
         pinned = [point for point in points if point in (section.points_of(pair[1]) if joint.prismatic else [pair[1]])]
         if pinned and (joint.prismatic or section.owners[pinned[0]] != [pair[0]]):
-            what = (
-                "a point that two links name pins them together" if joint.prismatic else "a pin holds it to that link"
-            )
-            mend = "give the slider's point a name of its own" if joint.prismatic else "leave it out there"
-            message = f"point {pinned[0]!r} is on link {pair[0]!r} too, so that it cannot slide: {what}; {mend}"
+            mend = "a pin holds it to that link; leave it out there"
+            if joint.prismatic:
+                mend = "a point that two links name pins them together; give the slider's point a name of its own"
+            message = f"point {pinned[0]!r} is on link {pair[0]!r} too, so that it cannot slide: {mend}"
             builder.report(("joints", name), message)
 
 

@@ -54,15 +54,8 @@ class Parameters:
     def places(self, changed: Mapping[str, ArrayLike]) -> dict[str, Number]:
         """Places that differ from the nominal geometry where parameters or places have other values.
 
-        Parameters
-        ----------
-        changed : mapping of str to array_like
-            Values, in the study's units, of parameters or of single places; arrays broadcast against each other.
-
-        Returns
-        -------
-        dict of str to float or ndarray
-            Lengths in the study's unit, angles in radians.
+        Values are given in the study's units, and broadcast against each other; places come as lengths in the study's
+        unit and angles in radians.
 
         Raises
         ------

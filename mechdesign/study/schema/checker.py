@@ -29,13 +29,16 @@ class Checker:
         self.report = builder.reporter.report
 
     def coordinate(
-        self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = ()
+        self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = (), order: int | None = None
     ) -> Quantity | None:
         """Kind of a coordinate; None, and noted, where there is none of that name.
 
-        `others` are names that might have stood there as well.
+        `others` are names that might have stood there as well. With an `order` the unit of its value (0), rate (1) or
+        acceleration (2) is checked.
         """
         quantity = self.mechanism.coordinates.get(name)
+        if order is not None and quantity in ORDERS:
+            self.kind(path, ORDERS[quantity][order])
         if quantity is None:
             if name in self.mechanism.owners:
                 self.report(path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key)
@@ -51,9 +54,7 @@ class Checker:
     def coordinates(self, names: Iterable[str], path: KeyPath, order: int = 0) -> None:
         """Check the coordinates that are keys of a mapping, and the units of their values, rates or accelerations."""
         for name in names:
-            quantity = self.coordinate(name, (*path, name), at_key=True)
-            if quantity in ORDERS:
-                self.kind((*path, name), ORDERS[quantity][order])
+            self.coordinate(name, (*path, name), at_key=True, order=order)
 
     def outputs(self, outputs: Iterable[str] | None, path: KeyPath) -> None:
         """Check a list of coordinates and points that are asked for."""

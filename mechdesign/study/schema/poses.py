@@ -164,11 +164,8 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
 def _check_speed(checker: Checker, section: MotionSection) -> None:
     for key in ("rates", "accelerations"):
         if getattr(section, key):
-            checker.report(
-                (section.command, key),
-                f"'speed' and {key!r} are both given; a path is passed at one of them",
-                at_key=True,
-            )
+            message = f"'speed' and {key!r} are both given; a path is passed at one of them"
+            checker.report((section.command, key), message, at_key=True)
     path = _source(checker, section).path
     if path is None:
         message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"

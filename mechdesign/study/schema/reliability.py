@@ -274,21 +274,14 @@ class ReliabilitySection(MotionSection):
         return super().checked(checker).model_copy(update=filled | {"outputs": outputs, "limits": limits})
 
 
-def _point_of(mechanism: MechanismSection, name: str) -> str:
-    """The point that the name of an error is about; empty where it is about none."""
-    for suffix in reversed(SUFFIXES):
-        base = name.removesuffix(suffix).removesuffix(".x").removesuffix(".y")
-        if base in mechanism.owners:
-            return base
-    return ""
-
-
 def split_link(mechanism: MechanismSection, name: str) -> tuple[str, str, str]:
     """The link that a coordinate or point is said to be of, or nothing, the name without it, and the point."""
     link, _, rest = name.partition(".")
-    if name in mechanism.coordinates or link not in mechanism.links or not (point := _point_of(mechanism, rest)):
+    points = {part: point for point in mechanism.owners for part in (point, *mechanism.coordinates_of(point))}
+    base, _ = split_order(rest, points.__contains__)
+    if name in mechanism.coordinates or link not in mechanism.links or base not in points:
         return "", name, ""
-    return link, rest, point
+    return link, rest, points[base]
 
 
 def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
@@ -346,14 +339,11 @@ def _allocate(
                       at_key=True)  # fmt: skip
     if not section.limits:
         checker.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
-    wide = [name for name, dimension in dimensions.items() if name not in LOADS and _varies(dimension)]
+    wide = any(d.sigma if d.tolerance is None else d.tolerance[0] < d.tolerance[1]
+               for name, d in dimensions.items() if name not in LOADS)  # fmt: skip
     if not wide and not section.allocate.cost:
         message = "nothing to allocate: no dimension has a tolerance, and a clearance is held unless 'cost' names it"
         checker.report(("reliability", "allocate"), message)
-
-
-def _varies(dimension: Dimension) -> bool:
-    return bool(dimension.sigma) if dimension.tolerance is None else dimension.tolerance[0] < dimension.tolerance[1]
 
 
 def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
@@ -400,9 +390,7 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
     elif base in mechanism.owners:
         report(path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True)
     else:
-        quantity = checker.coordinate(base, path, at_key=True)
-        if quantity in ORDERS:
-            checker.kind(path, ORDERS[quantity][order])
+        checker.coordinate(base, path, at_key=True, order=order)
 
 
 def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dimension]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.study.schema.reliability import Precision
 
 # Of all intervals.
 CONFIDENCE = 0.997
@@ -19,24 +20,20 @@ CONFIDENCE = 0.997
 WIDTH = 2.97
 
 
-@dataclass(frozen=True)
-class Precision:
-    """How wide the 99.7 % interval may be: half of it, or the standard error as a share of the failure probability."""
+def _half_wanted(precision: Precision, value: float) -> float:
+    """Half of the widest interval that is narrow enough."""
+    return precision.half_width if precision.half_width is not None else WIDTH * (precision.relative or 0.0) * value
 
-    relative: float | None
-    half_width: float | None
 
-    def _half(self, value: float) -> float:
-        return self.half_width if self.half_width is not None else WIDTH * (self.relative or 0.0) * value
+def reached(precision: Precision, value: float, low: float, high: float) -> bool:
+    """Whether an interval is narrow enough."""
+    return 0.5 * (high - low) <= _half_wanted(precision, value)
 
-    def reached(self, value: float, low: float, high: float) -> bool:
-        """Whether an interval is narrow enough."""
-        return 0.5 * (high - low) <= self._half(value)
 
-    def needed(self, value: float, variance: float) -> float:
-        """Samples that reach it, from the value and the variance of one sample."""
-        half = self._half(value)
-        return WIDTH**2 * variance / half**2 if half > 0 else float("inf")
+def needed(precision: Precision, value: float, variance: float) -> float:
+    """Samples that reach a precision, from the value and the variance of one sample."""
+    half = _half_wanted(precision, value)
+    return WIDTH**2 * variance / half**2 if half > 0 else float("inf")
 
 
 def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -159,22 +156,17 @@ class Problem:
 
     def draw(self, rng: np.random.Generator, count: int, spread: float = 1.0) -> Floats:
         """Points, shape (dimension, count), normal variables with this standard deviation and all directions."""
-        return self.on_circles(
-            np.where(self.straight[:, None], spread, 1.0) * rng.standard_normal((self.dimension, count))
-        )
-
-    @property
-    def straight(self) -> Flags:
-        """Which of the variables are normal."""
-        return np.isin(np.arange(self.dimension), self.normals)
-
-    def on_circles(self, u: Floats) -> Floats:
-        """Points, shape (dimension, n), changed in place: their directions are cosine and sine again."""
+        u = np.where(self.straight[:, None], spread, 1.0) * rng.standard_normal((self.dimension, count))
         for pair in self.circles:
             length = np.linalg.norm(u[pair], axis=0)
             u[pair[0]] = np.where(length > 0, u[pair[0]], 1.0)
             u[pair] /= np.where(length > 0, length, 1.0)
         return u
+
+    @property
+    def straight(self) -> Flags:
+        """Which of the variables are normal."""
+        return np.isin(np.arange(self.dimension), self.normals)
 
     def margins(self, u: Floats) -> Floats:
         """Margins at points `u` of shape (dimension, n): shape (limits, n)."""

@@ -9,11 +9,12 @@ from importlib import import_module
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
-from mechdesign.analyses.reliability.engine.problem import Estimate, Precision, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, needed, reached
 from mechdesign.analyses.reliability.methods import SEARCH, pose_by_pose
 from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate_chunk
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
+from mechdesign.study.schema.reliability import Precision
 
 # Plain samples that every rung is checked with, and up to how many of them need no other method.
 PILOT = 4000
@@ -92,12 +93,12 @@ def climb(
         return said["monte_carlo"]
 
     def precise(estimate: Estimate) -> bool:
-        return precision.reached(estimate.failure, estimate.low, estimate.high)
+        return reached(precision, estimate.failure, estimate.low, estimate.high)
 
     def enough(estimate: Estimate) -> float:
         # Of few failures the interval's end is the safe number to plan with.
         share = estimate.failure if estimate.failures >= _ENOUGH_FAILURES else estimate.high
-        return 1.1 * precision.needed(share, share * (1.0 - share))
+        return 1.1 * needed(precision, share, share * (1.0 - share))
 
     found, used = said["monte_carlo"], "monte_carlo"
     if not precise(found) and enough(found) <= FEW:

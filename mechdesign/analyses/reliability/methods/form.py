@@ -16,12 +16,13 @@ from scipy.special import ndtr, ndtri
 
 from mechdesign.analyses.reliability.engine.design_points import DesignPoints, descend, find, sizes
 from mechdesign.analyses.reliability.engine.mixture import Mixture
-from mechdesign.analyses.reliability.engine.problem import Estimate, Precision, Problem
+from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
 from mechdesign.analyses.reliability.probability import half_spaces
 from mechdesign.analyses.reliability.simulation import Setting, generator, problem_of
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
+from mechdesign.study.schema.reliability import Precision
 
 # Directions drawn in each round of learning which ones count, and for the value.
 _LEARNING_CHOICES = 96

@@ -22,15 +22,17 @@ from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.problem import (
     POINTS_TOGETHER,
     Estimate,
-    Precision,
     Problem,
     failed,
+    needed,
+    reached,
     weighted,
 )
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
 from mechdesign.analyses.reliability.simulation import Setting, Sums, generator, problem_of, simulate
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
+from mechdesign.study.schema.reliability import Precision
 
 # Design points farther than the nearest one by this many standard deviations bring nothing.
 _FARTHEST = 4.0
@@ -106,8 +108,8 @@ def importance_sampling(
         invalid += int(np.isnan(margins).any(axis=0).sum())
         if done == wanted < samples and precision is not None and total > 0:
             mean = total / done
-            if not precision.reached(mean, *weighted(total, squares, most, done)):
-                more = _MARGIN * precision.needed(mean, squares / done - mean * mean)
+            if not reached(precision, mean, *weighted(total, squares, most, done)):
+                more = _MARGIN * needed(precision, mean, squares / done - mean * mean)
                 wanted = int(min(samples, max(1.2 * done, more)))
     low, high = weighted(total, squares, most, done)
     # Weights are 1 on the average only.

@@ -1,6 +1,6 @@
 """Smallest stiffness of the point of the stiffness section, in its weakest direction."""
 
-from mechdesign.analyses.stiffness.compliance import principal
+from mechdesign.analyses.stiffness.screws import principal
 from mechdesign.analyses.workspace.index import Index, of_compliance
 
 # As ``k_min`` of stiffness.csv; 0 where the point is free [S4].

@@ -8,11 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
-from mechdesign.report.figures.panels import along
-from mechdesign.report.figures.planes import plane
+from mechdesign.report.figures.panels import along, plane
 from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
-from mechdesign.report.figures.reliability.errors import map_figures, sweep_figures
-from mechdesign.report.figures.reliability.estimates import MAX_LISTED, estimate_figure
+from mechdesign.report.figures.reliability.errors import MAX_LISTED, estimate_figure, map_figures, sweep_figures
 from mechdesign.report.figures.reliability.looks import Sampled, look
 from mechdesign.report.figures.reliability.samples import (
     convergence_figure,
@@ -50,7 +48,7 @@ def _sampled(study: Study, result: Result, poses: Poses) -> Gallery:
     tables, moments = result.tables, result.tables["moments"]
     found = Gallery()
     # The tables are of the first method that samples errors; the moments hold its name.
-    method = next((name for name in moments["method"].tolist() if look(name).simulated), None)
+    method = next((name for name in moments["method"].tolist() if look(name).sampled), None)
     if method is None:
         return found
     makers: dict[str, Callable[[Sampled], Figure | Mapping[str, Figure]]] = {

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,27 +12,15 @@ from mechdesign.analyses.reliability.first_order import ORDERS
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
-from mechdesign.study.schema.methods import METHODS
+from mechdesign.study.schema.methods import METHODS, Method
 from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
 
 SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
 
 
-class Look(NamedTuple):
-    """A method's name in words, colour, marker and dashes; what is simulated is drawn as dots, without a line."""
-
-    words: str
-    color: str
-    marker: str
-    dashes: Literal["-", "--", ":", "-.", "None"]
-    simulated: bool
-
-
-def look(name: str) -> Look:
-    """How a method is drawn."""
-    method = METHODS[name]
-    dashes = "None" if method.sampled else method.dashes
-    return Look(method.words, getattr(style, method.color), method.marker, dashes, method.sampled)
+def look(name: str) -> Method:
+    """A method with its colour as Matplotlib knows it; what is sampled is drawn as dots, without a line."""
+    return replace(METHODS[name], color=getattr(style, METHODS[name].color))
 
 
 class Sampled(NamedTuple):

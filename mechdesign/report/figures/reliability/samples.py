@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.analyses.reliability.simulation import CELLS
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import MAX_PANELS, legend_below, number, stack, title
 from mechdesign.report.figures.reliability.looks import (
@@ -129,7 +130,7 @@ def trend_figure(given: Sampled) -> Figure:
         if np.isfinite(failure):
             drawn, used = look(method), str(reliability["used"][row])
             words = drawn.words + f" by {look(used).words}" * (used != method)
-            dashes = (0, (1, 1)) if drawn.simulated else drawn.dashes
+            dashes = (0, (1, 1)) if drawn.sampled else drawn.dashes
             lines.append((failure, {"color": drawn.color, "ls": dashes, "label": f"{words}: {number(failure)}"}))
             ends.append(failure)
     positive = [end for end in ends if end > 0]
@@ -169,16 +170,15 @@ def density_figures(given: Sampled) -> dict[str, Figure]:
     }
     columns = [column for column in table.columns if column.name in known]
     shown = [known[column.name] for column in columns]
-    table = table.take(_first_pose(table))
-    cells = int(np.sqrt(len(table)))
-    x, y = (table[column.name].reshape(cells, cells) for column in columns)
+    table = table.take(np.arange(CELLS**2))
+    x, y = (table[column.name].reshape(CELLS, CELLS) for column in columns)
     labels = [
         style.axis_label(f"{output} {order} error".replace("position ", ""), column.unit)
         for (output, order), column in zip(shown, columns, strict=True)
     ]
     densities = {
-        "bivariate normal, first order": table["normal"].reshape(cells, cells),
-        f"simulation ({look(given.method).words})": table["simulated"].reshape(cells, cells),
+        "bivariate normal, first order": table["normal"].reshape(CELLS, CELLS),
+        f"simulation ({look(given.method).words})": table["simulated"].reshape(CELLS, CELLS),
     }
     (output, order), section = shown[0], study.reliability
     assert section is not None
@@ -188,13 +188,6 @@ def density_figures(given: Sampled) -> dict[str, Figure]:
         "density_contours": _contours(x, y, densities, labels, given.where, bands, circle.radius if circle else None),
         "density": _surfaces(x, y, densities, labels, given.where),
     }
-
-
-def _first_pose(table: Table) -> Flags:
-    """Rows of the first pose: those before the first cell comes again."""
-    again = np.flatnonzero((table["x"] == table["x"][0]) & (table["y"] == table["y"][0]))
-    end = again[1] if len(again) > 1 else len(table)
-    return np.arange(len(table)) < end
 
 
 def _contours(

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import BoundaryNorm, Normalize
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, PathPatch, Rectangle
 from matplotlib.path import Path
@@ -18,15 +21,18 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.panels import coordinate_label
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.workspace.maps import map_figures
 from mechdesign.report.figures.workspace.regions import (
     MAX_REGIONS,
     PALE,
     ROOM,
+    Grid,
     Region,
     coloured,
     fill,
+    grids,
     outline_of,
     regions,
     sheet,
@@ -43,6 +49,13 @@ DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
 CIRCLE = ("circle_x", "circle_y", "circle_radius")
 RECTANGLE = ("rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height")
 _HALO = [withStroke(linewidth=2.2, foreground="white")]
+# Columns of the table that are no indices, beside the held coordinates.
+_NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node", "piece")
+# An index whose largest values are a thin tail is cut off above this share of the area, which the bar shows.
+_SHOWN_AREA = 0.96
+# Points on paper between the name of a level and lines of other levels, and other names.
+CLEAR_OF_LINES = 5.0
+CLEAR_OF_NAMES = 18.0
 
 
 def figures(study: Study, result: Result) -> Mapping[str, Figure]:
@@ -78,7 +91,7 @@ def workspace_figure(study: Study, result: Result, region: Region, title: str = 
     title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
     page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
     (axes,) = page.axes
-    fill(axes, region)
+    fill(axes, region.local)
     page.ends([region])
     for index in range(len(configuration.reason)):
         draw_mechanism(axes, mechanism, configuration, index, faint=True)
@@ -127,7 +140,7 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
     unit = study.units.label("length")
     size = 9 if len(shown) == 1 else 7.5
     for axes, region in zip(page.axes, shown, strict=True):
-        fill(axes, region)
+        fill(axes, region.local)
         shapes: list[tuple[Patch, tuple[float, float], str, str]] = []
         if CIRCLE[0] in table:
             x, y, radius = (float(table[name][region.row]) for name in CIRCLE)
@@ -198,7 +211,7 @@ def _speed(study: Study, path: Table) -> Figure:
     top, tail = _ends(path["speed_ratio"])
     axes.set_ylim(0, 1.3 * top if tail else None)
     axes.set_title("Speed of the point over that of the drive", loc="left")
-    axes.set_xlabel(style.axis_label(drive, study.units.label(study.mechanism.quantity(drive))))
+    axes.set_xlabel(coordinate_label(study, drive))
     axes.set_ylabel(_label(path))
     axes.margins(x=0.01)
     if len(pieces) > 1:
@@ -288,3 +301,117 @@ def loops(pieces: Sequence[Complexes]) -> list[Complexes]:
             loop = np.concatenate([loop, piece[::-1] if end else piece])
         found.append(np.append(loop, loop[0]))
     return found
+
+
+def map_figures(study: Study, found: Sequence[Region]) -> Gallery:
+    """One map an index of the table of local indices; of many regions a few, spread evenly.
+
+    There is none of an index that is infinite everywhere.
+    """
+    shown = some(found)
+    names = [name for name in index_columns(found[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
+    maps = Gallery()
+    for name in names:
+        maps.add(name, _index_map, study, shown, name)
+    return maps
+
+
+def index_columns(region: Region) -> list[str]:
+    """Names of the local indices that a region's table holds."""
+    return [name for name in region.local.names if name not in _NO_INDEX and name not in region.held]
+
+
+def _index_map(study: Study, found: Sequence[Region], column: str) -> Figure:
+    norm = _norm(found, column)
+    told = found[0].local.column(column)
+    places = np.concatenate([region.places() for region in found])
+    point = study.workspace.point if study.workspace else ""
+    name = column.replace("_", " ")
+    page = sheet(
+        study, places, [region.title for region in found], f"{name} at point {point}: {told.meaning}", bar=True
+    )
+    for axes, region in zip(page.axes, found, strict=True):
+        contours(axes, list(grids(region.local, column)), norm, labels=len(found) == 1)
+    page.ends(found)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, told.unit), ticks=norm.boundaries)
+    return page.figure
+
+
+def contours(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, *, labels: bool) -> None:
+    """Filled contours over the patches of a region, each level named once, where its line is longest."""
+    drawn = []
+    low, high = norm.boundaries[[0, -1]]
+    # Beyond the last level is where an index grows without bounds, on singularities.
+    over = 2 * high - low
+    for x, y, z in patches:
+        shown = np.where(np.isfinite(z), np.minimum(z, over), over if norm.extend == "max" else low)
+        drawn.append(style.filled(axes, x, y, shown, norm, norm.boundaries[1:]))
+    if labels:
+        edges = [np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]]) for z in (x + 1j * y for x, y, _ in patches)]
+        label_levels(axes, drawn, norm, _on_paper(axes, np.concatenate(edges)))
+
+
+def label_levels(axes: Axes, drawn: Sequence[QuadContourSet], norm: BoundaryNorm, blocked: Complexes) -> None:
+    """Name each level once on one of its lines, far from other lines and names; or not at all."""
+    levels = norm.boundaries[1:]
+    parts_of = [contour.allsegs for contour in drawn]
+    lines = [[_on_paper(axes, part @ [1, 1j]) for parts in parts_of for part in parts[k]] for k in range(len(levels))]
+    every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]
+    taken = np.zeros(0, dtype=complex)
+    for k, level in enumerate(levels):
+        places = [(part[j], part[j + 1] - part[j - 1]) for part in lines[k] if len(part) > 4
+                  for j in range(2, len(part) - 2, max(1, len(part) // 40)) if part[j + 1] != part[j - 1]]  # fmt: skip
+        if not places:
+            continue
+        at, along = np.array(places).T
+        others = np.concatenate([*every[:k], *every[k + 1 :], blocked])
+        room = np.minimum(_nearest(at, others) / CLEAR_OF_LINES, _nearest(at, taken) / CLEAR_OF_NAMES)
+        # Where there is room, upright names read best.
+        best = int(np.argmax(np.minimum(room, 2.0) + np.abs(along.real) / np.abs(along)))
+        if room[best] < 1:
+            continue
+        taken = np.append(taken, at[best])
+        turn = float(np.degrees(np.angle(along[best])))
+        back = colormaps[style.COLORMAP](norm(level))
+        place = (at[best].real, at[best].imag)
+        axes.annotate(
+            f"{level:g}", place, xycoords="figure points", fontsize=7.5, ha="center", va="center",
+            rotation=(turn + 90) % 180 - 90, rotation_mode="anchor", color="white" if norm(level) < 140 else style.INK,
+            zorder=3.5, path_effects=[withStroke(linewidth=2.5, foreground=back)],
+        )  # fmt: skip
+
+
+def _on_paper(axes: Axes, places: Complexes) -> Complexes:
+    """Places in points on paper."""
+    return np.asarray(paper(axes, places) @ np.array([1, 1j]))
+
+
+def _nearest(places: Complexes, others: Complexes) -> Floats:
+    if not len(others):
+        return np.full(len(places), np.inf)
+    return np.asarray(np.abs(places[:, None] - others[None, :]).min(axis=1))
+
+
+def _norm(found: Sequence[Region], column: str) -> BoundaryNorm:
+    """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
+    patches = [patch for region in found for patch in grids(region.local, column)]
+    values = np.concatenate([z.ravel() for _, _, z in patches])
+    areas = np.concatenate([_node_areas(x, y).ravel() for x, y, _ in patches])
+    finite = np.isfinite(values)
+    values, areas = values[finite], areas[finite]
+    order = np.argsort(values)
+    share = np.cumsum(areas[order]) / areas.sum()
+    high = float(values[order[min(int(np.searchsorted(share, _SHOWN_AREA)), len(order) - 1)]])
+    low, top = float(values.min()), float(values.max())
+    if top > 1.4 * high + 1e-12:
+        top = np.inf
+    else:
+        high = top
+    return style.steps(style.levels(0.0 if 0 <= low < 0.5 * high else low, high, 11), low, top)
+
+
+def _node_areas(x: Floats, y: Floats) -> Floats:
+    """Area about each node of a grid."""
+    z = x + 1j * y
+    along, across = np.gradient(z, axis=0), np.gradient(z, axis=1)
+    return np.asarray(np.abs(np.imag(np.conj(along) * across)))

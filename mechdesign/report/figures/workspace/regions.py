@@ -124,7 +124,7 @@ def outline(axes: Axes, region: Region) -> set[str]:
     seen = outline_of(axes, region.boundary)
     if region.others is not None:
         local, boundary = region.others
-        _fill(axes, local, LEFT_OUT, zorder=0.9)
+        fill(axes, local, LEFT_OUT, zorder=0.9)
         for rows in curves(boundary):
             axes.plot(boundary["x"][rows], boundary["y"][rows], color=style.FAINT, linewidth=0.8, zorder=2.8)
         seen.add("other")
@@ -171,13 +171,8 @@ def loci(axes: Axes, region: Region) -> set[str]:
     return seen
 
 
-def fill(axes: Axes, region: Region) -> None:
-    """Fill the region in a pale colour."""
-    _fill(axes, region.local, PALE)
-
-
-def _fill(axes: Axes, local: Table, color: str, **look: Any) -> None:
-    """Fill what lies between both curves of each patch."""
+def fill(axes: Axes, local: Table, color: str = PALE, **look: Any) -> None:
+    """Fill a region: what lies between both curves of each patch."""
     for x, y, _ in grids(local, "det_J"):
         edge = [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
         axes.fill(*edge, color=color, linewidth=0, antialiased=False, **look)
