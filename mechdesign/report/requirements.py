@@ -11,7 +11,7 @@ from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.results import Result, Table
 from mechdesign.rows import UnknownColumnError, choose
 from mechdesign.study import Study
-from mechdesign.study.schema.optimize import Condition
+from mechdesign.study.schema.optimize import Requirement
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Verdict:
         return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}"
 
 
-def command_of(requirement: Condition) -> str:
+def command_of(requirement: Requirement) -> str:
     """The command whose result a requirement judges."""
     return requirement.result.partition(".")[0]
 
@@ -89,7 +89,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     return tuple(verdicts)
 
 
-def judge(result: Result, requirement: Condition, freedom: int = 1, *, whole: bool = True) -> Verdict:
+def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: bool = True) -> Verdict:
     """The verdict on one requirement; `freedom` is how many numbers make a pose, see `requirements`.
 
     Raises
@@ -118,7 +118,7 @@ def judge(result: Result, requirement: Condition, freedom: int = 1, *, whole: bo
     return Verdict(words, met, float(values[worst]), _place(table, int(worst), name, freedom))
 
 
-def _words(requirement: Condition) -> str:
+def _words(requirement: Requirement) -> str:
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
     where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
     given = (("at least", requirement.at_least), ("at most", requirement.at_most))

@@ -31,7 +31,7 @@ from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
+from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -69,7 +69,7 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Condition, ...]
+    requirements: tuple[Requirement, ...]
     targets: Mapping[str, Target]  # by the coordinate or point
     warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
 

@@ -197,9 +197,7 @@ reliability:
         found = contributions["sensitivity"][contributions.where(output=name)]
         assert found == pytest.approx(slopes, rel=1e-7, abs=1e-9)
     moments = result.tables["moments"]
-    first, second, sampled = (
-        moments.take(moments.where(method=m)) for m in ("monte_carlo", "analytic", "second_order")
-    )
+    first, second, sampled = (moments.take(moments.where(method=method)) for method in methods)
     assert first["sigma"] == pytest.approx(sampled["sigma"], rel=0.01)
     # E[k**2] is 2**2 + 0.05**2.
     reach = measured("reach", 30, 2)

@@ -102,7 +102,7 @@ class Evaluator:
             self._regions_together = not one_by_one and all(batched(each.column) for each in self._regional)
         # Where the study names each.
         self._keys = goals_of(study.optimize) | conditions_of(study.optimize)
-        commands = dict.fromkeys(each.command for each in self.goals if not each.regional)
+        commands = dict.fromkeys(each.command for each in self.goals if not each.regional and not each.expression)
         problems = [problem for command in commands for problem in self._look(command)]
         if problems:
             raise StudyError(problems)
@@ -177,6 +177,12 @@ class Evaluator:
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
         batch = _Batch(self, designs)
+        values = {**self.study.parameters.nominal, **batch.parameters}
+        for each in self.goals:
+            if each.expression is not None:
+                found = np.asarray(each.expression.evaluate(values))
+                found = np.where(np.isfinite(found), found, np.nan)
+                batch.table[:, self.layout.column[each]] = np.abs(found) if each.absolute else found
         if self.question is not None and self._regions_together:
             self._regions(batch, batch.feasible, self.question, batch.places)
         for command, tables in self._together.items():

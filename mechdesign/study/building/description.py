@@ -253,12 +253,11 @@ def _measures(builder: Builder) -> dict[str, Measure]:
             except ExpressionError as error:
                 builder.report(path, str(error))
                 continue
-            names, parameters = sorted(expression.names), builder.parameter_values
+            parameters = builder.parameter_values
             what, listed = "coordinate or parameter", [*known, *parameters]
-            if all(builder.check_name(item, listed, what, path) for item in names):
+            if all(builder.check_name(item, listed, what, path) for item in sorted(expression.names)):
                 for item in expression.names & parameters.keys():
-                    number = StudyNumber(parameters[item], Expression.parse(item))
-                    builder.place(MEASURED + item, number, "none")
+                    builder.place(MEASURED + item, StudyNumber(parameters[item], Expression.parse(item)), "none")
                 found[name] = Measure(name, "expression", None, expression)
         elif pair is not None and builder.check_named(section.kind, pair, (*path, section.kind)):
             found[name] = Measure(name, section.kind, pair)
