@@ -48,7 +48,7 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
     Raises
     ------
     UnknownColumnError
-        If there is no such column, it holds words, or its rows have several units.
+        If there is no such column (why, where the result says so), it holds words, or its rows have several units.
     """
     table, column, rows = _locate(result, path)
     counts = rows
@@ -107,6 +107,9 @@ def _locate(result: Result, path: str) -> tuple[Table, str, Flags]:
             for words in named.columns if word != rest else ():
                 if not words.numeric and (rows := _equal(words.values, word)).any():
                     return named, column, rows
+    for absent, why in result.absent.items():
+        if absent in path.split("."):
+            raise UnknownColumnError(f"{result.command} has no {absent}: {why}")
     known = [column for table in result.tables.values() for column in table.names]
     raise UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
 

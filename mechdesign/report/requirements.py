@@ -33,8 +33,13 @@ def command_of(requirement: Requirement) -> str:
     return requirement.result.partition(".")[0]
 
 
-def foresee(study: Study, commands: Iterable[str]) -> None:
+def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:
     """Find, at a look, the requirements of commands that name what their results have not.
+
+    Parameters
+    ----------
+    goals : bool
+        Whether to look at the goals and conditions of `optimize` as well, which its own computation begins with.
 
     Raises
     ------
@@ -45,6 +50,15 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
 
     problems: list[Problem] = []
     judged = {command_of(requirement) for requirement in study.requirements}
+    if goals and study.optimize is not None:
+        from mechdesign.analyses.optimize.evaluation import Evaluator
+
+        try:
+            Evaluator(study)
+        except StudyError as error:
+            problems += error.problems
+            # Its requirements would meet the same mistakes.
+            judged.discard("optimize")
     for command in [name for name in commands if name in judged]:
         try:
             # Of so few designs some rows may be missing that all of them have.

@@ -69,7 +69,7 @@ def kinematics(
     Result
         Tables ``motion``, ``extremes``; for a sweep of one coordinate ``limits``; ``loops`` and ``toggles`` of
         four-bars and slider-cranks; ``targets`` where there are some;
-        ``jacobian`` where the study lists as many outputs as drives; ``modes`` with `all_modes`.
+        ``jacobian`` where the study names as many outputs of it, or outputs, as drives; ``modes`` with `all_modes`.
 
     Raises
     ------
@@ -113,7 +113,9 @@ def kinematics(
     if all_modes:
         tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
         warnings += told
-    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn)
+    # What only a square Jacobian has.
+    absent = {} if question.square else dict.fromkeys(("det_J", "inverse_condition", "jacobian"), question.not_square)
+    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn, absent=absent)
 
 
 def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
@@ -207,7 +209,7 @@ def jacobian_table(motion: Motion) -> Table:
             meaning = f"derivative of {output.name} by {drive.name}, angles in radians"
             columns.append(Column(name, motion.arrays[name], _per(question.study, output, drive), meaning))
     columns += shared(question.study.units, valid=motion.valid)
-    return Table("jacobian", tuple(columns), "derivatives of the listed outputs by the drives, per radian")
+    return Table("jacobian", tuple(columns), "derivatives of outputs by the drives, per radian")
 
 
 def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
