@@ -530,6 +530,11 @@ optimize:
         ("minimize=[{result: 2*l1, where: {theta: 3}}]", r"'2\*l1' is one number .* leave out 'where'"),
         ("minimize=[l11]", r"there is no result 'l11'; did you mean 'l1'"),
         ("minimize=[5]", r"expected a result, such as GII"),
+        (
+            "subject_to=[{result: l1 + l2, at_most: 2*l1 - k}]",
+            r"at_most: '2\*l1 - k' changes with .* \{result: l1 \+ l2 - \(2\*l1 - k\), at_most: 0\}",
+        ),
+        ("subject_to=[{result: kinematics.mu, at_least: l1}]", r"at_least: 'l1' changes with .*a measure may take"),
     ],
 )
 def test_wrong_expressions_are_told(change: str, message: str) -> None:

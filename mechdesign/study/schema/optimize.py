@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
@@ -66,6 +67,9 @@ def _result(raw: Any, context: Context) -> str | Expression:
 
 
 def _required(raw: Any, context: Context) -> str:
+    if isinstance(raw, str) and raw.startswith("optimize."):
+        # A column of its tables may be an expression.
+        return raw
     if isinstance(found := _result(raw, context), str):
         return found
     cure = f"give it as a measure, mechanism.measures: {{NAME: {raw}}}, and require kinematics.NAME"
@@ -213,7 +217,24 @@ class OptimizeSection(fields.Model):
                 check_result(checker, each.result, path)
             elif each.result.names.isdisjoint(moved):
                 report(path, f"{each.name!r} is the same for every design: no variable changes it")
+        for k, condition in enumerate(self.subject_to):
+            for key in condition.given("at_least", "at_most"):
+                _check_bound(checker, condition, (*root, "subject_to", k, key), moved)
         return self
+
+
+def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: Collection[str]) -> None:
+    """Note a bound that the parameters in `moved` change."""
+    raw, names = checker.reporter.raw(path), frozenset[str]()
+    # What is no expression has been reported.
+    with suppress(ExpressionError):
+        names = Expression.parse(str(raw)).names
+    if names.isdisjoint(moved):
+        return
+    cure = f"a measure may take parameters, as in mechanism.measures: {{NAME: COORDINATE - ({raw})}}"
+    if isinstance(condition.result, Expression):
+        cure = f"bound the difference, {{result: {condition.result.text} - ({raw}), {path[-1]}: 0}}"
+    checker.report(path, f"{raw!r} changes with the variables, and a bound is the same for every design; {cure}")
 
 
 def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:
