@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +55,8 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
         from mechdesign.analyses.optimize.evaluation import Evaluator
 
         try:
-            Evaluator(study)
+            with suppress(AssemblyError):
+                Evaluator(study)
         except StudyError as error:
             problems += error.problems
             # Its requirements would meet the same mistakes.

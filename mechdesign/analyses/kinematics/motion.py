@@ -111,8 +111,8 @@ class MotionQuestion:
         known = {c.name: c for c in expand_outputs(study, (*named, *others)) if c.name not in drives}
         node = next((c.node for c in known.values() if c.kind in ("x", "y")), -1)
         picked = sorted(known, key=lambda name: (known[name].node != node, known[name].kind != "angle"))[: len(drives)]
-        whole = [name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked]
-        rows = dict.fromkeys(next((point for point in whole if name[:-2] == point), name) for name in picked)
+        points = {name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked}
+        rows = dict.fromkeys(name[:-2] if name[:-2] in points else name for name in picked)
         given = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"
         told = f"{given} for {counted(len(drives), 'drive')}; name as many"
         if not named:

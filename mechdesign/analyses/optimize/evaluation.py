@@ -67,11 +67,10 @@ class Evaluated(NamedTuple):
 
 
 class Evaluator:
-    """Evaluates goals (left out, those of the study and its conditions) for designs of one study.
+    """Evaluates goals for designs of one study, which differ in parameters or single places.
 
-    Designs differ in parameters or single places.
-    Graded, it also gives the rows that goals are the worst of, or the root mean square of (those in `squares`), and how
-    far poses are from assembling.
+    Goals that are left out are those of the study, and its conditions. Graded, it also gives the rows that goals are
+    the worst of, or the root mean square of (those in `squares`), and how far poses are from assembling.
 
     Raises
     ------

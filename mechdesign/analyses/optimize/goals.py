@@ -158,7 +158,7 @@ def unit_of(study: Study, text: str) -> str:
     """
     expression = Expression.parse(text)
     places, parameters = study.mechanism.description.places, study.parameters
-    found = {
+    kinds = {
         frozenset(
             places[place].quantity
             for place, slope in parameters.derivatives(name).items()
@@ -166,5 +166,5 @@ def unit_of(study: Study, text: str) -> str:
         )
         for name in expression.names
     }
-    (*quantities,) = found.pop() if len(found) == 1 and expression.is_linear() else ()
-    return study.units.label(quantities[0]) if len(quantities) == 1 else ""
+    same = kinds.pop() if len(kinds) == 1 and expression.is_linear() else frozenset[str]()
+    return study.units.label(*same) if len(same) == 1 else ""
