@@ -524,7 +524,7 @@ optimize:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("minimize=[l1 + kinematics.mu]", r"minimize\.0: 'kinematics\.mu' in .* is not a parameter"),
+        ("minimize=[l1 + kinematics.mu]", r"minimize\.0: 'kinematics\.mu' in .* is not a parameter.*; a measure takes"),
         ("minimize=[l1 + l12]", r"minimize\.0: 'l12' in .* is not a parameter.*did you mean 'l2'"),
         ("minimize=[l3*k]", r"minimize\.0: 'l3\*k' is the same for every design"),
         ("minimize=[{result: 2*l1, where: {theta: 3}}]", r"'2\*l1' is one number .* leave out 'where'"),

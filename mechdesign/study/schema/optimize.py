@@ -61,8 +61,10 @@ def _result(raw: Any, context: Context) -> str | Expression:
     except ExpressionError as error:
         raise failure(str(error)) from None
     for name in sorted(expression.names - context.parameters.keys()):
-        told = suggestion(name, context.parameters)
-        raise failure(f"{name!r} in {shown(raw)} is not a parameter, and an expression here is over parameters{told}")
+        cure = suggestion(name, context.parameters)
+        if "." in name:
+            cure = "; a measure takes coordinates and parameters: mechanism.measures: {NAME: ...}, then kinematics.NAME"
+        raise failure(f"{name!r} in {shown(raw)} is not a parameter, and an expression here is over parameters{cure}")
     return expression
 
 
