@@ -340,3 +340,8 @@ def test_why_there_is_no_condition_number_is_told(asked: str, place: str) -> Non
     )
     with pytest.raises(StudyError, match=message):
         foresee(study_of(ARM, kinematic, asked), COMMANDS, goals=True)
+    # With as many outputs as drives, but of lengths and angles.
+    with pytest.raises(StudyError, match=rf"{place}: .*no inverse_condition: J mixes lengths and angles; give kinem"):
+        foresee(study_of(ARM, kinematic, asked, "kinematics.jacobian=[P.x, bend]"), COMMANDS, goals=True)
+    length = ("kinematics.jacobian=[P.x, bend]", "kinematics.characteristic_length=5")
+    foresee(study_of(ARM, kinematic, asked, *length), COMMANDS, goals=True)

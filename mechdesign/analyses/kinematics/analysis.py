@@ -16,7 +16,6 @@ from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles
 from mechdesign.analyses.kinematics.motion import (
     Motion,
     MotionQuestion,
-    characteristic_length,
     entry,
     motion_question,
     move,
@@ -113,9 +112,7 @@ def kinematics(
     if all_modes:
         tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
         warnings += told
-    # What only a square Jacobian has.
-    absent = {} if question.square else dict.fromkeys(("det_J", "inverse_condition", "jacobian"), question.not_square)
-    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn, absent=absent)
+    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn, absent=question.absent)
 
 
 def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
@@ -227,7 +224,7 @@ def _conditioning(motion: Motion) -> list[str]:
         return []
     values = motion.arrays["inverse_condition"]
     regular = motion.valid & (motion.arrays["conditioning"] >= STALLED)
-    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.question.study) is None:
+    if regular.any() and motion.question.mixed:
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
     near = regular & ~(values >= SINGULAR)
     if near.any():

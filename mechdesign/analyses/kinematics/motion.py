@@ -5,7 +5,7 @@ At a change point that the motion follows, values are interpolated from poses on
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -103,8 +103,16 @@ class MotionQuestion:
         return [self.study.mechanism.coordinate(name) for name in self.study.mechanism.drives]
 
     @property
-    def not_square(self) -> str:
-        """Why there is no Jacobian where it is not `square`, and what to write for it."""
+    def mixed(self) -> bool:
+        """Whether the Jacobian mixes lengths and angles, and the study gives no length that makes them comparable."""
+        return self.square and mixes(self.listed, self.drives) and characteristic_length(self.study) is None
+
+    @property
+    def absent(self) -> Mapping[str, str]:
+        """Columns and tables of the Jacobian that have no values: why, and what to write for them."""
+        if self.square:
+            words = "J mixes lengths and angles; give kinematics.characteristic_length"
+            return {"inverse_condition": words} if self.mixed else {}
         study, drives = self.study, self.study.mechanism.drives
         # One point, then angles; of outputs that are left out the last, as the end of a chain.
         named, others = self.section.outputs or (), default_outputs(study.mechanism)[::-1]
@@ -117,7 +125,8 @@ class MotionQuestion:
         told = f"{given} for {counted(len(drives), 'drive')}; name as many"
         if not named:
             told = f"no outputs are named; name as many as there are drives, {len(drives)},"
-        return f"{told} by kinematics.jacobian: [{', '.join(rows)}]"
+        told += f" by kinematics.jacobian: [{', '.join(rows)}]"
+        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), told)
 
 
 def motion_question(study: Study) -> MotionQuestion:
