@@ -31,7 +31,7 @@ from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
+from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -69,7 +69,7 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Condition, ...]
+    requirements: tuple[Requirement, ...]
     targets: Mapping[str, Target]  # by the coordinate or point
     warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
 
@@ -104,9 +104,10 @@ class Study:
         That of a parameter is known where numbers of the geometry, all of one quantity, change as much as it does.
         """
         parameters, places = self.parameters, self.mechanism.description.places
+        if name in places:
+            return self.units.label(places[name].quantity)
         if name not in parameters.nominal:
-            quantity = places[name].quantity if name in places else self.mechanism.quantity(name)
-            return self.units.label(quantity)
+            return self.units.label(self.mechanism.quantity(name)) if name in self.mechanism.drives else None
         slopes = parameters.derivatives(name).items()
         found = {places[place].quantity for place, slope in slopes if abs(slope) == parameters.factors[place]} - {
             "none"
@@ -241,7 +242,7 @@ def load_document(
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
-    parameters = builder.parameters(context.parameters, formulas)
+    parameters = builder.parameters(formulas)
     parts = _checked(Checker(builder, parameters, parts, folder))
     _check_use(parts, parameters, context, reporter)
     reporter.done()
@@ -379,7 +380,11 @@ def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Contex
         # What was wrong may have been what uses them.
         return
     optimize, reliability = parts.get("optimize"), parts.get("reliability")
-    used = context.used.union(optimize.variables if optimize else (), reliability.dimensions if reliability else ())
+    used = context.used.union(
+        *(formula.names for formula in parameters.dependent.values()),
+        optimize.variables if optimize else (),
+        reliability.dimensions if reliability else (),
+    )
     for name, formula in reversed([*parameters.formulas.items()]):
         # A parameter may use those above it.
         if name in used:
