@@ -109,9 +109,8 @@ class Study:
         if name not in parameters.nominal:
             return self.units.label(self.mechanism.quantity(name)) if name in self.mechanism.drives else None
         slopes = parameters.derivatives(name).items()
-        found = {places[place].quantity for place, slope in slopes if abs(slope) == parameters.factors[place]} - {
-            "none"
-        }
+        alike = [places[place].quantity for place, slope in slopes if abs(slope) == parameters.factors[place]]
+        found = set(alike) - {"none"}
         return self.units.label(*found) if len(found) == 1 else None
 
     def problem(self, message: str, *keys: str | int) -> Problem:
