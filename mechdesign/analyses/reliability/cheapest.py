@@ -78,8 +78,7 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
         half = dimension.sigma
         kind = "sigma"
         if half is None:
-            assert dimension.tolerance is not None
-            low, high = dimension.tolerance
+            low, high = dimension.ends
             half, kind = 0.5 * (high - low), "tolerance"
         asked = half > 0 and (scalar.kind != "load" or scalar.name in given)
         cost = given.get(scalar.name, Cost()) if asked else None
