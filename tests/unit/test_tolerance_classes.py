@@ -12,6 +12,7 @@ from mechdesign.analyses.reliability.laws import fit_law
 from mechdesign.analyses.reliability.sources import find_sources
 from mechdesign.errors import StudyError
 from mechdesign.study.schema.iso_tolerances import ToleranceClassError, angle_deviations, deviations, fit_deviations
+from mechdesign.study.schema.reliability import in_words
 from mechdesign.study.variants import variant
 
 # Limit deviations in micrometres as handbooks print them [ISO 286-2:2010].
@@ -132,9 +133,9 @@ def test_tolerances_of_dimensions_by_class():
     found = study(
         'dimensions: {"*.length": ISO 2768-m, arm.length: js9, rod.length: {tolerance: h7, distribution: uniform}}'
     ).reliability.dimensions
-    assert found["arm.length"].tolerance == pytest.approx((-0.0435, 0.0435))
-    assert found["rod.length"].tolerance == pytest.approx((-0.03, 0.0))
-    assert found["rocker.length"].tolerance == pytest.approx((-0.3, 0.3))
+    assert found["arm.length"].ends == pytest.approx((-0.0435, 0.0435))
+    assert found["rod.length"].ends == pytest.approx((-0.03, 0.0))
+    assert found["rocker.length"].ends == pytest.approx((-0.3, 0.3))
 
 
 def test_classes_go_by_millimetres_in_any_unit():
@@ -142,7 +143,7 @@ def test_classes_go_by_millimetres_in_any_unit():
     text = inches.replace("85, 78", "3.4, 2.9") + "units: {length: in}\n"
     section = "reliability: {dimensions: {arm.length: js9}, clearances: {P: {fit: 20 H7/g6}}}"
     found = mechdesign.load(text=text + section).reliability
-    assert found.dimensions["arm.length"].tolerance[1] == pytest.approx(0.037 / 25.4)
+    assert found.dimensions["arm.length"].ends[1] == pytest.approx(0.037 / 25.4)
     assert found.clearances["P"].radius == pytest.approx(0.5 * 0.024 / 25.4)
     with pytest.raises(StudyError, match="this study's lengths are dimensionless"):
         mechdesign.load(text=text.replace("length: in", "length: dimensionless") + section)
@@ -158,7 +159,7 @@ def test_an_angle_goes_by_its_shorter_leg():
       sketch: {P: [90, 0]}
     """
     found = mechdesign.load(text=text + f"reliability: {{poses: [{{arm: 70}}], outputs: [T], {section}}}")
-    assert found.reliability.dimensions["plate.angle"].tolerance == pytest.approx((-0.5, 0.5))
+    assert found.reliability.dimensions["plate.angle"].ends == pytest.approx((-0.5, 0.5))
     with pytest.raises(StudyError, match="shorter leg; say which"):
         mechdesign.load(text=text + "reliability: {dimensions: {plate.angle: ISO 2768-c}}")
 
@@ -210,7 +211,7 @@ def test_a_fit_of_uniform_sizes_is_a_trapezoid():
 
 def test_a_class_follows_the_size_that_is_changed():
     given = study("dimensions: {arm.length: js9}")
-    assert variant(given, {"arm.length": 50.0}).reliability.dimensions["arm.length"].tolerance[1] == 0.031
+    assert variant(given, {"arm.length": 50.0}).reliability.dimensions["arm.length"].ends[1] == 0.031
 
 
 def test_an_allocated_class_keeps_its_middle():
@@ -218,5 +219,15 @@ def test_an_allocated_class_keeps_its_middle():
                   "samples: 2000, sobol: 0")  # fmt: skip
     text = mechdesign.reliability(given).files["allocated.yaml"]
     found = mechdesign.load(text=text).reliability.dimensions
-    assert sum(found["arm.length"].tolerance) == pytest.approx(-0.087)
-    assert sum(found["rod.length"].tolerance) == 0.0
+    assert sum(found["arm.length"].ends) == pytest.approx(-0.087)
+    assert sum(found["rod.length"].ends) == 0.0
+
+
+def test_check_shows_what_classes_and_fits_come_to():
+    given = study('dimensions: {"*.length": ISO 2768-m, arm.length: h9}, clearances: {P: {fit: 20 H7/g6}}')
+    lines = in_words(given.reliability, given.mechanism.graph)
+    assert lines[1:] == [
+        "fit: P, 20 H7/g6: radial clearance 0.0035 to 0.0205",
+        "tolerance: ISO 2768-m of rod.length, rocker.length: -0.3 to +0.3",
+        "tolerance: h9 of arm.length: -0.087 to +0",
+    ]

@@ -321,7 +321,7 @@ def _pin(mechanism: Mechanism, name: str, clearance: Clearance) -> Pin:
     spread, radius = clearance.radius_spread, clearance.radius
     law = None if spread is None else marginal(spread, radius)
     if clearance.fit is not None:
-        law = fit_law(clearance.distribution, *clearance.fit[1:], radius)
+        law = fit_law(clearance.distribution, clearance.fit.hole, clearance.fit.shaft, radius)
     kind = "slide" if name in mechanism.description.joints else clearance.effect
     found = Pin(name, radius, law, clearance.pin.analytic, clearance.pin.monte_carlo, kind, ())
     if kind == "slide":

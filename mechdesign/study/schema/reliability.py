@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
@@ -60,13 +60,15 @@ def _millimetre(context: Context, text: str) -> float:
 
 @dataclass(frozen=True)
 class ToleranceClass:
-    """A tolerance class as it is written, whose deviations follow from a size; a millimetre and a degree as the study
-    counts them.
+    """A tolerance class as it is written, a millimetre and a degree as the study counts them.
+
+    `ends`, its lowest and highest deviation, follow from the size of what it is of.
     """
 
     text: str
     millimetre: float
     degree: float
+    ends: tuple[float, float] = (0.0, 0.0)
 
     def of_length(self, size: float) -> tuple[float, float]:
         """Lowest and highest deviation of a length; raises as `deviations`."""
@@ -110,8 +112,16 @@ Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
 _CLASSED = {**_TOLERANCE, "description": "a half-width, the lowest and highest deviation, or a class: js9, ISO 2768-m"}
 
 
-def _fit(raw: Any, context: Context) -> tuple[float, float, float]:
-    """Mean diametral clearance of a fit, and half the tolerances of its hole and of its shaft."""
+class Fit(NamedTuple):
+    """A fit as it is written, its mean diametral clearance, and half the tolerances of its hole and of its shaft."""
+
+    text: str
+    diametral: float
+    hole: float
+    shaft: float
+
+
+def _fit(raw: Any, context: Context) -> Fit:
     if not isinstance(raw, str):
         raise failure(f"expected a fit such as 20 H7/g6, not {shown(raw)}")
     millimetre = _millimetre(context, raw)
@@ -126,11 +136,11 @@ def _fit(raw: Any, context: Context) -> tuple[float, float, float]:
             f"{raw} is {kind} fit, from {least:+.4g} to {most:+.4g} mm, and no clearance is negative; a pin that is "
             "pressed in has none: leave it out, or take a clearance fit such as H7/g6 or H7/h6"
         )
-    one, other = (0.5 * (high - low) * millimetre for low, high in (hole, shaft))
-    return 0.5 * (least + most) * millimetre, one, other
+    halves = [0.5 * (high - low) * millimetre for low, high in (hole, shaft)]
+    return Fit(raw, 0.5 * (least + most) * millimetre, *halves)
 
 
-Fit = Annotated[tuple[float, float, float], fields.Read(_fit, {**fields.NAME_FORM, "description": "such as 20 H7/g6"})]
+_FIT = {**fields.NAME_FORM, "description": "such as 20 H7/g6"}
 
 
 class Dimension(fields.Model):
@@ -151,9 +161,8 @@ class Dimension(fields.Model):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Lowest and highest deviation of the tolerance, of a checked study; none where sigma is given."""
-        assert not isinstance(self.tolerance, ToleranceClass)
-        return self.tolerance or (0.0, 0.0)
+        """Lowest and highest deviation of the tolerance; none where sigma is given."""
+        return self.tolerance.ends if isinstance(self.tolerance, ToleranceClass) else self.tolerance or (0.0, 0.0)
 
 
 class PinModel(fields.Model):
@@ -182,7 +191,7 @@ class Clearance(fields.Model):
     one_of = ("a clearance needs either 'radial' or 'diametral', or a 'fit'", "radial", "diametral", "fit")
     radial: fields.NonNegativeLength | None = None
     diametral: fields.NonNegativeLength | None = None
-    fit: Fit | None = None
+    fit: Annotated[Fit, fields.Read(_fit, _FIT)] | None = None
     tolerance: Tolerance = (0.0, 0.0)
     distribution: Annotated[str, fields.choice(DISTRIBUTIONS)] = "normal"
     pin: PinModel = PinModel()
@@ -193,7 +202,7 @@ class Clearance(fields.Model):
     @property
     def radius(self) -> float:
         """Mean radial clearance, half the difference of the diameters."""
-        diametral = self.fit[0] if self.fit is not None else self.diametral
+        diametral = self.fit.diametral if self.fit is not None else self.diametral
         return self.radial if self.radial is not None else 0.5 * (diametral or 0.0)
 
     @property
@@ -552,13 +561,13 @@ def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath)
         if dimension.leg is not None:
             checker.report((*path, "leg"), "the leg is that of an angle with the tolerance ISO 2768-m (or -f, -c, -v)")
         return dimension
-    found = (0.0, 0.0)
+    given = dimension.tolerance
     try:
-        found = _of_class(checker, name, dimension.tolerance, dimension.leg)
+        given = replace(given, ends=_of_class(checker, name, given, dimension.leg))
     except ToleranceClassError as error:
         alone = "" if name == path[-1] else f"{name} has no such tolerance and needs one of its own: "
         checker.report(path, f"{alone}{error}", at_key=True)
-    return dimension.model_copy(update={"tolerance": found})
+    return dimension.model_copy(update={"tolerance": given})
 
 
 def _of_class(checker: Checker, name: str, given: ToleranceClass, leg: float | None) -> tuple[float, float]:
@@ -599,10 +608,30 @@ def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tup
 
 
 def in_words(section: ReliabilitySection | None, graph: Graph) -> list[str]:
-    """One line for each clearance."""
-    slides = [point for point in (section.clearances if section is not None else {}) if point in graph.slides]
-    return [
+    """A line for each clearance, and for each fit and tolerance class with its size in the study's units."""
+    if section is None:
+        return []
+    lines = [
         f"clearance: the pin {point} moves in {link}; {point}.x and {point}.y are those of "
         f"{' and '.join(rest) or 'the joint'}"
         for point, (link, rest) in others(section, graph).items()
-    ] + [f"clearance: the slider of {slide} shifts across its line" for slide in slides]
+    ]
+    for name, clearance in section.clearances.items():
+        if name in graph.slides:
+            tilts = ", and tilts as its ends do" if clearance.length is not None else ""
+            lines.append(f"clearance: the slider of {name} shifts across its line{tilts}")
+        if clearance.fit is not None:
+            half = 0.5 * (clearance.fit.hole + clearance.fit.shaft)
+            lines.append(
+                f"fit: {name}, {clearance.fit.text}: radial clearance {clearance.radius - half:.6g} to "
+                f"{clearance.radius + half:.6g}"
+            )
+    classes: dict[tuple[str, tuple[float, float]], list[str]] = {}
+    for name, dimension in section.dimensions.items():
+        if isinstance(given := dimension.tolerance, ToleranceClass):
+            classes.setdefault((given.text, given.ends), []).append(name)
+    lines += [
+        f"tolerance: {text} of {', '.join(names)}: {low:+.6g} to {high:+.6g}"
+        for (text, (low, high)), names in classes.items()
+    ]
+    return lines
