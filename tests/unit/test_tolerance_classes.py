@@ -138,6 +138,17 @@ def test_tolerances_of_dimensions_by_class():
     assert found["rocker.length"].ends == pytest.approx((-0.3, 0.3))
 
 
+def test_a_parameter_has_the_class_of_the_length_that_it_sets():
+    text = ARM.replace("arm: [O, P, 90]", "arm: [O, P, r]").replace(
+        "mechanism:", "mechanism:\n  parameters: {r: 90, k: 2}\n  measures: {reach: Q.x - k*r}\n"
+        "  limits: [{measure: reach, max: 10*r}]"
+    )  # fmt: skip
+    found = mechdesign.load(text=text + "reliability: {dimensions: {r: js9}}")
+    assert found.reliability.dimensions["r"].ends[1] == pytest.approx(0.0435)
+    with pytest.raises(StudyError, match="js9 is of a length or an angle of the drawing"):
+        mechdesign.load(text=text + "reliability: {dimensions: {k: js9}}")
+
+
 def test_classes_go_by_millimetres_in_any_unit():
     inches = ARM.replace("100", "4").replace("90", "2").replace("60", "3").replace("80", "3").replace("30, 85", "1, 2")
     text = inches.replace("85, 78", "3.4, 2.9") + "units: {length: in}\n"

@@ -15,6 +15,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.model import MEASURED
 from mechdesign.study.building.section import MechanismSection
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
 from mechdesign.study.schema.iso_tolerances import (
@@ -573,14 +574,10 @@ def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath)
 def _of_class(checker: Checker, name: str, given: ToleranceClass, leg: float | None) -> tuple[float, float]:
     """Deviations of a parameter or place by its class."""
     parameters, places = checker.parameters, checker.places
-    moved = (
-        [name]
-        if name in places
-        else [place for place, slope in parameters.derivatives(name).items() if slope]
-        if name in parameters.nominal
-        else []
-    )
-    kinds = {places[place].quantity for place in moved}
+    slopes = parameters.derivatives(name) if name in parameters.nominal or name in places else {}
+    # Bounds of the motion and numbers in measures are no dimensions of a part.
+    kinds = {places[place].quantity for place, slope in slopes.items()
+             if slope and not place.startswith(("limits.", MEASURED))}  # fmt: skip
     if len(kinds) != 1 or "none" in kinds:
         raise ToleranceClassError(f"{given.text} is of a length or an angle of the drawing; give a number here")
     if kinds == {"length"}:
