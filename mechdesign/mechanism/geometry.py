@@ -18,6 +18,11 @@ def offset_names(link: str, point: str) -> tuple[str, str]:
     return f"{link}.{point}.dx", f"{link}.{point}.dy"
 
 
+def slide_offset(joint: str) -> str:
+    """Place of a slide's offset from its line, to the left of its direction (zero unless given)."""
+    return f"{joint}.offset"
+
+
 @dataclass(frozen=True)
 class Vectors:
     """Values of all edges for one set of dimensions: w and d of each edge, the offset rotation of each body.
@@ -88,14 +93,20 @@ class Geometry:
             add_local(body, point)
             add_turns(graph.bodies[body][1])
         add_turns(edge.turns)
+        names.update(self._offset_of(edge))
         return frozenset(names)
 
+    def _offset_of(self, edge: Edge) -> tuple[str, ...]:
+        """Place of an edge's offset from the line of a slide, where it has one."""
+        graph = self.graph
+        on_line = edge.slide is not None and edge.slide not in graph.telescopic
+        return (slide_offset(graph.slides[edge.slide]),) if on_line and edge.slide is not None else ()
+
     @cached_property
-    def pin_offsets(self) -> frozenset[str]:
-        """Names of the places of all pin offsets."""
-        return frozenset(
-            name for body, point in self.graph.points for name in offset_names(body.removesuffix(":rod"), point)
-        )
+    def offsets(self) -> frozenset[str]:
+        """Names of the places of all offsets, of pins and of slides."""
+        pins = (name for body, point in self.graph.points for name in offset_names(body.removesuffix(":rod"), point))
+        return frozenset([*pins, *(name for edge in self.graph.edges for name in self._offset_of(edge))])
 
     @cached_property
     def measured(self) -> Mapping[str, str]:
@@ -104,7 +115,7 @@ class Geometry:
 
     @cached_property
     def dependencies(self) -> tuple[frozenset[str], ...]:
-        """Names of the places that each edge depends on, pin offsets included."""
+        """Names of the places that each edge depends on, offsets included."""
         return tuple(self._places_of(edge) for edge in self.graph.edges)
 
     @cached_property
@@ -135,11 +146,13 @@ class Geometry:
                 if not isinstance(offsets[body], float):
                     local = local * offsets[body]
                 total = plus(total, sign, local)
-            w.append(total)
             if edge.slide is None:
                 d.append(0.0)
             else:
                 d.append(rotation(self.angle(edge.turns, values)) if edge.turns else 1.0 + 0.0j)
+            for name in self._offset_of(edge):
+                total = total + 1j * values[name] * d[k] if name in values else total
+            w.append(total)
         return Vectors(w, d, offsets, {name: self.term(place, values) for name, place in self.measured.items()})
 
     def angle_derivative(self, turns: Sequence[Turn], place: str, values: Mapping[str, Value]) -> Value:
@@ -170,11 +183,13 @@ class Geometry:
                 w_z.append(0j)
                 d_z.append(0j)
                 continue
+            d_z.append(1j * self.angle_derivative(edge.turns, place, values) * vectors.d[k])
             total: Value = 0j
+            for name in self._offset_of(edge):
+                total = 1j * ((place == name) * vectors.d[k] + values.get(name, 0.0) * d_z[k])
             for sign, body, point in edge.locals:
                 turn = self.angle_derivative(self.graph.bodies[body][1], place, values)
                 turned = 1j * turn * self.local(body, point, values)
                 total = total + sign * (self.local_derivative(body, point, place) + turned) * vectors.offsets[body]
             w_z.append(total)
-            d_z.append(1j * self.angle_derivative(edge.turns, place, values) * vectors.d[k])
         return w_z, d_z

@@ -171,7 +171,7 @@ class Mechanism(Core):
         dims = {}
         for name, value in (places or {}).items():
             place = self.description.places.get(name)
-            if place is None and name not in self.geometry.pin_offsets:
+            if place is None and name not in self.geometry.offsets:
                 raise MechanismError(f"'{name}' is not a dimension of this mechanism", name)
             angle = place is not None and place.quantity == "angle"
             dims[name] = np.asarray(value, dtype=float) * (unit if angle else 1.0)

@@ -24,6 +24,7 @@ from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Fixed
 from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document
+from mechdesign.study.schema.iso_tolerances import is_class
 from mechdesign.study.text.document import Document, KeyPath, Mark, leaves, plain, read
 
 # Sections whose numbers are read once, when the study is loaded.
@@ -117,10 +118,21 @@ def follows(study: Study, names: Collection[str], sections: Collection[str] = SE
     read += [target for target in (mechanism.get("targets") or {}).values() if not isinstance(target, str)]
     if any(_mentions(part, parameters) for part in read):
         return True
+    if "reliability" in sections and _has_classes(study):
+        return True
     if not study.parameters.measured:
         return False
     return _mentions(mechanism.get("sketch"), parameters) or not _drawing(study).isdisjoint(
         study.parameters.moved_places(names)
+    )
+
+
+def _has_classes(study: Study) -> bool:
+    """Whether a tolerance goes by the size of its dimension: that of a class."""
+    section = study.resolved.get("reliability") or {}
+    return any(
+        isinstance(value, str) and is_class(value) and value not in study.parameters.nominal
+        for _, value in leaves(section.get("dimensions") or {})
     )
 
 

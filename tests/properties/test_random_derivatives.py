@@ -126,7 +126,7 @@ def test_sensitivities_of_every_order_are_derivatives(made: Made) -> None:
     mechanism, h = made.mechanism, 1e-4
     time = np.array([-0.02, 0.0, 0.03])
     every = [name for name in mechanism.nominal if not name.startswith("limits")]
-    places = made.rng.sample(every, min(4, len(every))) + made.rng.sample(sorted(mechanism.geometry.pin_offsets), 2)
+    places = made.rng.sample(every, min(4, len(every))) + made.rng.sample(sorted(mechanism.geometry.offsets), 2)
     configuration, linear, velocity, acceleration = _state(made, time, {})
     assume(configuration.valid.all())
     position = linear.sensitivity(places)

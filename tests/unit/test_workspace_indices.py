@@ -16,6 +16,7 @@ from mechdesign.analyses.workspace.index import Local, prepare
 from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import StudyError
 from mechdesign.indices import USUAL
+from mechdesign.rows import choose
 from mechdesign.study import Study
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -296,3 +297,46 @@ def test_order_of_the_midpoint_rule() -> None:
                           .values["manipulability_mean"][0] - exact))  # fmt: skip
     order = -np.polyfit(np.log(nodes), np.log(errors), 1)[0]
     assert order == pytest.approx(1.5, abs=0.1)
+
+
+PLATFORM = """
+mechanism:
+  links:
+    ground: {A1: [-1000, 0], A2: [1000, 0], A3: [0, 1700]}
+    l1: {from: A1, to: B1, telescopic: true}
+    l2: {from: A2, to: B2, telescopic: true}
+    l3: {from: A3, to: B3, telescopic: true}
+    plate: {B1: [-200, 0], B2: [200, 0], B3: [0, 300], P: [0, 100]}
+  drives: [l1, l2, l3]
+  sketch: {B1: [-215, 540], B2: [180, 480], B3: [30, 800]}
+  limits: [{drive: l1, min: 600, max: 1300}, {drive: l2, min: 600, max: 1300}, {drive: l3, min: 600, max: 1300}]
+workspace: {point: P, at: {plate.angle: [-20, 20, -10]}, characteristic_length: 100, indices: [sigma_min]}
+"""
+
+
+def test_totals_over_all_held_values_and_empty_regions_among_them() -> None:
+    result = mechdesign.workspace(study_of(PLATFORM))
+    indices, totals = result.tables["indices"], result.tables["totals"]
+    assert list(indices["plate.angle"]) == [-20, 20, -10]
+    assert indices["area"][1] == 0 < indices["area"][0] < indices["area"][2]
+    told = {row["statistic"]: row for row in totals}
+    assert {"GII", "area", "box_area", "sigma_min_min", "circle_radius"} <= set(told)
+    area = told["area"]
+    assert (area["smallest"], area["smallest_at_plate.angle"]) == (0, 20)
+    assert (area["largest"], area["largest_at_plate.angle"]) == (indices["area"][2], -10)
+    assert area["mean"] == pytest.approx(indices["area"].sum() / 3)
+    assert (area["unit"], area["values"], area["empty"]) == ("mm^2", 3, 1)
+    # What an empty region has not is not counted.
+    assert told["GII"]["mean"] == pytest.approx(np.nanmean(indices["GII"]))
+    assert told["GII"]["smallest"] == np.nanmin(indices["GII"])
+    chosen = choose(result, "totals.area.smallest", {})
+    assert chosen.values[chosen.counts].tolist() == [0.0]
+    # The assembly that is not the sketch's has all of it.
+    assert any("at plate.angle = 20" in warning and "and 0 mm^2 here" in warning for warning in result.warnings)
+
+
+def test_totals_over_a_range_are_of_the_other_held_values() -> None:
+    study = study_of(PLATFORM, "workspace.at={plate.angle: -20}")
+    assert len(mechdesign.workspace(study).tables["totals"]) > 5
+    over = study_of(PLATFORM, "workspace.at={plate.angle: {from: -20, to: -15}}")
+    assert "totals" not in mechdesign.workspace(over).tables

@@ -97,7 +97,10 @@ class Evaluator:
         if self._regional:
             asked = questions(study, GRID_TOLERANCE, self._columns)
             if len(asked) > 1:
-                message = "an optimisation compares one workspace a design: hold one value of each coordinate"
+                message = (
+                    "an optimisation compares one workspace a design: hold one value of each coordinate, or name a "
+                    "result over all of them, such as workspace.totals.area.smallest"
+                )
                 raise StudyError([study.problem(message, "workspace", "at")])
             self.question = asked[0]
             one_by_one = follows(study, study.optimize.variables, ("workspace",))

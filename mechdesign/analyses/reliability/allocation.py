@@ -312,13 +312,13 @@ def _dimension(raw: Any, dimension: Dimension, tolerance: Tolerance, scale: floa
     size = _number(tolerance.given * scale)
     if isinstance(raw, dict) and raw.get("sigma") is not None:
         return {**raw, "sigma": size}
-    assert dimension.tolerance is not None
     width = raw["tolerance"] if isinstance(raw, dict) else raw
     new: Any = size
-    if isinstance(width, list):
-        middle = 0.5 * sum(dimension.tolerance)
+    middle = 0.5 * sum(dimension.ends)
+    if isinstance(width, list) or middle:
         new = [_number(middle - size, 12), _number(middle + size, 12)]
-    return {**raw, "tolerance": new} if isinstance(raw, dict) else new
+    # An allocated number is of no class, and needs no leg to go by.
+    return {**{key: raw[key] for key in raw if key != "leg"}, "tolerance": new} if isinstance(raw, dict) else new
 
 
 def _clearance(raw: dict[str, Any], clearance: Clearance, tolerance: Tolerance, scale: float) -> dict[str, Any]:

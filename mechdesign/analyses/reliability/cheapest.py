@@ -77,7 +77,7 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
         dimension = section.dimensions[scalar.name]
         half = dimension.sigma
         if dimension.tolerance is not None:
-            low, high = dimension.tolerance
+            low, high = dimension.ends
             half = 0.5 * (high - low)
         elif half is None:
             half = math.sqrt(scalar.law.moments[1]) / scalar.factor

@@ -14,7 +14,7 @@ import numpy as np
 from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.question import Channel
-from mechdesign.analyses.reliability.sources import Sources
+from mechdesign.analyses.reliability.sources import Pin, Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
@@ -84,9 +84,18 @@ class FirstOrder:
 
     @cached_property
     def sensitivity(self) -> Floats:
-        """Per source, shape (channels, sources, poses): the derivative, of a pin sqrt(s_x^2 + s_y^2)."""
+        """Per source, shape (channels, sources, poses): the derivative, of a clearance sqrt(s_x^2 + s_y^2)."""
         each = [self.components[:, self.owner == k] for k in range(len(self.sources.all))]
         return np.stack([own[:, 0] if own.shape[1] == 1 else np.linalg.norm(own, axis=1) for own in each], axis=1)
+
+    @cached_property
+    def _steepest(self) -> Floats:
+        """As `sensitivity`, but of the two ends of a slider, each of which may be at its worst, the sum."""
+        found = self.sensitivity.copy()
+        for k, source in enumerate(self.sources.all):
+            if isinstance(source, Pin) and source.kind == "slide":
+                found[:, k] = np.abs(self.components[:, self.owner == k]).sum(axis=1)
+        return found
 
     def share(self) -> Floats:
         """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies.
@@ -101,12 +110,12 @@ class FirstOrder:
     def worst_case(self) -> Floats:
         """Sum of |sensitivity| times the larger end of the tolerance, shape (channels, poses)."""
         reach = np.array([max(abs(end) for end in source.ends) for source in self.sources.all])
-        return np.asarray(np.einsum("csp,s->cp", np.abs(self.sensitivity), reach))
+        return np.asarray(np.einsum("csp,s->cp", np.abs(self._steepest), reach))
 
     def worst_ends(self) -> tuple[Floats, Floats]:
         """Lowest and highest error with each source at the end of its tolerance that leads there, (channels, poses)."""
         low, high = (
-            self.sensitivity * np.array([source.ends[k] for source in self.sources.all])[:, None] for k in (0, 1)
+            self._steepest * np.array([source.ends[k] for source in self.sources.all])[:, None] for k in (0, 1)
         )
         offset = 0.0 if self.offset is None else self.offset
         return np.minimum(low, high).sum(axis=1) + offset, np.maximum(low, high).sum(axis=1) + offset

@@ -80,7 +80,7 @@ class Marginal(ABC):
 def marginal(spread: Dimension, nominal: float, factor: float = 1.0) -> Marginal:
     """The law that a study gives in its units; `nominal` is in the core's, `factor` of which are one of the study's."""
     law = LAWS[spread.distribution]
-    low, high = spread.tolerance or (0.0, 0.0)
+    low, high = spread.ends
     if spread.sigma is not None:
         low, high = -law.reach * spread.sigma, law.reach * spread.sigma
     if spread.shape is not None:
@@ -189,6 +189,48 @@ class Lognormal(Marginal):
 
 
 @dataclass(frozen=True)
+class _OfFit(Marginal):
+    """A hole's size less its shaft's, each alike in its own tolerance; `hole` is the hole's part of both tolerances."""
+
+    hole: float = 0.5
+
+    @property
+    def sigma(self) -> float:
+        return super().sigma * math.hypot(self.hole, 1.0 - self.hole)
+
+
+class NormalFit(_OfFit, Normal):
+    """Of normal sizes."""
+
+
+class UniformFit(_OfFit):
+    """Of uniform sizes: a trapezoid."""
+
+    reach = Uniform.reach
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        hole, shaft = (0.5 * (self.high - self.low) * part / self.reach for part in (self.hole, 1.0 - self.hole))
+        return self.mean, self.sigma**2, 0.0, Uniform.fourth * (hole**4 + shaft**4) + 6.0 * (hole * shaft) ** 2
+
+    def at(self, u: Floats) -> Floats:
+        from scipy.special import ndtr
+
+        width, wider, narrower = self.high - self.low, max(self.hole, 1.0 - self.hole), min(self.hole, 1.0 - self.hole)
+        tail = ndtr(-np.abs(u))
+        rising = np.sqrt(2.0 * wider * narrower * tail)
+        inward = width * np.where(2.0 * wider * tail < narrower, rising, 0.5 * narrower + wider * tail)
+        return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
+
+
+def fit_law(distribution: str, hole: float, shaft: float, nominal: float) -> Marginal:
+    """Law of a radial clearance by half the tolerances of the hole's and the shaft's diameter, about its mean."""
+    law = NormalFit if distribution == "normal" else UniformFit
+    reach = 0.5 * (hole + shaft)
+    return law(-reach, reach, nominal, hole / (hole + shaft))
+
+
+@dataclass(frozen=True)
 class Beta(Marginal):
     """Beta over the tolerance, of two shape parameters: equal ones do not lean, (1, 1) is uniform."""
 
@@ -274,7 +316,7 @@ class PinLaw:
     Parameters
     ----------
     variance, fourth : float
-        Of each coordinate: E[x^2] and E[x^4]; E[x^2 y^2] is a third of the latter.
+        Of each coordinate: E[x^2] and E[x^4].
     stretch : callable
         Ratio of the offset's length to that of two standard normal variables, of half their squared length.
     """
@@ -283,6 +325,11 @@ class PinLaw:
     fourth: float
     draw: Callable[[np.random.Generator, int], tuple[Floats, Floats]]
     stretch: Callable[[Floats], Floats]
+
+    @property
+    def mixed(self) -> float:
+        """E[x^2 y^2]."""
+        return self.fourth / 3.0
 
     def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
         """The place at values of two independent standard normal variables, which is not turned."""
@@ -344,6 +391,54 @@ PIN_LAWS: Mapping[str, PinLaw] = {
     ),
     "uniform": PinLaw(1 / 4, 1 / 8, partial(_turned, inside=True), _stretch(lambda half: -np.expm1(-half))),
     "contact": PinLaw(1 / 2, 3 / 8, partial(_turned, inside=False), _stretch(np.ones_like)),
+}
+
+
+class Wall(Marginal):
+    """At either end of the tolerance, as often as at the other."""
+
+    reach = 1.0
+    fourth = 1.0
+
+    def at(self, u: Floats) -> Floats:
+        return np.where(u < 0, self.low, self.high)
+
+
+@dataclass(frozen=True)
+class SlideLaw:
+    """Law of the two ends of a slider in its guide, each by itself, for a clearance of 1 on either side."""
+
+    end: Marginal
+
+    @property
+    def variance(self) -> float:
+        """Of each end."""
+        return self.end.moments[1]
+
+    @property
+    def fourth(self) -> float:
+        """E[x^4] of each end."""
+        return self.end.moments[3]
+
+    @property
+    def mixed(self) -> float:
+        """E[x^2 y^2] of both."""
+        return self.variance**2
+
+    def draw(self, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
+        """Both ends, each of shape (count,)."""
+        return self.end.draw(rng, count), self.end.draw(rng, count)
+
+    def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Both ends at values of two independent standard normal variables."""
+        return self.end.at(u), self.end.at(v)
+
+
+SLIDE_LAWS: Mapping[str, SlideLaw] = {
+    "normal": SlideLaw(Normal(-1.0, 1.0)),
+    "normal_in_disc": SlideLaw(TruncatedNormal(-1.0, 1.0)),
+    "uniform": SlideLaw(Uniform(-1.0, 1.0)),
+    "contact": SlideLaw(Wall(-1.0, 1.0)),
 }
 
 

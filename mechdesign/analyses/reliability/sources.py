@@ -9,11 +9,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.analyses.reliability.laws import PIN_LAWS, Correlation, Marginal, Measured, marginal
+from mechdesign.analyses.reliability.laws import (
+    PIN_LAWS,
+    SLIDE_LAWS,
+    Correlation,
+    Marginal,
+    Measured,
+    PinLaw,
+    SlideLaw,
+    fit_law,
+    marginal,
+)
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.geometry import offset_names
-from mechdesign.mechanism.model import MEASURED
+from mechdesign.mechanism.geometry import offset_names, slide_offset
+from mechdesign.mechanism.model import MEASURED, Joint, Prismatic
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import LOADS, Clearance
@@ -57,10 +67,12 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Pin:
-    """A clearance: its mean radius, and the law of its deviation.
+    """A clearance of a pin or a slide: its mean radius, and the law of its deviation.
 
-    `analytic` and `sampled` are the laws of the pin's place, of the analytic methods and of those that sample; `places`
-    what the pin moves: the offsets of its point in its link, or the link's length.
+    `analytic` and `sampled` name the laws of its place, of the analytic methods and of those that sample. The place has
+    two components, x and y of a pin or the two ends of a slider; `directions` are the derivatives of the places of the
+    geometry by as many of them as move something: the offsets of the pin's point in its link, the link's length, or
+    the slide's offset and angle. `kind` is ``offset``, ``length`` or ``slide``.
     """
 
     name: str
@@ -68,7 +80,18 @@ class Pin:
     law: Marginal | None
     analytic: str
     sampled: str
-    places: tuple[str, ...]
+    kind: str
+    directions: tuple[Mapping[str, float], ...]
+
+    @property
+    def laws(self) -> Mapping[str, PinLaw] | Mapping[str, SlideLaw]:
+        """Laws of the place by name."""
+        return SLIDE_LAWS if self.kind == "slide" else PIN_LAWS
+
+    @property
+    def directed(self) -> bool:
+        """Whether the direction of its place alone counts: a pin in contact."""
+        return self.sampled == "contact" and self.kind != "slide"
 
     @property
     def moments(self) -> tuple[float, float, float, float]:
@@ -77,19 +100,14 @@ class Pin:
         return self.radius + mean, second, third, fourth
 
     @property
-    def directions(self) -> list[dict[str, float]]:
-        """Of the components x and y. Along a binary link the pin changes its length; across it, in the second order."""
-        return [{name: 1.0} for name in self.places]
-
-    @property
     def spread(self) -> tuple[float, float]:
         """Mean and variance of each component [S2, eqs. 5, 6]."""
         mean, variance, _, _ = self.moments
-        return 0.0, PIN_LAWS[self.analytic].variance * (variance + mean**2)
+        return 0.0, self.laws[self.analytic].variance * (variance + mean**2)
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The largest radial clearance in any direction."""
+        """The largest radial clearance in any direction, or of each end of a slider."""
         largest = self.radius + (0.0 if self.law is None else self.law.high)
         return -largest, largest
 
@@ -130,7 +148,7 @@ class Sources:
     def circles(self) -> list[tuple[int, int]]:
         """The variables of `at` of which the direction alone counts: the places of pins in contact."""
         owners = self.owners
-        ends = [len(owners) - owners[::-1].index(pin.name) for pin in self.pins if pin.sampled == "contact"]
+        ends = [len(owners) - owners[::-1].index(pin.name) for pin in self.pins if pin.directed]
         return [(end - 2, end - 1) for end in ends]
 
     def widened(self, factors: Sequence[float] | Floats) -> Sources:
@@ -147,7 +165,7 @@ class Sources:
         """Correlation coefficients of the components of `all`; None where all are independent."""
         if self.correlation is None:
             return None
-        found = np.eye(len(self.scalars) + sum(len(pin.places) for pin in self.pins))
+        found = np.eye(len(self.scalars) + sum(len(pin.directions) for pin in self.pins))
         found[: len(self.scalars), : len(self.scalars)] = self.correlation.coefficients
         return found
 
@@ -160,14 +178,14 @@ class Sources:
             rows = [scalar.law.at(u) for scalar, u in zip(self.scalars, normal, strict=True)]
         for pin in self.pins:
             radius = pin.radius if pin.law is None else pin.radius + pin.law.draw(rng, count)
-            rows += [radius, *PIN_LAWS[pin.sampled].draw(rng, count)]
+            rows += [radius, *pin.laws[pin.sampled].draw(rng, count)]
         return np.array([np.broadcast_to(row, (count,)) for row in rows])
 
     def redraw_pins(self, drawn: Floats, rng: np.random.Generator) -> Floats:
         """The same mechanisms with their pins elsewhere in their holes."""
         drawn = drawn.copy()
         for pin, (_, *place) in zip(self.pins, self._by_pin(drawn), strict=True):
-            place[0][:], place[1][:] = PIN_LAWS[pin.sampled].draw(rng, drawn.shape[1])
+            place[0][:], place[1][:] = pin.laws[pin.sampled].draw(rng, drawn.shape[1])
         return drawn
 
     def at(self, u: Floats, *, directed: bool = False) -> Floats:
@@ -182,8 +200,7 @@ class Sources:
         for pin in self.pins:
             rows.append(pin.radius if pin.law is None else pin.radius + pin.law.at(next(rest)))
             place = next(rest), next(rest)
-            given = directed and pin.sampled == "contact"
-            rows += place if given else PIN_LAWS[pin.sampled].at(*place)
+            rows += place if directed and pin.directed else pin.laws[pin.sampled].at(*place)
         return np.array([np.broadcast_to(row, (u.shape[1],)) for row in rows])
 
     def _by_pin(self, drawn: Floats) -> Floats:
@@ -193,7 +210,7 @@ class Sources:
     def components(self, drawn: Floats) -> Floats:
         """Deviations of the components of `all`, shape (components, count)."""
         pins = [radius * part for pin, (radius, *place) in zip(self.pins, self._by_pin(drawn), strict=True)
-                for _, part in zip(pin.places, place, strict=False)]  # fmt: skip
+                for _, part in zip(pin.directions, place, strict=False)]  # fmt: skip
         return np.array([*drawn[: len(self.scalars)], *pins])
 
     def made(self, drawn: Floats) -> Made:
@@ -209,12 +226,14 @@ class Sources:
         for name, deviation in by_kind["place"].items():
             places[name] = places.get(name, nominal[name]) + deviation
         for pin, (radius, x, y) in zip(self.pins, self._by_pin(drawn), strict=True):
-            along, across = radius * x, radius * y
-            if len(pin.places) == 1:
-                (name,) = pin.places
-                places[name] = np.sqrt((places.get(name, nominal[name]) + along) ** 2 + across**2)
-            else:
-                places.update(zip(pin.places, (along, across), strict=True))
+            parts = radius * x, radius * y
+            if pin.kind == "length":
+                (name,) = pin.directions[0]
+                places[name] = np.sqrt((places.get(name, nominal[name]) + parts[0]) ** 2 + parts[1] ** 2)
+                continue
+            for direction, part in zip(pin.directions, parts, strict=False):
+                for name, slope in direction.items():
+                    places[name] = places.get(name, nominal.get(name, 0.0)) + slope * part
         return Made(places, by_kind["drive"], by_kind["load"])
 
 
@@ -260,7 +279,7 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
             law = marginal(dimension, nominal, factor)
         scalars.append(Scalar(name, kind, law, moves, factor, unit))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
-    pins = tuple(_pin(point, clearance) for point, clearance in section.clearances.items())
+    pins = tuple(_pin(mechanism, name, clearance) for name, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))
     _check_sizes(sources)
     return sources, warnings
@@ -310,16 +329,30 @@ def _correlation(study: Study, scalars: Sequence[Scalar]) -> Correlation | None:
     return Correlation.of([scalar.law for scalar in scalars], pairs)
 
 
-def _pin(point: str, clearance: Clearance) -> Pin:
-    link = clearance.link
-    if link is None:
-        raise StudyError(f"reliability.clearances.{point}: name the 'link' whose pin moves")
-    spread = clearance.radius_spread
-    return Pin(
-        point, clearance.radius, None if spread is None else marginal(spread, clearance.radius),
-        clearance.pin.analytic, clearance.pin.monte_carlo,
-        (f"{link}.length",) if clearance.effect == "length" else offset_names(link, point),
-    )  # fmt: skip
+def _pin(mechanism: Mechanism, name: str, clearance: Clearance) -> Pin:
+    spread, radius = clearance.radius_spread, clearance.radius
+    law = None if spread is None else marginal(spread, radius)
+    if clearance.fit is not None:
+        law = fit_law(clearance.distribution, clearance.fit.hole, clearance.fit.shaft, radius)
+    kind = "slide" if name in mechanism.description.joints else clearance.effect
+    found = Pin(name, radius, law, clearance.pin.analytic, clearance.pin.monte_carlo, kind, ())
+    if kind == "slide":
+        return replace(found, directions=_slider(mechanism.description.joints[name], clearance.length))
+    if clearance.link is None:
+        raise StudyError(f"reliability.clearances.{name}: name the 'link' whose pin moves")
+    moved = (f"{clearance.link}.length",) if kind == "length" else offset_names(clearance.link, name)
+    return replace(found, directions=tuple({place: 1.0} for place in moved))
+
+
+def _slider(joint: Joint, length: float | None) -> tuple[dict[str, float], ...]:
+    """Of the rear and the front end of a slider: it shifts by their mean and tilts by their difference over its length.
+
+    A pin in a slot only shifts.
+    """
+    offset = slide_offset(joint.name)
+    if length is None or not isinstance(joint, Prismatic):
+        return ({offset: 1.0},)
+    return tuple({offset: 0.5, str(joint.angle): slope} for slope in (-1.0 / length, 1.0 / length))
 
 
 def _geometric(values: Mapping[str, object]) -> dict[str, float]:

@@ -28,6 +28,7 @@ from mechdesign.analyses.workspace.question import (
 from mechdesign.analyses.workspace.ranged import Every, Ranged, Some, SomeDesigns
 from mechdesign.analyses.workspace.singularities import causes, singular_everywhere
 from mechdesign.analyses.workspace.tables import (
+    beyond,
     boundary_columns,
     held_columns,
     inscribed_columns,
@@ -36,6 +37,7 @@ from mechdesign.analyses.workspace.tables import (
     piece_columns,
     poses_along,
     stacked,
+    totals,
     where,
 )
 from mechdesign.errors import AssemblyError, Problem, StudyError
@@ -110,12 +112,16 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
                 )
         else:
             shapes.append(np.full(len(INSCRIBED), np.nan))
+            warnings += filter(None, [beyond(study, question, ())] if question.field.same_assembly else [])
+            pieces.append(piece_columns(study, question, (), (), drawn=False))
         progress.update(1)
     if not regions:
         raise AssemblyError(_unreachable(study, asked))
+    indices = Table("indices", (*_indices(study, asked, answers), *inscribed_columns(study, shapes)),
+                    "performance indices over the region")  # fmt: skip
     tables = [
-        Table("indices", (*_indices(study, asked, answers), *inscribed_columns(study, shapes)),
-              "performance indices over the region"),
+        indices,
+        *_totals(indices, asked),
         Table("local", stacked([_local(*region) for region in regions]),
               "local indices on a grid that follows the boundary"),
         *outlines(regions),
@@ -130,13 +136,21 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 def _pieces(
     study: Study, question: Question, given: Evaluation, warnings: list[str]
 ) -> tuple[list[Patch], list[Column]]:
-    """Patches and pieces of a region, and a warning where pieces are left out."""
+    """Patches and pieces of a region, and a warning where pieces, or more than the piece beyond it, are left out."""
     assert given.pieces is not None
     found = patches_of_pieces(given.pieces, question.rays or RAYS)
     areas, drawn = areas_of_pieces(question, given), bool(given.pieces.drawn[0])
     if len(areas) > 1 and question.field.same_assembly:
         warnings.append(left_out(study, question, areas, drawn))
+    if question.field.same_assembly and not isinstance(question.field, Ranged):
+        warnings += filter(None, [beyond(study, question, areas)])
     return found, piece_columns(study, question, found, areas, drawn)
+
+
+def _totals(indices: Table, asked: Sequence[Question]) -> Iterator[Table]:
+    """The table over all held values, where a coordinate is held."""
+    if asked[0].held:
+        yield totals(indices, list(asked[0].held))
 
 
 def _several(pieces: Sequence[Sequence[Column]]) -> Iterator[Table]:
@@ -263,6 +277,8 @@ def _reachable(study: Study, progress: Progress) -> Result:
             found, columns = _pieces(study, question, given, warnings)
             pieces.append(columns)
             boundaries.append(_outline(study, question, name, found))
+        else:
+            pieces.append(piece_columns(study, question, (), (), drawn=False))
         progress.update(1)
     if not boundaries:
         held = "".join(f", {key} = {value:g}" for key, value in asked[0].held.items())
@@ -271,13 +287,15 @@ def _reachable(study: Study, progress: Progress) -> Result:
         )
     values = {key: np.concatenate([given.values[key] for given in answers]) for key in OF_RANGE}
     area, error = values["area"], np.concatenate([given.errors["area"] for given in answers])
-    indices = (
+    told = (
         *stacked([held_columns(study, question, 1) for question in asked]),
         *shared(study.units, **values),
         Column("area_error", error, study.units.label("area"), "estimated error of area"),
     )
+    indices = Table("indices", told, f"the region over the range of {name}")
     tables = [
-        Table("indices", indices, f"the region over the range of {name}"),
+        indices,
+        *_totals(indices, asked),
         Table("boundary", stacked(boundaries), "boundary of the region, curve by curve"),
         *_several(pieces),
     ]

@@ -12,14 +12,18 @@ from numpy.typing import NDArray
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.region.curves import Patch
+from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.inscribed import INSCRIBED
-from mechdesign.analyses.workspace.question import Question
+from mechdesign.analyses.workspace.question import Question, answer
 from mechdesign.analyses.workspace.singularities import around, causes, inside
+from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
+# Relative accuracy of the area that lies in the other assembly.
+LOOSE = 1e-3
 # So far inside the boundary (as a part of the radius) the drives are read where rounding opens the mechanism.
 BESIDE = 1e-12
 # Poses along all curves of one side of the boundary.
@@ -42,6 +46,31 @@ def left_out(study: Study, question: Question, areas: Sequence[float], drawn: bo
     return (
         f"the region{where(question)} has {len(areas)} pieces that do not hang together: indices are {one}; "
         f"{left} {'is' if many == 1 else 'are'} left out ('assembly: any' counts all)"
+    )
+
+
+def beyond(study: Study, question: Question, areas: Sequence[float]) -> str:
+    """That more lies in the other assembly than in the piece that is reported, with both areas; else nothing.
+
+    It is looked for as loosely as of a design of many.
+    """
+    field = question.field
+    if not any(name.startswith("assembly ") for _, name in field.labels):
+        return ""
+    both = replace(field, same_assembly=False)
+    every = replace(question, field=both, indices=(), wanted=("area",), rule="gauss", tolerance=LOOSE)
+    try:
+        other = float(answer(every, {}, 1, BATCH).values["area"][0]) - sum(areas)
+    except AssemblyError:
+        # In the other assembly the region has no end.
+        return ""
+    if not other > max(areas, default=0.0):
+        return ""
+    unit = study.units.label("area")
+    here, there = (f"{area:.3g} {unit}".rstrip() for area in (sum(areas[:1]), other))
+    return (
+        f"more of the region{where(question)} lies beyond a forward singularity, in the other assembly: about {there}, "
+        f"and {here} here; 'assembly: any' counts all, or redraw the sketch in the other assembly"
     )
 
 
@@ -103,16 +132,19 @@ def boundary_columns(
 def piece_columns(
     study: Study, question: Question, found: Sequence[Patch], areas: Sequence[float], drawn: bool
 ) -> list[Column]:  # fmt: skip
-    """Pieces of a region: the area of each, a place inside it, and whether it holds the sketch's place."""
+    """Pieces of a region: the area of each, a place inside it, and whether it holds the sketch's place.
+
+    Of an empty region it is one row, piece 0 of area 0.
+    """
     length = study.units.label("length")
-    number = np.arange(1, len(areas) + 1)
-    widest = [max((patch for patch in found if patch.piece == k), key=lambda p: float(np.max(p.outer - p.inner)))
-              for k in number]  # fmt: skip
-    z = np.array([patch.middle(question.about) for patch in widest])
+    number = np.arange(1, len(areas) + 1) if areas else np.zeros(1, dtype=int)
+    own = [[patch for patch in found if patch.piece == k] for k in number]
+    widest = [max(patches, key=lambda p: float(np.max(p.outer - p.inner)), default=None) for patches in own]
+    z = np.array([complex(np.nan, np.nan) if patch is None else patch.middle(question.about) for patch in widest])
     return [
         *held_columns(study, question, len(z)),
         *shared(study.units, piece=number),
-        Column("area", np.array(areas), study.units.label("area"), "area of the piece"),
+        Column("area", np.array([*areas] or [0.0]), study.units.label("area"), "area of the piece"),
         Column("x", z.real, length, "a place inside the piece"),
         Column("y", z.imag, length, "a place inside the piece"),
         Column("sketch", ((number == 1) & drawn).astype(int), "", "whether it holds the point's place in the sketch"),
@@ -149,6 +181,39 @@ def inscribed_columns(study: Study, shapes: Sequence[Floats]) -> list[Column]:
         )
         for name, values in zip(INSCRIBED, np.transpose(shapes), strict=True)
     ]
+
+
+def totals(indices: Table, held: Sequence[str]) -> Table:
+    """Smallest, mean and largest of each statistic of the indices over the held values, and where they are."""
+    told = [column for column in indices.columns
+            if column.name not in held and not column.name.endswith(("_error", "_x", "_y"))]  # fmt: skip
+    values = np.array([column.values for column in told], dtype=float)
+    known = np.isfinite(values) | np.isinf(values)
+    least = np.argmin(np.where(known, values, np.inf), axis=1)
+    most = np.argmax(np.where(known, values, -np.inf), axis=1)
+    row, some = np.arange(len(told)), known.any(axis=1)
+    with np.errstate(invalid="ignore"):
+        mean = np.where(known, values, 0.0).sum(axis=1) / np.where(some, known.sum(axis=1), np.nan)
+    ends = {"smallest": least, "largest": most}
+    over = "over the held values that have one, in `unit`"
+    return Table(
+        "totals",
+        (
+            Column("statistic", np.array([column.name for column in told]), "", "column of the indices"),
+            Column("smallest", values[row, least], "", f"smallest {over}"),
+            Column("mean", mean, "", f"mean {over}"),
+            Column("largest", values[row, most], "", f"largest {over}"),
+            *(
+                Column(f"{end}_at_{name}", np.where(some, indices[name][at], np.nan), indices.column(name).unit,
+                       f"held value at which the {end} is")
+                for end, at in ends.items() for name in held
+            ),
+            Column("unit", np.array([column.unit for column in told]), "", "unit of the row's values"),
+            Column("values", np.full(len(told), len(indices)), "", "held values, empty regions among them"),
+            Column("empty", np.full(len(told), int((indices["area"] == 0).sum())), "", "held values of empty regions"),
+        ),
+        "the indices over all held values",
+    )  # fmt: skip
 
 
 def outlines(regions: Sequence[tuple[Study, Question, Sequence[Patch]]]) -> list[Table]:

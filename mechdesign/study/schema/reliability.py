@@ -7,7 +7,9 @@ the pin moves in another one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
@@ -16,15 +18,24 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.model import MEASURED
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.building.section import MechanismSection
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
+from mechdesign.study.schema.iso_tolerances import (
+    ToleranceClassError,
+    angle_deviations,
+    deviations,
+    fit_deviations,
+    is_class,
+)
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.paths import read_column
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.study.text.units import QuantityError
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
 BETA = "beta"
@@ -48,6 +59,45 @@ def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
     return name, 0
 
 
+def _millimetre(context: Context, text: str) -> float:
+    """A millimetre in the study's unit of length, for a class of an ISO standard."""
+    try:
+        return context.units.convert("1 mm")
+    except QuantityError:
+        raise failure(f"{text!r} is of sizes in mm, and this study's lengths are dimensionless") from None
+
+
+@dataclass(frozen=True)
+class ToleranceClass:
+    """A tolerance class as it is written, a millimetre and a degree as the study counts them.
+
+    `ends`, its lowest and highest deviation, follow from the size of what it is of.
+    """
+
+    text: str
+    millimetre: float
+    degree: float
+    ends: tuple[float, float] = (0.0, 0.0)
+
+    def of_length(self, size: float) -> tuple[float, float]:
+        """Lowest and highest deviation of a length; raises as `deviations`."""
+        low, high = deviations(self.text, abs(size) / self.millimetre)
+        return low * self.millimetre, high * self.millimetre
+
+    def of_angle(self, leg: float) -> tuple[float, float]:
+        """Lowest and highest deviation of an angle whose shorter leg is so long; raises as `angle_deviations`."""
+        low, high = angle_deviations(self.text, leg / self.millimetre)
+        return low * self.degree, high * self.degree
+
+
+def _tolerance_or_class(raw: Any, context: Context) -> tuple[float, float] | ToleranceClass:
+    """As `_tolerance`, or a tolerance class; a parameter of its name counts first."""
+    if isinstance(raw, str) and is_class(raw) and raw not in context.parameters:
+        degree = math.pi / 180.0 / context.units.angle_factor
+        return ToleranceClass(raw, _millimetre(context, raw), degree)
+    return _tolerance(raw, context)
+
+
 def _tolerance(raw: Any, context: Context) -> tuple[float, float]:
     """A half-width, or the lowest and the highest deviation."""
     if not isinstance(raw, list):
@@ -68,6 +118,38 @@ _TOLERANCE = {
     "description": "a half-width, or the lowest and highest deviation",
 }
 Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
+_CLASSED = {**_TOLERANCE, "description": "a half-width, the lowest and highest deviation, or a class: js9, ISO 2768-m"}
+
+
+class Fit(NamedTuple):
+    """A fit as it is written, its mean diametral clearance, and half the tolerances of its hole and of its shaft."""
+
+    text: str
+    diametral: float
+    hole: float
+    shaft: float
+
+
+def _fit(raw: Any, context: Context) -> Fit:
+    if not isinstance(raw, str):
+        raise failure(f"expected a fit such as 20 H7/g6, not {shown(raw)}")
+    millimetre = _millimetre(context, raw)
+    try:
+        _, hole, shaft = fit_deviations(raw)
+    except ToleranceClassError as error:
+        raise failure(str(error)) from None
+    least, most = hole[0] - shaft[1], hole[1] - shaft[0]
+    if least < -_ROUNDING:
+        kind = "an interference" if most <= _ROUNDING else "a transition"
+        raise failure(
+            f"{raw} is {kind} fit, from {least:+.4g} to {most:+.4g} mm, and no clearance is negative; a pin that is "
+            "pressed in has none: leave it out, or take a clearance fit such as H7/g6 or H7/h6"
+        )
+    halves = [0.5 * (high - low) * millimetre for low, high in (hole, shaft)]
+    return Fit(raw, 0.5 * (least + most) * millimetre, *halves)
+
+
+_FIT = {**fields.NAME_FORM, "description": "such as 20 H7/g6"}
 
 
 class Dimension(fields.Model):
@@ -75,7 +157,8 @@ class Dimension(fields.Model):
 
     Of a tolerance ``normal`` makes three standard deviations, ``truncated_normal`` the same and cuts there; ``uniform``
     fills it, ``triangular`` peaks at the nominal value, ``lognormal`` has the mean and the deviation of ``normal``,
-    ``beta`` has two shape parameters between its ends.
+    ``beta`` has two shape parameters between its ends. A class, ``h7`` of ISO 286-1 or ``ISO 2768-m``, gives the
+    deviations for the dimension's nominal size; for an angle by the length of its shorter `leg`.
 
     `measured` is a file of measured values of the dimension, in the study's units: one a line, or a `column`. What they
     deviate from is the dimension's own nominal value (of a drive or a load 0), or `nominal`. What is sampled is drawn
@@ -84,12 +167,13 @@ class Dimension(fields.Model):
 
     bare, short = "tolerance", (fields.NUMBER_FORM, fields.PAIR_FORM)
     one_of = ("a dimension needs either 'tolerance', 'sigma' or 'measured'", "tolerance", "sigma", "measured")
-    tolerance: Tolerance | None = None
+    tolerance: Annotated[tuple[float, float] | ToleranceClass, fields.Read(_tolerance_or_class, _CLASSED)] | None = None
     sigma: fields.NonNegative | None = None
     distribution: Annotated[str, fields.choice((*DISTRIBUTIONS, BETA))] = "normal"
     shape: (
         Annotated[tuple[fields.Positive, fields.Positive], fields.pair_of("two shape parameters such as [2, 5]")] | None
     ) = Field(None, description="shape parameters of a beta distribution over the tolerance")
+    leg: fields.PositiveLength | None = None
     measured: str | None = Field(None, description="a file of measured values, one a line or a column")
     column: str | None = Field(None, description="the column of measured values, by its name in the first line")
     nominal: fields.Number | None = Field(None, description="what measured values deviate from; 0 of deviations")
@@ -105,6 +189,11 @@ class Dimension(fields.Model):
         if self.measured is None and (spare := self.given("column", "nominal")):
             raise failure(f"{spare[0]!r} goes with 'measured', the name of a file")
         return self
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest deviation of the tolerance; none where sigma is given."""
+        return self.tolerance.ends if isinstance(self.tolerance, ToleranceClass) else self.tolerance or (0.0, 0.0)
 
     def deviations(self, nominal: float, folder: Path) -> Floats:
         """Measured values less what they deviate from, in the study's units, by default `nominal`.
@@ -143,29 +232,35 @@ class PinModel(fields.Model):
 
 
 class Clearance(fields.Model):
-    """The clearance of a pin joint; exactly one of radial and diametral, to which the tolerance belongs.
+    """The clearance of a pin joint or a slide; exactly one of radial and diametral, to which the tolerance belongs, or
+    a fit of ISO 286-1, which has the tolerances of its hole and shaft.
 
     The pin moves in `link` (left out, the last link of the joint that no output is said to be of); the coordinates of
     its point are those of the other links. An output or a limit may name the link that it is about: ``coupler.P.x``.
+    A slider of a `length`, centred on the joint's point, shifts and tilts: each end lies within the radial clearance
+    across the line. A pin in a slot shifts only.
     """
 
-    one_of = ("a clearance needs either 'radial' or 'diametral'", "radial", "diametral")
+    one_of = ("a clearance needs either 'radial' or 'diametral', or a 'fit'", "radial", "diametral", "fit")
     radial: fields.NonNegativeLength | None = None
     diametral: fields.NonNegativeLength | None = None
+    fit: Annotated[Fit, fields.Read(_fit, _FIT)] | None = None
     tolerance: Tolerance = (0.0, 0.0)
     distribution: Annotated[str, fields.choice(DISTRIBUTIONS)] = "normal"
     pin: PinModel = PinModel()
     link: fields.LinkName | None = None
     effect: Annotated[str, fields.choice(("offset", "length"))] = "offset"
+    length: fields.PositiveLength | None = None
 
     @property
     def radius(self) -> float:
         """Mean radial clearance, half the difference of the diameters."""
-        return self.radial if self.radial is not None else 0.5 * (self.diametral or 0.0)
+        diametral = self.fit.diametral if self.fit is not None else self.diametral
+        return self.radial if self.radial is not None else 0.5 * (diametral or 0.0)
 
     @property
     def radius_spread(self) -> Dimension | None:
-        """Variation of the radial clearance; None where it has none."""
+        """Variation of the radial clearance; None where it has none, and of a fit."""
         if self.tolerance == (0.0, 0.0):
             return None
         factor = 1.0 if self.radial is not None else 0.5
@@ -339,6 +434,13 @@ class ReliabilitySection(MotionSection):
         for index, method in enumerate(self.methods):
             if method in self.methods[:index]:
                 checker.report(("reliability", "methods", index), f"{method!r} is given twice")
+            at_walls = [name for name, c in clearances.items() if c.length and c.pin.monte_carlo == "contact"]
+            if at_walls and (METHODS[method].step or METHODS[method].precise):
+                message = (
+                    f"the slider of {at_walls[0]!r} is at one wall or at the other, and {method} needs errors that "
+                    "change gradually; ask for monte_carlo or quasi_monte_carlo, or another pin model"
+                )
+                checker.report(("reliability", "methods", index), message)
         if self.allocate is not None:
             _allocate(checker, self, dimensions, clearances)
         load = _load(checker, self, dimensions)
@@ -418,9 +520,12 @@ def _allocate(
         known = [*dimensions, *clearances]
         checker.known(name, known, "dimension or clearance that varies,", ("reliability", "allocate", "cost", name),
                       at_key=True)  # fmt: skip
+        if name in clearances and clearances[name].fit is not None:
+            message = "a fit is not allocated: its classes come in steps; give 'radial' or 'diametral', or no cost"
+            checker.report(("reliability", "allocate", "cost", name), message, at_key=True)
     if not section.limits:
         checker.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
-    wide = any(d.sigma if d.tolerance is None else d.tolerance[0] < d.tolerance[1]
+    wide = any(d.sigma if d.tolerance is None else d.ends[0] < d.ends[1]
                for name, d in dimensions.items() if name not in LOADS)  # fmt: skip
     if not wide and not section.allocate.cost:
         message = "nothing to allocate: no dimension has a tolerance, and a clearance is held unless 'cost' names it"
@@ -430,8 +535,13 @@ def _allocate(
 def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
     path: KeyPath = ("reliability", "clearances", point)
     mechanism, report = checker.mechanism, checker.report
-    if not checker.known(point, mechanism.owners, "point", path, at_key=True):
+    _radius(checker, clearance, path)
+    if point in mechanism.slides:
+        return _slide_clearance(checker, clearance, path, tilts=mechanism.joints[point].prismatic is not None)
+    if not checker.known(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
         return None
+    if clearance.length is not None:
+        report((*path, "length"), "is that of a slider in its guide; a pin's clearance has none")
     links = mechanism.owners[point]
     held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
     if len(held) < 2:
@@ -445,16 +555,37 @@ def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | 
         if point not in (binary.from_, binary.to) or binary.telescopic:
             message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
             report((*path, "effect"), message)
+    return clearance.model_copy(update={"link": link})
+
+
+def _slide_clearance(checker: Checker, clearance: Clearance, path: KeyPath, *, tilts: bool) -> Clearance:
+    for key in {"link", "effect"} & clearance.model_fields_set:
+        checker.report((*path, key), f"a slide's clearance has no {key!r}: its slider shifts across the line")
+    if tilts and clearance.length is None:
+        message = "the slider tilts in its guide as far as its 'length' along the line lets it; give that too"
+        checker.report(path, message, at_key=True)
+    elif not tilts and clearance.length is not None:
+        checker.report((*path, "length"), "a pin in a slot does not tilt; leave it out")
+    return clearance
+
+
+def _radius(checker: Checker, clearance: Clearance, path: KeyPath) -> None:
+    """Check how the clearance's size varies."""
+    report = checker.report
     checker.kind((*path, "tolerance"), "length")
+    if clearance.fit is not None:
+        if "tolerance" in clearance.model_fields_set:
+            report((*path, "tolerance"), "a fit has the tolerances of its hole and shaft; leave it out")
+        if clearance.distribution not in ("normal", "uniform"):
+            report((*path, "distribution"), "hole and shaft of a fit are normal or uniform within their tolerances")
     spread = clearance.radius_spread
-    if spread is not None and spread.tolerance is not None and clearance.radius + spread.tolerance[0] < -_ROUNDING:
+    if spread is not None and clearance.radius + spread.ends[0] < -_ROUNDING:
         factor = 1.0 if clearance.radial is not None else 2.0
         size, lowest = factor * clearance.radius, clearance.tolerance[0]
         message = f"a clearance of {size:g} that is {-lowest:g} smaller is negative: such a pin does not go in its hole"
         report((*path, "tolerance"), message)
     if spread is not None and spread.distribution == "lognormal" and clearance.radius <= 0:
         report((*path, "distribution"), "what is lognormal is positive, and so is its nominal value")
-    return clearance.model_copy(update={"link": link})
 
 
 def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: ErrorLimit) -> None:
@@ -485,31 +616,64 @@ def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dime
             if not matching:
                 report(path, f"no dimension matches {name!r}", at_key=True)
             for place in matching:
-                _dimension(checker, place, dimension, path)
                 if place not in section.dimensions:
-                    found[place] = dimension
+                    found[place] = _dimension(checker, place, dimension, path)
             continue
         if name in parameters.formulas:
             message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
             report(path, message, at_key=True)
         known = [*parameters.known(), *checker.mechanism.driven_kinds, *LOADS]
         if checker.known(name, known, "parameter, dimension or drive", path, at_key=True):
-            _dimension(checker, name, dimension, path)
-            found[name] = dimension
+            found[name] = _dimension(checker, name, dimension, path)
     return found
 
 
-def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
+def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> Dimension:
+    """Check a dimension and give it the deviations of its class."""
     if dimension.distribution == "lognormal":
         nominal = checker.parameters.nominal.get(name)
         if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
             checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
+    if name not in checker.parameters.nominal:
+        kinds = {**checker.mechanism.driven_kinds, **LOADS}
+        quantity = checker.places[name].quantity if name in checker.places else kinds[name]
+        for key in (dimension.kind, "nominal"):
+            checker.kind((*path, key), quantity)
     if dimension.measured is not None:
         _measured(checker, name, dimension, path)
-    if name in checker.parameters.nominal:
-        return
-    kinds = {**checker.mechanism.driven_kinds, **LOADS}
-    checker.kind(path, checker.places[name].quantity if name in checker.places else kinds[name])
+    if not isinstance(dimension.tolerance, ToleranceClass):
+        if dimension.leg is not None:
+            checker.report((*path, "leg"), "the leg is that of an angle with the tolerance ISO 2768-m (or -f, -c, -v)")
+        return dimension
+    given = dimension.tolerance
+    try:
+        given = replace(given, ends=_of_class(checker, name, given, dimension.leg))
+    except ToleranceClassError as error:
+        alone = "" if name == path[-1] else f"{name} has no such tolerance and needs one of its own: "
+        checker.report(path, f"{alone}{error}", at_key=True)
+    return dimension.model_copy(update={"tolerance": given})
+
+
+def _of_class(checker: Checker, name: str, given: ToleranceClass, leg: float | None) -> tuple[float, float]:
+    """Deviations of a parameter or place by its class."""
+    parameters, places = checker.parameters, checker.places
+    slopes = parameters.derivatives(name) if name in parameters.nominal or name in places else {}
+    # Bounds of the motion and numbers in measures are no dimensions of a part.
+    kinds = {places[place].quantity for place, slope in slopes.items()
+             if slope and not place.startswith(("limits.", MEASURED))}  # fmt: skip
+    if len(kinds) != 1 or "none" in kinds:
+        raise ToleranceClassError(f"{given.text} is of a length or an angle of the drawing; give a number here")
+    if kinds == {"length"}:
+        if leg is not None:
+            raise ToleranceClassError("the leg is that of an angle; a length has its own size")
+        return given.of_length(parameters.nominal[name] if name in parameters.nominal else places[name].nominal)
+    found = given.of_angle(leg or given.millimetre)
+    if leg is None:
+        raise ToleranceClassError(
+            f"{given.text} of an angle goes by the length of its shorter leg; say which: "
+            f"{{tolerance: {given.text}, leg: 50}}"
+        )
+    return found
 
 
 def _measured(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
@@ -534,15 +698,38 @@ def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tup
     """Of each point with a clearance the link that its pin moves in, and those whose point its coordinates are."""
     found: dict[str, tuple[str, list[str]]] = {}
     for point, clearance in (section.clearances if section is not None else {}).items():
+        if point in graph.slides:
+            continue
         links = [body.removesuffix(":rod") for body, name in graph.points if name == point]
         found[point] = clearance.link or "", [link for link in dict.fromkeys(links) if link != clearance.link]
     return found
 
 
 def in_words(section: ReliabilitySection | None, graph: Graph) -> list[str]:
-    """One line for each clearance."""
-    return [
+    """A line for each clearance, and for each fit and tolerance class with its size in the study's units."""
+    if section is None:
+        return []
+    lines = [
         f"clearance: the pin {point} moves in {link}; {point}.x and {point}.y are those of "
         f"{' and '.join(rest) or 'the joint'}"
         for point, (link, rest) in others(section, graph).items()
     ]
+    for name, clearance in section.clearances.items():
+        if name in graph.slides:
+            tilts = ", and tilts as its ends do" if clearance.length is not None else ""
+            lines.append(f"clearance: the slider of {name} shifts across its line{tilts}")
+        if clearance.fit is not None:
+            half = 0.5 * (clearance.fit.hole + clearance.fit.shaft)
+            lines.append(
+                f"fit: {name}, {clearance.fit.text}: radial clearance {clearance.radius - half:.6g} to "
+                f"{clearance.radius + half:.6g}"
+            )
+    classes: dict[tuple[str, tuple[float, float]], list[str]] = {}
+    for name, dimension in section.dimensions.items():
+        if isinstance(given := dimension.tolerance, ToleranceClass):
+            classes.setdefault((given.text, given.ends), []).append(name)
+    lines += [
+        f"tolerance: {text} of {', '.join(names)}: {low:+.6g} to {high:+.6g}"
+        for (text, (low, high)), names in classes.items()
+    ]
+    return lines

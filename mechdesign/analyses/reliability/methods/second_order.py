@@ -12,7 +12,7 @@ from itertools import permutations
 
 import numpy as np
 
-from mechdesign.analyses.reliability.laws import PIN_LAWS, Normal, pair_nodes
+from mechdesign.analyses.reliability.laws import Normal, pair_nodes
 from mechdesign.analyses.reliability.methods import normal
 from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Sources
@@ -112,6 +112,11 @@ def step_sizes(sources: Sources, sigma: Floats) -> Floats:
         reach = [(1.0 if quantity == "angle" else length) / abs(slope)
                  for slope, quantity in scalar.moves.values() if slope]  # fmt: skip
         scale[k] = min(reach, default=1.0)
+    for k, pin in enumerate(sources.pins):
+        first = len(sources.scalars) + 2 * k
+        # A slider's end moves its offset, and its angle (the last of its places) by the inverse of its length.
+        turn = abs([*pin.directions[0].values()][-1]) if len(pin.directions[0]) > 1 else 0.0
+        scale[first : first + 2] = min(length, 1.0 / turn) if turn else length
     steps = np.clip(_PART * sigma, _SHORTEST * scale, _LONGEST * scale)
     # Deflections are linear in the loads, and the longest step leaves the least rounding.
     loads = [k for k, scalar in enumerate(sources.scalars) if scalar.kind == "load"]
@@ -122,8 +127,8 @@ def step_sizes(sources: Sources, sigma: Floats) -> Floats:
 def cumulants(sources: Sources) -> Cumulants:
     """Cumulants with the pins' laws of the analytic method.
 
-    A clearance's radius R multiplies its pin's place of unit clearance (x, y), which is isotropic: E[(R x)^2] =
-    E[R^2] E[x^2], E[(R x)^4] = E[R^4] E[x^4], E[R^4 x^2 y^2] = E[R^4] E[x^4]/3, and all odd moments are zero. Of
+    A clearance's radius R multiplies the place for a unit clearance (x, y) of its pin or slider: E[(R x)^2] =
+    E[R^2] E[x^2], E[(R x)^4] = E[R^4] E[x^4], E[R^4 x^2 y^2] = E[R^4] E[x^2 y^2], and all odd moments are zero. Of
     correlated dimensions that are not normal the cumulants of two are counted, those of three and more together not.
     """
     laws = [scalar.law.moments for scalar in sources.scalars]
@@ -142,13 +147,13 @@ def cumulants(sources: Sources) -> Cumulants:
         for places, value in _of_pairs(sources, covariance):
             (third if len(places) == 3 else fourth)[places] = value
     for k, pin in enumerate(sources.pins):
-        law, (radius, second, skew, flat) = PIN_LAWS[pin.analytic], pin.moments
+        law, (radius, second, skew, flat) = pin.laws[pin.analytic], pin.moments
         squared = law.variance * (radius**2 + second)
-        quartic = law.fourth * (radius**4 + 6.0 * radius**2 * second + 4.0 * radius * skew + flat)
+        power = radius**4 + 6.0 * radius**2 * second + 4.0 * radius * skew + flat
         x, y = count + 2 * k, count + 2 * k + 1
         covariance[x, x] = covariance[y, y] = squared
-        fourth[x, x, x, x] = fourth[y, y, y, y] = quartic - 3.0 * squared**2
-        fourth[x, x, y, y] = quartic / 3.0 - squared**2
+        fourth[x, x, x, x] = fourth[y, y, y, y] = law.fourth * power - 3.0 * squared**2
+        fourth[x, x, y, y] = law.mixed * power - squared**2
     return Cumulants(mean, covariance, _terms(third, 3), _terms(fourth, 4))
 
 
