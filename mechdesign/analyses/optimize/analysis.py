@@ -35,6 +35,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
+from mechdesign.study.schema.workspace import Over
 from mechdesign.study.variants import changed_data, rewritten, variant
 
 # Numbers that a search keeps of the rows behind its goals.
@@ -81,7 +82,7 @@ def optimize(
         raise StudyError((study.problem(message, "optimize", "maximize"),))
     weights = np.array(section.weights or [[1.0] * len(goals)], dtype=float).reshape(-1, len(goals))
     evaluator = Evaluator(study, (*goals, *conditions_of(section)), graded=section.method != "grid")
-    meanings = index_meanings(study, evaluator.question) if evaluator.question is not None else {}
+    meanings = _meanings(study, evaluator)
     budget = section.evaluations or (
         pareto.FRONT_EVALUATIONS * len(goals)
         if section.method == "pareto"
@@ -132,7 +133,7 @@ def _ask(
     dimensions, smallest = len(section.variables), [each.smallest for each in judge.goals]
     judge.progress.start(budget, "designs")
     # Values of a workspace are known to a tolerance only.
-    rough = evaluator.question is not None
+    rough = bool(evaluator.questions)
     explorer = Explorer(judge.known, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
     if section.method == "search":
         use_all = section.evaluations is not None
@@ -184,13 +185,30 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[str]:
         yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {place})"
     if len(reasons) > MAX_REASONS:
         yield f"designs are infeasible for {len(reasons) - MAX_REASONS} more reasons; see designs.csv"
-    if evaluator.question is None or evaluator.question.rule != "gauss":
+    if not evaluator.questions or evaluator.questions[0].rule != "gauss":
         return
     for each, error in designs.errors.items():
-        loose = designs.feasible & (error > 2 * evaluator.question.tolerance * np.abs(designs.found[each]))
+        loose = designs.feasible & (error > 2 * evaluator.questions[0].tolerance * np.abs(designs.found[each]))
         if loose.any():
             told = f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for"
             yield f"{told}; see {each.name}_error"
+
+
+def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each number of the workspace, by its column."""
+    if not evaluator.questions:
+        return {}
+    assert study.workspace is not None
+    found = index_meanings(study, evaluator.questions[0])
+    for each in evaluator.goals:
+        if each.shape is not None:
+            told = f"largest factor by which the {each.shape.name} may be scaled for the workspace to hold it"
+            found[each.column] = "", f"{told}: contained from 1 on, negative where its centre lies outside"
+    if len(evaluator.questions) > 1:
+        held = [f"{name} = {', '.join(f'{v:g}' for v in values)}"
+                for name, values in study.workspace.at.items() if not isinstance(values, Over)]  # fmt: skip
+        return {name: (unit, f"{meaning}; the worst at {'; '.join(held)}") for name, (unit, meaning) in found.items()}
+    return found
 
 
 def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
@@ -239,7 +257,8 @@ def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]
 def best_design(designs: Designs) -> tuple[Study, Result]:
     """The design that is best on the whole as a study, and its workspace where that was judged, or else its motion."""
     best = variant(designs.study, designs.numbers(designs.best))
-    if best.workspace is not None and any(each.command == "workspace" for each in designs.goals):
+    judged = (*designs.goals, *designs.conditions)
+    if best.workspace is not None and any(each.command == "workspace" for each in judged):
         # The region is drawn, not its indices.
         plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)

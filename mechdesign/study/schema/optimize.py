@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, model_validator
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
@@ -13,7 +13,7 @@ from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure
+from mechdesign.study.text.fields import failure, shown
 
 # Results of a workspace that a goal or condition may name without its command.
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
@@ -73,6 +73,49 @@ class Condition(Judged):
         return self
 
 
+_PAIR = fields.pair_of("[width, height]")
+
+
+def _centre(raw: Any) -> Any:
+    if raw != "free" and (not isinstance(raw, list) or len(raw) != 2):
+        raise failure(f"expected [x, y] or free, not {shown(raw)}")
+    return None if raw == "free" else raw
+
+
+class Outline(fields.Model):
+    """A circle, or a rectangle with sides along x and y; its centre is None where it may lie anywhere."""
+
+    one_of = ("a shape is one of rectangle: [width, height], circle: radius", "rectangle", "circle")
+    rectangle: Annotated[tuple[fields.PositiveLengthValue, fields.PositiveLengthValue], _PAIR] | None = None
+    circle: fields.PositiveLengthValue | None = None
+    center: Annotated[
+        tuple[fields.LengthValue, fields.LengthValue] | None,
+        BeforeValidator(_centre),
+        fields.OrShort({"const": "free"}),
+    ] = None
+
+    @property
+    def numbers(self) -> Mapping[str, tuple[fields.StudyNumber, ...]]:
+        """Every number that is given, by its key."""
+        given = {"rectangle": self.rectangle, "circle": self.circle and (self.circle,), "center": self.center}
+        return {key: numbers for key, numbers in given.items() if numbers}
+
+
+class Containment(fields.Model):
+    """A shape that the workspace must hold."""
+
+    contains: Outline
+
+
+def _condition_form(raw: Any) -> str:
+    return "contains" if isinstance(raw, Containment) or (isinstance(raw, dict) and "contains" in raw) else "result"
+
+
+AnyCondition = Annotated[
+    Annotated[Containment, Tag("contains")] | Annotated[Condition, Tag("result")], Discriminator(_condition_form)
+]
+
+
 def _weight_row(raw: Any, info: ValidationInfo) -> Any:
     """Bring ``{GII: 1, SUI: 1}`` to a list in the order maximize then minimize; say what is wrong with a row."""
     if "maximize" not in info.data or "minimize" not in info.data:
@@ -116,7 +159,7 @@ class OptimizeSection(fields.Model):
     maximize: Goals = ()
     minimize: Goals = ()
     weights: tuple[WeightRow, ...] | None = None
-    subject_to: tuple[Condition, ...] = ()
+    subject_to: tuple[AnyCondition, ...] = ()
     evaluations: Annotated[int, fields.whole(10, 10_000_000)] | None = None
 
     @model_validator(mode="after")
@@ -160,8 +203,22 @@ class OptimizeSection(fields.Model):
             for index, goal in enumerate(goals):
                 check_result(checker, goal.result, (*root, key, index))
         for index, condition in enumerate(self.subject_to):
-            check_result(checker, condition.result, (*root, "subject_to", index, "result"))
+            if isinstance(condition, Containment):
+                self._check_fixed(checker, condition.contains, (*root, "subject_to", index, "contains"))
+            else:
+                check_result(checker, condition.result, (*root, "subject_to", index, "result"))
         return self
+
+    def _check_fixed(self, checker: Checker, shape: Outline, path: KeyPath) -> None:
+        """Check that a shape's numbers are the same for all designs, and that there is a workspace."""
+        checker.needs("workspace", "'contains'", path)
+        varied = checker.parameters.moved(self.variables)
+        for key, numbers in shape.numbers.items():
+            names = {name for number in numbers if number.expression for name in number.expression.names}
+            for name in sorted(names & varied):
+                checker.report(
+                    (*path, key), f"{name!r} is varied, but what is to be contained is the same for all designs"
+                )
 
 
 def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:
