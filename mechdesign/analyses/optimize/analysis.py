@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -24,11 +24,13 @@ from mechdesign.analyses.optimize.tables import (
     sensitivity_table,
 )
 from mechdesign.analyses.optimize.variables import grid, in_words
-from mechdesign.analyses.poses import solve_shown
+from mechdesign.analyses.poses import solve_poses, solve_shown, study_poses
+from mechdesign.analyses.region.curves import workspace_nodes
 from mechdesign.analyses.workspace.analysis import index_meanings, workspace
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import one_thread, workers
 from mechdesign.progress import NULL, Progress
@@ -230,19 +232,34 @@ def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> 
         heading = f"{heading}: {in_words(numbers)}"
         data = changed_data(study, numbers)
         try:
-            mechanism = variant(study, numbers).mechanism
-            if not _assembles_alike(study, mechanism, data):
-                # With the sketch as it assembles.
-                sketch = data["mechanism"]["sketch"]
-                places = [np.asarray(mechanism.sketch_configuration.point(point)).item() for point in sketch]
-                sketch |= {point: [z.real, z.imag] for point, z in zip(sketch, places, strict=True)}
-                if not _assembles_alike(study, mechanism, data):
+            best = variant(study, numbers)
+            drawings = _drawings(best, dict.fromkeys(each.command for each in (*designs.goals, *designs.conditions)))
+            while not _assembles_alike(study, best.mechanism, data):
+                pose = next(drawings, None)
+                if pose is None:
                     doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
+                    break
+                sketch = data["mechanism"]["sketch"]
+                places = [np.asarray(pose.point(point)).item() for point in sketch]
+                sketch |= {point: [z.real, z.imag] for point, z in zip(sketch, places, strict=True)}
         except MechdesignError as error:
             doubts.append(f"{name}.yaml: {str(error).splitlines()[0]}")
         text, beside = rewritten(study, data, heading)
         files |= {f"{name}.yaml": text, **beside}
     return files, doubts
+
+
+def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:
+    """Poses that a design may be drawn in: its sketch as it assembles, or else one that a command asks for."""
+    yield study.mechanism.sketch_configuration
+    for command in commands:
+        poses = workspace_nodes(study) if command == "workspace" else study_poses(study, command)
+        for solved in solve_poses(study, poses):
+            valid = np.flatnonzero(solved.configuration.valid)
+            if valid.size:
+                # Not the first: a workspace begins at its boundary, where legs are stretched.
+                yield solved.configuration.take(int(valid[valid.size // 2]))
+                break
 
 
 def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]) -> bool:
