@@ -26,7 +26,10 @@ from mechdesign.analyses.optimize.tables import (
 from mechdesign.analyses.optimize.variables import grid, in_words
 from mechdesign.analyses.poses import solve_poses, solve_shown, study_poses
 from mechdesign.analyses.region.curves import workspace_nodes
+from mechdesign.analyses.region.rays import SINGLE
 from mechdesign.analyses.workspace.analysis import index_meanings, workspace
+from mechdesign.analyses.workspace.contained import fitting_scale
+from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
 from mechdesign.mechanism import Mechanism
@@ -280,7 +283,10 @@ def best_design(designs: Designs) -> tuple[Study, Result]:
         plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:
-            return plain, result
+            shapes = [each.shape for each in designs.conditions if each.shape is not None]
+            panels = answer(questions(plain, wanted=("area",))[0], {}, 1, SINGLE).panels
+            contained = [(shape, complex(fitting_scale(shape, panels)[1][0])) for shape in shapes]
+            return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
     drawn = {}
     with suppress(MechdesignError):
         drawn["motion"] = solve_shown(best)

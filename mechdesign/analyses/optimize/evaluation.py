@@ -216,7 +216,7 @@ class Evaluator:
         for goal in self._regional:
             column, shape = self.layout.column[goal], goal.shape
             values = np.stack([
-                each.values[goal.column] if shape is None else fitting_scale(shape, each.panels) for each in given
+                each.values[goal.column] if shape is None else fitting_scale(shape, each.panels)[0] for each in given
             ])  # fmt: skip
             # Where one has no value none is worse.
             worst = np.where(np.isnan(values), np.inf, values if goal.smallest else -values).argmax(axis=0)

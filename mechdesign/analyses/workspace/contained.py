@@ -21,9 +21,11 @@ from mechdesign.numerics.roots import dips
 
 # Rays from a shape's centre, besides those to its corners.
 RAYS = 120
-# Contacts: the lowest local minima of the scales that rays allow, so many at most; and steps to the place of each.
+# Contacts: the lowest local minima of the scales that rays allow, so many at most; and steps to the place of those that
+# are no more than so many times the lowest.
 CONTACTS = 6
-STEPS = 12
+STEPS = 8
+LOW = 1.3
 # Directions and parts of the outline's distance at which margins are looked at for holes that no ray meets. Parabolas
 # through places around the lowest, in parts of the shape's smaller side, lead to a hole; at most so many of these far.
 SPOKES = 2 * np.pi * np.arange(24) / 24
@@ -97,24 +99,29 @@ class Shape:
         return normal / extent
 
 
-def fitting_scale(shape: Shape, panels: Panels) -> Floats:
-    """The largest factor by which a shape may be scaled and still lie in the region, shape (designs,).
+def fitting_scale(shape: Shape, panels: Panels) -> tuple[Floats, Complexes]:
+    """The largest factor by which a shape may be scaled and still lie in the region, and its centre then.
 
-    It is 1 or more where the region holds the shape. Negative values say how far the centre lies outside: the shape,
-    scaled so, would just touch the region. nan where the region is empty. It is judged on rays from the centre, 3
-    degrees apart and through the corners, and at the lowest place of every margin: a notch, or one of several holes,
-    that lies between two rays may be overlooked.
+    Both are of shape (designs,). The factor is 1 or more where the region holds the shape. Negative values say how far
+    the centre lies outside: the shape, scaled so, would just touch the region. It is nan where the region is empty.
+
+    It is judged on rays from the centre, 3 degrees apart and through the corners, and at the lowest place of every
+    margin: a notch, or one of several holes, that lies between two rays may be overlooked.
     """
-    found = np.full(len(panels.closes), np.nan)
-    some = np.flatnonzero(panels.closes)
+    some, count = np.flatnonzero(panels.closes), len(panels.closes)
+    found = np.full(count, np.nan)
+    centres = np.full(count, complex(np.nan, np.nan) if shape.centre is None else shape.centre)
     if not some.size:
-        return found
+        return found, centres
     if shape.centre is not None:
-        found[some] = _View(shape, panels, some, np.full(len(some), shape.centre)).scale
-        return found
+        found[some] = _View(shape, panels, some, centres[some]).scale
+        return found, centres
     lane, centre = _beginnings(shape, panels, some)
-    np.fmax.at(found, lane, _largest(shape, panels, lane, centre)[1])
-    return found
+    centre, scale = _largest(shape, panels, lane, centre)
+    # Of several values of one design the last assigned is the largest.
+    order = np.argsort(scale, kind="stable")
+    found[lane[order]], centres[lane[order]] = scale[order], centre[order]
+    return found, centres
 
 
 class _View:
@@ -142,7 +149,7 @@ class _View:
         beside = scales[(row + np.array([[[-1]], [[0]], [[1]]])) % n, lanes]
         missing = ~np.take_along_axis(low, row, axis=0)
         around, beside = self._with_overlooked(around, np.where(missing, np.inf, beside))
-        contact, lane = np.nonzero(np.isfinite(beside[1]))
+        contact, lane = np.nonzero(np.isfinite(beside[1]) & (beside[1] <= LOW * beside[1].min(axis=0)))
         self.theta, self.scales = around[1], beside[1]
         place, value = dips(
             lambda which, x: self.at(lane[which], x), around[:, contact, lane], beside[:, contact, lane],
