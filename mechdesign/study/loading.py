@@ -135,8 +135,9 @@ def load(
     StudyError
         With every mistake found, each as ``file:line:column: key path: what, and what would mend it``.
     """
-    if (source is None) == (text is None):
-        raise StudyError("give a study as a file, a mapping or text=..., one of them")
+    named = isinstance(source, str) and "\n" not in source
+    if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):
+        raise StudyError("give a study as one of a file's name, a mapping, or text=... in YAML")
     if text is not None:
         return load_bytes(text.encode() if isinstance(text, str) else text, None, overrides, seed)
     if isinstance(source, Mapping):
@@ -187,7 +188,7 @@ def _plain_data(value: Any, what: str) -> Any:
             return each.tolist()
         if isinstance(each, os.PathLike):
             return os.fspath(each)
-        raise TypeError(f"it holds {shown(each)}")
+        raise TypeError(f"it holds {type(each).__name__!r}")
 
     try:
         return json.loads(json.dumps(value, default=plainly))
