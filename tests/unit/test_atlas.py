@@ -121,7 +121,7 @@ def test_a_region_between_folds_has_its_area() -> None:
 
 
 def test_region_of_a_design_that_does_not_close_where_the_sketch_is_drawn() -> None:
-    """With cranks so short the point cannot be where it is drawn; by the platform's angle the same has a closed form."""
+    """With so short cranks the point cannot be where it is drawn; by the platform's angle there is a closed form."""
     far = (
         "mechanism.sketch={P: [0.8, 0.16], B1: [0.69338, 0.01463], B2: [0.9752, 0.1175], B3: [0.73142, 0.34787], "
         "D1: [0.39814, -0.03856], D2: [1.1142, 0.38335], D3: [0.47338, 0.50089]}"

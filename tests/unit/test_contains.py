@@ -174,6 +174,9 @@ def test_search_ends_where_the_shape_just_fits() -> None:
         ("{contains: {circle: 5, center: middle}}", "expected [x, y] or free, not 'middle'"),
         ("{contains: {rectangle: 5}}", "expected [width, height], not the number 5"),
         ("{contains: {rectangle: [5, 0]}}", "must be positive, not 0"),
+        ("{contains: {circle: 5, centre: free}}", "subject_to.0.contains.centre: unknown key; did you mean 'center'?"),
+        ("{result: area}", "subject_to.0: a condition needs 'at_least', 'at_most' or both"),
+        ("{result: area, at_lest: 5}", "did you mean 'at_least'?"),
         ("{contains: {circle: 2*l1}}", "subject_to.0.contains.circle: 'l1' is varied"),
     ],
 )

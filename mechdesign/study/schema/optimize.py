@@ -108,11 +108,11 @@ class Containment(fields.Model):
 
 
 def _condition_form(raw: Any) -> str:
-    return "contains" if isinstance(raw, Containment) or (isinstance(raw, dict) and "contains" in raw) else "result"
+    return "shape" if isinstance(raw, Containment) or (isinstance(raw, dict) and "contains" in raw) else "bounds"
 
 
 AnyCondition = Annotated[
-    Annotated[Containment, Tag("contains")] | Annotated[Condition, Tag("result")], Discriminator(_condition_form)
+    Annotated[Containment, Tag("shape")] | Annotated[Condition, Tag("bounds")], Discriminator(_condition_form)
 ]
 
 
