@@ -31,7 +31,7 @@ from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
+from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -69,7 +69,7 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Condition, ...]
+    requirements: tuple[Requirement, ...]
     targets: Mapping[str, Target]  # by the coordinate or point
     warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
 
@@ -226,7 +226,7 @@ def load_document(
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
-    parameters = builder.parameters(context.parameters, formulas)
+    parameters = builder.parameters(formulas)
     parts = _checked(Checker(builder, parameters, parts), folder)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
@@ -364,7 +364,11 @@ def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Contex
         # What was wrong may have been what uses them.
         return
     optimize, reliability = parts.get("optimize"), parts.get("reliability")
-    used = context.used.union(optimize.variables if optimize else (), reliability.dimensions if reliability else ())
+    used = context.used.union(
+        *(formula.names for formula in parameters.dependent.values()),
+        optimize.variables if optimize else (),
+        reliability.dimensions if reliability else (),
+    )
     for name, formula in reversed([*parameters.formulas.items()]):
         # A parameter may use those above it.
         if name in used:

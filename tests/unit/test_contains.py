@@ -177,7 +177,7 @@ def test_search_ends_where_the_shape_just_fits() -> None:
         ("{contains: {circle: 5, centre: free}}", "subject_to.0.contains.centre: unknown key; did you mean 'center'?"),
         ("{result: area}", "subject_to.0: a condition needs 'at_least', 'at_most' or both"),
         ("{result: area, at_lest: 5}", "did you mean 'at_least'?"),
-        ("{contains: {circle: 2*l1}}", "subject_to.0.contains.circle: 'l1' is varied"),
+        ("{contains: {circle: 2*l1}}", "subject_to.0.contains.circle: 'l1' changes with the variables"),
     ],
 )
 def test_wrong_shapes_are_reported(condition: str, message: str) -> None:

@@ -14,7 +14,7 @@ from mechdesign.analyses.optimize import pareto
 from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer
-from mechdesign.analyses.optimize.goals import conditions_of, goals_of
+from mechdesign.analyses.optimize.goals import goals_of
 from mechdesign.analyses.optimize.judge import Designs, Judge
 from mechdesign.analyses.optimize.tables import (
     best_table,
@@ -86,7 +86,7 @@ def optimize(
         message = "what is to be best? e.g. maximize: [GII, GRI, SUI], or minimize"
         raise StudyError((study.problem(message, "optimize", "maximize"),))
     weights = np.array(section.weights or [[1.0] * len(goals)], dtype=float).reshape(-1, len(goals))
-    evaluator = Evaluator(study, (*goals, *conditions_of(section)), graded=section.method != "grid")
+    evaluator = Evaluator(study, graded=section.method != "grid")
     meanings = _meanings(study, evaluator)
     budget = section.evaluations or (
         pareto.FRONT_EVALUATIONS * len(goals)
@@ -236,7 +236,8 @@ def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> 
         data = changed_data(study, numbers)
         try:
             best = variant(study, numbers)
-            drawings = _drawings(best, dict.fromkeys(each.command for each in (*designs.goals, *designs.conditions)))
+            judged = [each for each in (*designs.goals, *designs.conditions) if not each.expression]
+            drawings = _drawings(best, dict.fromkeys(each.command for each in judged))
             while not _assembles_alike(study, best.mechanism, data):
                 pose = next(drawings, None)
                 if pose is None:
