@@ -83,6 +83,7 @@ def test_largest_scale_of_a_free_circle_and_rectangle_in_a_ring() -> None:
         (Shape(60, 60, True, 100j), 2.0),
         (Shape(60, 60, True, 200j), -40 / 30),  # beyond the ring
         (Shape(60, 60, True, 10j), -1.0),  # in its hole
+        (Shape(300, 1, False, 50j), brentq(lambda s: np.hypot(150 * s, 50 + 0.5 * s) - 160, 0, 9)),  # long and thin
         (Shape(40, 20, False, 100j), brentq(lambda s: np.hypot(20 * s, 100 + 10 * s) - 160, 0, 9)),
         (Shape(20, 40, False, 100 + 0j), brentq(lambda s: np.hypot(20 * s, 100 + 10 * s) - 160, 0, 9)),
     ],

@@ -19,18 +19,18 @@ from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.numerics.roots import dips
 
-# Rays from a shape's centre, besides those to its corners.
+# Rays from a shape's centre to places spread along its outline, and the fewest to a side of a rectangle.
 RAYS = 120
+SIDE_RAYS = 6
 # Contacts: the lowest local minima of the scales that rays allow, so many at most; and steps to the place of those that
 # are no more than so many times the lowest.
 CONTACTS = 6
 STEPS = 8
 LOW = 1.3
-# Directions and parts of the outline's distance at which margins are looked at for holes that no ray meets. Parabolas
-# through places around the lowest, in parts of the shape's smaller side, lead to a hole; at most so many of these far.
-SPOKES = 2 * np.pi * np.arange(24) / 24
-SHARES = np.array([0.25, 0.5, 0.75, 1.0, 1.2])
-PARABOLAS = (0.06, 0.003)
+# Places, from the centre in half widths and heights, where margins are looked at for holes that no ray meets. Parabolas
+# through places so far beside the lowest lead to a hole; at most so many of these steps away.
+LATTICE = (np.linspace(-1.2, 1.2, 11) + 1j * np.linspace(-1.2, 1.2, 11)[:, None]).ravel()
+PARABOLAS = (0.12, 0.006)
 AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 FARTHEST = 5.0
 # Margins below this part of the largest beside them are rounding's.
@@ -70,6 +70,21 @@ class Shape:
         return size if self.centre is None else f"{size} at ({self.centre.real:g}, {self.centre.imag:g})"
 
     @property
+    def directions(self) -> Floats:
+        """Directions from the centre to places spread along the outline (radians in [0, 2 pi), ascending)."""
+        if self.round:
+            return 2 * np.pi * np.arange(RAYS) / RAYS
+        sides = [
+            max(SIDE_RAYS, round(RAYS * size / (2 * (self.width + self.height)))) for size in (self.width, self.height)
+        ]
+        x, y = (
+            0.5 * size * np.linspace(-1, 1, count + 1)
+            for size, count in zip((self.width, self.height), sides, strict=True)
+        )
+        around = np.concatenate([x - 0.5j * self.height, x + 0.5j * self.height, 1j * y - x[-1], 1j * y + x[-1]])
+        return np.unique(np.angle(around) % (2 * np.pi))
+
+    @property
     def corners(self) -> Floats:
         """Directions of the corners from the centre (radians, in [0, 2 pi))."""
         corner = np.arctan2(self.height, self.width)
@@ -105,8 +120,8 @@ def fitting_scale(shape: Shape, panels: Panels) -> tuple[Floats, Complexes]:
     Both are of shape (designs,). The factor is 1 or more where the region holds the shape. Negative values say how far
     the centre lies outside: the shape, scaled so, would just touch the region. It is nan where the region is empty.
 
-    It is judged on rays from the centre, 3 degrees apart and through the corners, and at the lowest place of every
-    margin: a notch, or one of several holes, that lies between two rays may be overlooked.
+    It is judged on rays from the centre through 120 places of the outline, the corners among them, and at the lowest
+    place of every margin: a notch, or one of several holes, that lies between two rays may be overlooked.
     """
     some, count = np.flatnonzero(panels.closes), len(panels.closes)
     found = np.full(count, np.nan)
@@ -138,8 +153,7 @@ class _View:
         self._reach = np.abs(centre - every.about) + panels.reach[design]
         _, found, inside = panels.through(design, centre)
         self._inside = np.bincount(found.ray[inside], minlength=len(design)) > 0
-        uniform = 2 * np.pi * np.arange(RAYS) / RAYS
-        theta = np.unique(np.concatenate([uniform, shape.corners]))
+        theta = shape.directions
         lanes, n = np.arange(len(design)), len(theta)
         scales = self.at(np.tile(lanes, n), np.repeat(theta, len(lanes))).reshape(n, -1)
         low = (scales <= np.roll(scales, 1, axis=0)) & (scales <= np.roll(scales, -1, axis=0)) & np.isfinite(scales)
@@ -163,45 +177,38 @@ class _View:
 
     def _with_overlooked(self, theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
         """Contacts with one more where the lowest place of a margin is a hole between the rays."""
-        lanes = np.arange(len(self._centre))
-        scale = np.where(self._inside, scales[1].min(axis=0), 0.0)
-        apart = PARABOLAS[0] * scale * min(self._shape.width, self._shape.height)
-        sizes = self._designs.of(lanes)
+        shape, lanes = self._shape, np.arange(len(self._centre))
+        scale, sizes = np.where(self._inside, scales[1].min(axis=0), 0.0), self._designs.of(lanes)
 
-        def margins(z: Complexes) -> Floats:
+        def margins(part: Complexes) -> Floats:
+            z = self._centre + 0.5 * scale * (shape.width * part.real + 1j * shape.height * part.imag)
             return np.nan_to_num(self._designs.field.margins(z, sizes), nan=np.inf)
 
-        radii = SHARES[:, None] * self._shape.radius(SPOKES)
-        z = self._centre + scale * np.append(0.0, radii * np.exp(1j * SPOKES))[:, None]
-        values = margins(z)
+        values = margins(np.broadcast_to(LATTICE[:, None], (len(LATTICE), len(lanes))))
         rounding = ROUNDING * np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=1)
-        place = z[values.argmin(axis=1), lanes]
-        margin = np.arange(len(place))[:, None]
-        for part in PARABOLAS:
+        part = LATTICE[values.argmin(axis=1)]
+        margin = np.arange(len(part))[:, None]
+        for step in PARABOLAS:
             # A parabola through the places around leads to the lowest: for squares of distances it is exact.
-            step = apart * part / PARABOLAS[0]
-            around = place + step * AROUND[:, None, None]
-            here, right, left, up, down, across = (
-                margins(around.reshape(-1, len(lanes)))
-                .reshape(len(values), *around.shape)[margin, :, margin, lanes]
-                .transpose(2, 0, 1)
-            )
+            around = part + step * AROUND[:, None, None]
+            found = margins(around.reshape(-1, len(lanes))).reshape(len(values), *around.shape)
+            here, right, left, up, down, across = found[margin, :, margin, lanes].transpose(2, 0, 1)
             with np.errstate(invalid="ignore", divide="ignore"):
                 gx, gy = 0.5 * (right - left), 0.5 * (up - down)
                 xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
                 det = xx * yy - xy * xy
                 way = (gy * xy - gx * yy) / det + 1j * (gx * xy - gy * xx) / det
                 good = (xx > 0) & (det > 0) & (np.abs(way) < FARTHEST)
-            place = place + np.where(good, step * way, 0.0)
-        way = place - self._centre
-        there = margins(place)[margin, margin, lanes] < -rounding
-        nearest = np.where(there, self._shape.scale_at(way), np.inf)
+            part = part + np.where(good, step * way, 0.0)
+        way = shape.width * part.real + 1j * shape.height * part.imag
+        there = margins(part)[margin, margin, lanes] < -rounding
+        nearest = np.where(there, shape.scale_at(way), np.inf)
         row = nearest.argmin(axis=0)
         lane = np.flatnonzero(np.isfinite(nearest[row, lanes]))
         more = np.zeros((3, 1, len(lanes))), np.full((3, 1, len(lanes)), np.inf)
-        found = np.angle(way[row, lanes])[lane] + ABOUT_HOLE * np.array([[-1], [0], [1]])
-        more[0][:, 0, lane] = found
-        more[1][:, 0, lane] = self.at(np.tile(lane, 3), found.ravel()).reshape(3, -1)
+        angles = np.angle(way[row, lanes])[lane] + ABOUT_HOLE * np.array([[-1], [0], [1]])
+        more[0][:, 0, lane] = angles
+        more[1][:, 0, lane] = self.at(np.tile(lane, 3), angles.ravel()).reshape(3, -1)
         return np.concatenate([theta, more[0]], axis=1), np.concatenate([scales, more[1]], axis=1)
 
     def at(self, lane: Ints, theta: Floats) -> Floats:
@@ -209,6 +216,8 @@ class _View:
         return self._radii(lane, theta) / self._shape.radius(theta)
 
     def _radii(self, lane: Ints, theta: Floats) -> Floats:
+        if not lane.size:
+            return np.zeros(0)
         reach = self._reach[lane]
         traced = trace(self._designs, lane, theta, reach)
         ray, inner, outer, _, _ = whole(traced, SAME_ROOT * reach[traced.ray[1:]])
@@ -275,7 +284,8 @@ def _beginnings(shape: Shape, panels: Panels, some: Ints) -> tuple[Ints, Complex
         z = within[:, mine].ravel()
         room = shape.scale_at(ends[:, mine].ravel() - z[:, None]).min(axis=1, initial=np.inf)
         if not is_turn(designs.scan):
-            room = np.minimum(room, (_within_scan(designs, z[:, None], SPOKES)[1] / shape.radius(SPOKES)).min(axis=1))
+            _, end = _within_scan(designs, z[:, None], shape.directions)
+            room = np.minimum(room, (end / shape.radius(shape.directions)).min(axis=1))
         for _ in range(TRIALS if room.size else 0):
             best = int(room.argmax())
             lanes.append(k)
