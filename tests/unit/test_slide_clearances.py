@@ -139,5 +139,7 @@ def test_a_slot_and_a_pin_have_no_length_and_form_no_walls():
         mechdesign.load(text=QUICK_RETURN.replace("H8/f7", "H8/f7, length: 9"))
     with pytest.raises(StudyError, match="a pin's clearance has none"):
         mechdesign.load(text=QUICK_RETURN.replace("slot: {fit", "P: {length: 9, fit"))
-    with pytest.raises(StudyError, match="ask for monte_carlo or quasi_monte_carlo"):
-        mechdesign.load(text=GUIDED.replace("PIN", "contact").replace("second_order", "form"))
+    slot = QUICK_RETURN.replace("H8/f7", "H8/f7, pin: contact")
+    for text in (GUIDED.replace("PIN", "contact"), slot):
+        with pytest.raises(StudyError, match="ask for monte_carlo or quasi_monte_carlo"):
+            mechdesign.load(text=text.replace("second_order", "form"))

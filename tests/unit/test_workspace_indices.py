@@ -333,10 +333,3 @@ def test_totals_over_all_held_values_and_empty_regions_among_them() -> None:
     assert chosen.values[chosen.counts].tolist() == [0.0]
     # The assembly that is not the sketch's has all of it.
     assert any("at plate.angle = 20" in warning and "and 0 mm^2 here" in warning for warning in result.warnings)
-
-
-def test_totals_over_a_range_are_of_the_other_held_values() -> None:
-    study = study_of(PLATFORM, "workspace.at={plate.angle: -20}")
-    assert len(mechdesign.workspace(study).tables["totals"]) > 5
-    over = study_of(PLATFORM, "workspace.at={plate.angle: {from: -20, to: -15}}")
-    assert "totals" not in mechdesign.workspace(over).tables

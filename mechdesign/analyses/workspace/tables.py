@@ -188,7 +188,7 @@ def totals(indices: Table, held: Sequence[str]) -> Table:
     told = [column for column in indices.columns
             if column.name not in held and not column.name.endswith(("_error", "_x", "_y"))]  # fmt: skip
     values = np.array([column.values for column in told], dtype=float)
-    known = np.isfinite(values) | np.isinf(values)
+    known = ~np.isnan(values)
     least = np.argmin(np.where(known, values, np.inf), axis=1)
     most = np.argmax(np.where(known, values, -np.inf), axis=1)
     row, some = np.arange(len(told)), known.any(axis=1)

@@ -434,10 +434,11 @@ class ReliabilitySection(MotionSection):
         for index, method in enumerate(self.methods):
             if method in self.methods[:index]:
                 checker.report(("reliability", "methods", index), f"{method!r} is given twice")
-            at_walls = [name for name, c in clearances.items() if c.length and c.pin.monte_carlo == "contact"]
+            slides = set(clearances).intersection(checker.mechanism.slides)
+            at_walls = sorted(name for name in slides if clearances[name].pin.monte_carlo == "contact")
             if at_walls and (METHODS[method].step or METHODS[method].precise):
                 message = (
-                    f"the slider of {at_walls[0]!r} is at one wall or at the other, and {method} needs errors that "
+                    f"what slides in {at_walls[0]!r} is at one wall or at the other, and {method} needs errors that "
                     "change gradually; ask for monte_carlo or quasi_monte_carlo, or another pin model"
                 )
                 checker.report(("reliability", "methods", index), message)
