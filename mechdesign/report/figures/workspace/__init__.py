@@ -22,7 +22,7 @@ from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.panels import coordinate_label
+from mechdesign.report.figures.panels import coordinate_label, node_areas
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace.regions import (
     MAX_REGIONS,
@@ -396,7 +396,7 @@ def _norm(found: Sequence[Region], column: str) -> BoundaryNorm:
     """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
     patches = [patch for region in found for patch in grids(region.local, column)]
     values = np.concatenate([z.ravel() for _, _, z in patches])
-    areas = np.concatenate([_node_areas(x, y).ravel() for x, y, _ in patches])
+    areas = np.concatenate([node_areas(x, y).ravel() for x, y, _ in patches])
     finite = np.isfinite(values)
     values, areas = values[finite], areas[finite]
     order = np.argsort(values)
@@ -408,10 +408,3 @@ def _norm(found: Sequence[Region], column: str) -> BoundaryNorm:
     else:
         high = top
     return style.steps(style.levels(0.0 if 0 <= low < 0.5 * high else low, high, 11), low, top)
-
-
-def _node_areas(x: Floats, y: Floats) -> Floats:
-    """Area about each node of a grid."""
-    z = x + 1j * y
-    along, across = np.gradient(z, axis=0), np.gradient(z, axis=1)
-    return np.asarray(np.abs(np.imag(np.conj(along) * across)))
