@@ -29,6 +29,7 @@ PIN = 3.6  # radius of a joint
 GROUND_HEIGHT = 13.0  # height of the ground symbol
 SLIDER_SIZE = (22.0, 13.0)  # points, along its guide and across
 ARC = 25.0  # radius of an angle drive's arrow
+FORCE = 34.0  # length of a force's arrow
 _STEEL = "#777777"
 Color = str | tuple[float, float, float]
 DRIVE_COLOR = style.VERMILION
@@ -164,6 +165,15 @@ class Pen:
 
     def turn(self, place: complex, start: float, sweep: float, radius: float, color: str) -> None:
         """An angle drive: a curved arrow from the angle `start` (radians), with the line it is measured from."""
+        self.arc(place, start, sweep, radius, color)
+        base = (radius + 9) * np.exp(1j * start)
+        self._symbol(
+            Path([(0, 0), (base.real, base.imag)]), self._at(place), 0.3, facecolor="none", edgecolor=color, lw=0.9,
+            linestyle=(0, (3, 2)),
+        )  # fmt: skip
+
+    def arc(self, place: complex, start: float, sweep: float, radius: float, color: str) -> None:
+        """A curved arrow about a place, from the angle `start` over `sweep` (radians); the radius in points."""
         angles = start + np.linspace(0.0, sweep, 48)
         # The head is as long on the arc as it looks; a small angle has a small head.
         head = min(7.0, 0.7 * abs(sweep) * radius)
@@ -172,17 +182,17 @@ class Pen:
         tip = radius * np.exp(1j * angles[-1])
         tangent = 1j * sign * np.exp(1j * (angles[-1] - sign * head / (2 * radius)))
         self._arrow(stem, complex(tip), complex(tangent), head, self._at(place), color)
-        base = (radius + 9) * np.exp(1j * start)
-        self._symbol(
-            Path([(0, 0), (base.real, base.imag)]), self._at(place), 0.3, facecolor="none", edgecolor=color, lw=0.9,
-            linestyle=(0, (3, 2)),
-        )  # fmt: skip
 
     def push(self, place: complex, direction: complex, length: float, away: float, color: str) -> None:
         """A length or slide drive: a straight arrow (points) beside a line through the place."""
         where = self._at(place, math.atan2(direction.imag, direction.real))
         stem = np.array([-length / 2, length / 2 - 4]) + 1j * away
         self._arrow(stem, complex(length / 2, away), 1.0, 7.0, where, color)
+
+    def force(self, place: complex, direction: complex, color: str) -> None:
+        """A force: an arrow that ends at the place where it acts."""
+        where = self._at(place, math.atan2(direction.imag, direction.real))
+        self._arrow(np.array([-FORCE - PIN, -PIN - 6], dtype=complex), complex(-PIN), 1.0, 9.0, where, color)
 
     def _arrow(self, stem: np.ndarray, tip: complex, along: complex, head: float, where: Transform, color: str) -> None:
         if len(stem) > 1:
@@ -303,7 +313,7 @@ def draw_mechanism(
     if scene is None:
         return
     colors = link_colors(mechanism)
-    pen = Pen(axes, alpha=0.22, order=2.0) if faint else Pen(axes, size=size)
+    pen = Pen(axes, alpha=0.22, order=2.0, size=size) if faint else Pen(axes, size=size)
     for point in scene.pivots():
         pen.pivot(scene.points[point])
     _draw_guides(pen, scene, colors, travel or {})
