@@ -76,6 +76,22 @@ def test_the_coupler_point_tells_most():
     np.testing.assert_array_equal(bold.get_xdata(), path.real)
 
 
+@pytest.mark.parametrize(
+    "poses",
+    ["sweep: {theta: {from: 0, to: 360, step: 45}}", "path: {A: {circle: {center: [0, 0], radius: 30}, points: 8}}"],
+)
+def test_traces_of_few_poses_are_curves(poses):
+    """A crank's pin stays on its circle between the poses of a sweep, and of a path given by few points."""
+    text = FOUR_BAR.replace("sweep: {theta: {from: 0, to: 360, step: 5}}", poses)
+    if "path" in poses:
+        text = text.replace("crank: [O, A, 30]", "crank: {from: O, to: A, telescopic: true}")
+        text = text.replace("drives: {theta: {angle: crank}}", "drives: {theta: {angle: crank}, l: {length: crank}}")
+    trace = sweep_of(study_of(text)).traces["A"]
+    assert len(trace) > 200
+    np.testing.assert_allclose(np.abs(trace), 30, rtol=3e-3)
+    assert abs(trace[-1] - trace[0]) < 1e-9
+
+
 def test_curves_of_what_moves_only():
     study = study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 10}\n  sweep:"))
     figure = drawn(study)["motion"]

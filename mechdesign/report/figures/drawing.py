@@ -30,6 +30,7 @@ GROUND_HEIGHT = 13.0  # height of the ground symbol
 SLIDER_SIZE = (22.0, 13.0)  # points, along its guide and across
 ARC = 25.0  # radius of an angle drive's arrow
 FORCE = 34.0  # length of a force's arrow
+_GHOST = "#C8C8C8"
 _STEEL = "#777777"
 Color = str | tuple[float, float, float]
 DRIVE_COLOR = style.VERMILION
@@ -84,7 +85,7 @@ class Pen:
 
     def line(self, ends: Sequence[complex], color: str) -> None:
         """A link as a thin line along its points: for ghosts."""
-        self._line(ends, 0.1, 1.9, color, solid_capstyle="round", solid_joinstyle="round")
+        self._line(ends, 0.1, 1.3, color, solid_capstyle="round", solid_joinstyle="round")
 
     def bar(self, ends: Sequence[complex], color: str, width: float = BAR) -> None:
         """A link as a bar with round ends along a line of points."""
@@ -342,22 +343,21 @@ def draw_mechanism(
         place_labels(axes, named, covered(axes), order=pen.order + 2)
 
 
-def draw_ghost(axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int, *, share: float) -> None:
-    """Draw a further pose as pale lines, which many of can lie over one another; `share` of it is colour."""
+def draw_ghost(axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int) -> None:
+    """Draw a further pose as thin grey lines, which lie below the paths and do not look like them."""
     scene = pose(mechanism, configuration, index)
     if scene is None:
         return
-    colors = link_colors(mechanism)
-    pen = Pen(axes, alpha=share, order=2.0)
-    for name, body in _bodies(scene):
+    pen = Pen(axes, order=2.0)
+    for _, body in _bodies(scene):
         if len(body) > 1:
-            pen.line([*body, *(body[:1] if len(body) > 2 else [])], colors[name])
-    for name, link in scene.description.links.items():
+            pen.line([*body, *(body[:1] if len(body) > 2 else [])], _GHOST)
+    for link in scene.description.links.values():
         if link.telescopic and link.ends:
-            pen.line([scene.points[end] for end in link.ends], colors[name])
+            pen.line([scene.points[end] for end in link.ends], _GHOST)
     for guide in scene.guides:
         if guide.owner != GROUND:
-            pen.line(_reach(scene, guide, (guide.pin,)), colors[guide.owner])
+            pen.line(_reach(scene, guide, (guide.pin,)), _GHOST)
 
 
 def _bodies(scene: Scene) -> list[tuple[str, list[complex]]]:

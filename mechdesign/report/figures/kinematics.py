@@ -39,8 +39,8 @@ _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
-# Largest number of moving links, and for it the number of ghosts and their share of colour.
-_GHOSTS = ((3, 7, 0.42), (5, 6, 0.38), (8, 4, 0.32), (10**6, 2, 0.3))
+# Largest number of moving links, and for it the number of ghosts.
+_GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
 _PATH_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
@@ -255,11 +255,11 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
             zorder=3.7,
         )  # fmt: skip
     count = len(sweep.mechanism.description.links) - 1
-    _, ghosts, share = next(entry for entry in _GHOSTS if count <= entry[0])
+    _, ghosts = next(entry for entry in _GHOSTS if count <= entry[0])
     # A closed motion ends where it begins: its last ghost would hide the first.
     some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
     for index in np.unique(some[1 : -1 if sweep.closed else None]):
-        draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index), share=share)
+        draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index))
     draw_paths(axes, sweep)
     first = int(sweep.valid[0])
     draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
@@ -277,10 +277,7 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
         if name != GROUND:
             for point in link_points(link):
                 owners.setdefault(point, name)
-    for point, path in sweep.places.items():
-        if sweep.closed and sweep.poses.closed:
-            # A closed path is listed without its begin at its end.
-            path = np.append(path, path[0])
+    for point, path in sweep.traces.items():
         line, share = _PATH_LOOKS[min(ranked[point] + lift, 2)]
         axes.plot(
             path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,
