@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from matplotlib.text import Text
 
 import mechdesign
 from mechdesign.report.figures import style
@@ -62,6 +63,25 @@ def test_paths_and_their_mechanism_lie_within_the_picture_and_names_apart():
     assert len(names) >= 8
     for k, box in enumerate(names):
         assert not any(box.overlaps(other) for other in names[:k])
+
+
+def test_names_are_nearest_to_their_own_pins_or_have_a_line():
+    study = study_of(FOUR_BAR.replace("points: {C: [45, 40]}", "points: {C: [45, 6], E: [45, -6], F: [51, 0]}"))
+    (axes,) = drawn(study)["paths"].axes
+    names = [text for text in axes.texts if text.get_text() in "ODABCEF"]
+    assert len(names) == 7
+    pins = {text.get_text(): axes.transData.transform(text.xy) for text in names}
+    for text in names:
+        box = Text.get_window_extent(text)
+        gaps = {name: np.hypot(*np.maximum(np.maximum(box.min - pin, pin - box.max), 0)) for name, pin in pins.items()}
+        assert min(gaps, key=gaps.get) == text.get_text() or text.arrow_patch is not None
+
+
+def test_numbers_of_ticks_are_clear_of_the_names_of_axes():
+    figure = drawn(study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 1e-3}\n  sweep:")))["motion"]
+    for axes in figure.axes:
+        name = axes.yaxis.label.get_window_extent()
+        assert all(not name.overlaps(tick.get_window_extent()) for tick in axes.get_yticklabels() if tick.get_text())
 
 
 def test_the_coupler_point_tells_most():

@@ -30,7 +30,7 @@ GROUND_HEIGHT = 13.0  # height of the ground symbol
 SLIDER_SIZE = (22.0, 13.0)  # points, along its guide and across
 ARC = 25.0  # radius of an angle drive's arrow
 FORCE = 34.0  # length of a force's arrow
-_GHOST = "#C8C8C8"
+_GHOST = "#777777"
 _STEEL = "#777777"
 Color = str | tuple[float, float, float]
 DRIVE_COLOR = style.VERMILION
@@ -348,7 +348,7 @@ def draw_ghost(axes: Axes, mechanism: Mechanism, configuration: Configuration, i
     scene = pose(mechanism, configuration, index)
     if scene is None:
         return
-    pen = Pen(axes, order=2.0)
+    pen = Pen(axes, alpha=0.4, order=2.0)
     for _, body in _bodies(scene):
         if len(body) > 1:
             pen.line([*body, *(body[:1] if len(body) > 2 else [])], _GHOST)

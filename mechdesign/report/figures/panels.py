@@ -25,6 +25,11 @@ _RIGHT = 0.3
 _TOP = 0.62
 _GAP = 0.42
 _HEIGHT = 1.75
+_EDGE = 0.05  # left of the label of an axis
+_LINE = 0.18  # a line of it
+_TICK = 0.1  # a tick and its gap
+_DIGIT = 0.083  # a digit of its number
+_POWER_LETTERS = 5  # of a power of ten
 BELOW_BARE = 0.6  # below the lowest panel: its axis alone
 BELOW_WITH_LEGEND = 0.95  # and with a legend of one or two rows
 # Inches of a map and its bar of colours.
@@ -93,11 +98,26 @@ def stack(
         # Given places: to find them from the tick labels would take as long as the rest of the picture.
         axis.set_title("", y=1.02)
         axis.locator_params(axis="y", nbins=5)
-        axis.yaxis.set_label_coords(-(_LEFT - 0.05) / (style.WIDTH - _LEFT - _RIGHT), 0.5, transform=axis.transAxes)
+        axis.yaxis.set_label_coords((_EDGE - _LEFT) / (style.WIDTH - _LEFT - _RIGHT), 0.5, transform=axis.transAxes)
         axis.yaxis.label.set_verticalalignment("top")
     axes[-1].xaxis.set_label_coords(0.5, -0.35 / tall, transform=axes[-1].transAxes)
     axes[-1].set_xlabel(label)
     return figure, axes
+
+
+def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Make room at the left so that no label of an axis lies over the numbers of its ticks; once all is drawn."""
+    numbers = [
+        text for axis in axes for text in axis.yaxis.get_major_formatter().format_ticks(axis.get_yticks().tolist())
+    ]
+    letters = max(len(text) if "$" not in text else _POWER_LETTERS for text in numbers)
+    lines = 1 + max(axis.get_ylabel().count("\n") for axis in axes)
+    left = max(figure.subplotpars.left * style.WIDTH, _EDGE + _LINE * lines + _TICK + _DIGIT * letters)
+    figure.subplots_adjust(left=left / style.WIDTH)
+    for axis in axes:
+        axis.yaxis.set_label_coords((_EDGE - left) / (axis.get_position().width * style.WIDTH), 0.5,
+                                    transform=axis.transAxes)  # fmt: skip
+        axis.yaxis.label.set_verticalalignment("top")
 
 
 def tick_abscissa(axis: Axes, swept: Along) -> None:

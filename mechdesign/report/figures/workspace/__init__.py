@@ -264,9 +264,14 @@ def _speed(study: Study, path: Table) -> Figure:
     figure = style.new_figure(3.4)
     axes = figure.add_subplot()
     pieces = _pieces(path)
-    for rows, color in zip(pieces, style.PALETTE * len(pieces), strict=False):
+    looks = zip(style.PALETTE * len(pieces), DASHES * len(pieces), strict=False)
+    for rows, (color, dashes) in zip(pieces, looks, strict=False):
         axes.plot(
-            path[drive][rows], path["speed_ratio"][rows], color=color, label=f"piece {int(path['piece'][rows[0]])}"
+            path[drive][rows],
+            path["speed_ratio"][rows],
+            color=color,
+            linestyle=dashes,
+            label=f"piece {int(path['piece'][rows[0]])}",
         )
     top, tail = _ends(path["speed_ratio"])
     axes.set_ylim(0, 1.3 * top if tail else None)
