@@ -31,7 +31,7 @@ from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
+from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -69,7 +69,7 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Condition, ...]
+    requirements: tuple[Requirement, ...]
     targets: Mapping[str, Target]  # by the coordinate or point
     warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
 
@@ -135,8 +135,9 @@ def load(
     StudyError
         With every mistake found, each as ``file:line:column: key path: what, and what would mend it``.
     """
-    if (source is None) == (text is None):
-        raise StudyError("give a study as a file, a mapping or text=..., one of them")
+    named = isinstance(source, str) and "\n" not in source
+    if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):
+        raise StudyError("give a study as one of a file's name, a mapping, or text=... in YAML")
     if text is not None:
         return load_bytes(text.encode() if isinstance(text, str) else text, None, overrides, seed)
     if isinstance(source, Mapping):
@@ -187,7 +188,7 @@ def _plain_data(value: Any, what: str) -> Any:
             return each.tolist()
         if isinstance(each, os.PathLike):
             return os.fspath(each)
-        raise TypeError(f"it holds {shown(each)}")
+        raise TypeError(f"it holds {type(each).__name__!r}")
 
     try:
         return json.loads(json.dumps(value, default=plainly))
@@ -225,7 +226,7 @@ def load_document(
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
-    parameters = builder.parameters(context.parameters, formulas)
+    parameters = builder.parameters(formulas)
     parts = _checked(Checker(builder, parameters, parts), folder)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
@@ -363,7 +364,11 @@ def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Contex
         # What was wrong may have been what uses them.
         return
     optimize, reliability = parts.get("optimize"), parts.get("reliability")
-    used = context.used.union(optimize.variables if optimize else (), reliability.dimensions if reliability else ())
+    used = context.used.union(
+        *(formula.names for formula in parameters.dependent.values()),
+        optimize.variables if optimize else (),
+        reliability.dimensions if reliability else (),
+    )
     for name, formula in reversed([*parameters.formulas.items()]):
         # A parameter may use those above it.
         if name in used:

@@ -27,7 +27,7 @@ def optimum_table(designs: Designs) -> Table:
     following = {
         name: np.asarray(value)
         for name, value in study.parameters.values(parameters).items()
-        if name not in variables and np.ndim(value)
+        if name not in variables and np.ndim(value) and all(name != each.name for each in designs.goals)
     }
     weights = zip(designs.goals, designs.weights.T, strict=True)
     columns = (

@@ -12,6 +12,7 @@ from mechdesign.analyses.reliability.laws import PIN_LAWS, Correlation, Marginal
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names
+from mechdesign.mechanism.model import MEASURED
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import LOADS, Clearance
@@ -234,10 +235,11 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
             kind, nominal = "parameter", study.parameters.nominal[name]
             slopes = _geometric(study.parameters.derivatives(name))
             moved = [place for place, slope in slopes.items() if slope]
+            dimensions = [place for place in moved if not place.startswith(MEASURED)]
             if not moved:
                 warnings.append(f"parameter '{name}' changes no dimension of the mechanism")
-            elif len(moved) > 1:
-                warnings.append(f"parameter '{name}' varies {', '.join(moved)} together")
+            elif len(dimensions) > 1:
+                warnings.append(f"parameter '{name}' varies {', '.join(dimensions)} together")
         else:
             kind, slopes = "load" if name in LOADS else "drive" if name in mechanism.drives else "place", {name: 1.0}
             if kind == "place":
@@ -264,7 +266,7 @@ def _check_sizes(sources: Sources) -> None:
     """Refuse deviations so large that their squares overflow."""
     study, size = sources.study, sources.study.mechanism.size or 1.0
     loads = (MAX_LOAD, "1e100")
-    most = {"angle": (MAX_DEVIATION, "a million radians"), "force": loads, "moment": loads}
+    most = {"angle": (MAX_DEVIATION, "a million radians"), "force": loads, "moment": loads, "none": loads}
     for scalar in sources.scalars:
         for slope, quantity in scalar.moves.values():
             allowed, words = most.get(quantity, (MAX_DEVIATION * size, "a million times the size of the mechanism"))
