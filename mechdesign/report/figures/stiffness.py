@@ -20,7 +20,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import ARC, Pen, draw_mechanism, point_labels
-from mechdesign.report.figures.framing import BELOW, LEFT, MAX_HEIGHT, RIGHT, TITLE, fit, framed, windows
+from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, TITLE, fit, framed, windows
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import Plane, along, map_sheet, plane, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
@@ -36,7 +36,10 @@ _COIL_TURNS = 7
 _COIL_ORDER = 5.0
 _LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
 _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
+_ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
 _FLAT = 0.02  # part of its value by which a stiffness changes that is written, not drawn
+_TAIL = 0.04  # share of stiffnesses at either end of which ...
+_BEYOND = 10.0  # ... no more is drawn than this ratio beyond the others
 _LOGARITHMIC = 5.0  # ratio of values above which their axis is logarithmic
 _PALE = "#D5DCE4"  # of the mechanism without load, in the legend
 # Main axes of the ellipse: column, words, angle from that of k_max, colour and dashes.
@@ -45,7 +48,7 @@ _MAIN_AXES: tuple[tuple[str, str, float, str, Any], ...] = (
     ("k_max", "stiffest", 0.0, style.BLUE, (0, (2, 1))),
 )
 # Inches.
-_PANEL_TITLE = 0.62
+_PANEL_TITLE = 0.17  # a line
 _HEADING = 0.32
 _LEGEND = 0.3
 # Shape functions of a deflected beam, cubic between its ends as bending makes it, at these parts of its length.
@@ -113,28 +116,30 @@ def _directions(study: Study, result: Result) -> Figure | None:
     shown, section = result.drawn["shown"], study.stiffness
     assert section is not None
     index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
-    scenes = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in spread(index, MAX_DIRECTIONS)}
-    scenes = {k: scene for k, scene in scenes.items() if scene is not None}
+    posed = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in spread(index, MAX_DIRECTIONS)}
+    scenes = {k: scene for k, scene in posed.items() if scene is not None}
     if not scenes:
         return None
     rows = shown.rows[list(scenes)]
-    largest = 1 / float(table["k_min"][rows].min())
-    span = max(scene.span for scene in scenes.values() if scene is not None)
-    if not 0 < largest < np.inf:
+    soft_ends = 1 / table["k_min"][rows]
+    if not (np.isfinite(soft_ends).all() and (soft_ends > 0).all()):
         return None
-    scale = round_down(_LARGEST_ELLIPSE * span / largest)
+    if soft_ends.max() < _ONE_SCALE * soft_ends.min():
+        soft_ends[:] = soft_ends.max()
+    force, span = _force(study), max(scene.span for scene in scenes.values())
+    scales = [force * round_down(_LARGEST_ELLIPSE * span / (force * end)) for end in soft_ends.tolist()]
     turns, ellipses = np.exp(1j * np.linspace(0, 2 * np.pi, 361)), []
-    for row in rows:
+    for row, scale in zip(rows, scales, strict=True):
         xx, xy, yy = (float(soft[name][row]) for name in ("C11", "C12", "C22"))
         ellipses.append(scale * (xx * turns.real + xy * turns.imag + 1j * (xy * turns.real + yy * turns.imag)))
     places = [[*scene.points.values(), *(scene.points[section.at] + ellipse)]
-              for scene, ellipse in zip(scenes.values(), ellipses, strict=True) if scene is not None]  # fmt: skip
-    words = _force_in_words(study, scale)
-    heading = f"ellipse: where a force in any direction moves {section.at}, {words}"
-    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading)
+              for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
+    words = f"{force:g} {style.printed(study.units.label('force'))}"
+    heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
+    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=4)
     units = study.units.label("stiffness"), study.units.label("angle")
-    for axes, (k, scene), row, ellipse in zip(panels, scenes.items(), rows, ellipses, strict=True):
-        assert scene is not None
+    shapes = zip(panels, scenes.items(), rows, scales, ellipses, strict=True)
+    for axes, (k, scene), row, scale, ellipse in shapes:
         at = scene.points[section.at]
         draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_small(len(panels)))
         axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
@@ -147,27 +152,29 @@ def _directions(study: Study, result: Result) -> Figure | None:
             toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
             said.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
         axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
-        axes.set_title("\n".join([pose_in_words(study, poses, int(row)), *said]), loc="left", fontsize=8.5)
+        said = [pose_in_words(study, poses, int(row)), *said, f"drawn {scale / force:g} times as large"]
+        axes.set_title("\n".join(said), loc="left", fontsize=8.5)
     handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{what} direction, {name}")
                for name, what, _, color, dashes in _MAIN_AXES]  # fmt: skip
     figure.legend(handles=handles, loc="lower left", ncols=2, bbox_to_anchor=(LEFT / style.WIDTH - 0.02, 0.0))
     return figure
 
 
-def _force_in_words(study: Study, scale: float) -> str:
-    """The force of an ellipse, about the largest of the study's loads or else one unit, and its magnification."""
+def _force(study: Study) -> float:
+    """The force of an ellipse: about the largest of the study's loads, or else one unit."""
     assert study.stiffness is not None
-    unit = study.units.label("force")
     loads = [abs(complex(*load[:2])) for load in study.stiffness.loads]
-    force = round_down(max(loads)) if any(loads) else 1.0
-    return f"{force:g} {unit}, drawn {scale / force:g} times as large"
+    return round_down(max(loads)) if any(loads) else 1.0
 
 
-def _panels(study: Study, places: Complexes, count: int, heading: str) -> tuple[Figure, list[Axes]]:
-    """Drawings of one scale, two in a row, under a heading, with room for titles of three lines and a legend."""
+def _panels(
+    study: Study, places: Complexes, count: int, heading: str, lines: int = 3
+) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    """Drawings of one scale, two in a row, under a heading, with room for titles of some lines and a legend."""
     columns = min(count, 2)
     window = fit(places, (style.WIDTH - RIGHT - LEFT * columns) / columns, MAX_HEIGHT if columns == 1 else 3.2)
-    figure, axes = windows(window, study.units.label("length"), count, columns, above=_PANEL_TITLE, top=_HEADING,
+    above = _PANEL_TITLE * lines + ABOVE
+    figure, axes = windows(window, study.units.label("length"), count, columns, above=above, top=_HEADING,
                            below=BELOW + _LEGEND)  # fmt: skip
     figure.text(LEFT / style.WIDTH, 1 - 0.1 / figure.get_figheight(), heading[0].upper() + heading[1:], va="top",
                 fontsize=11)  # fmt: skip
@@ -221,6 +228,12 @@ def _curves(study: Study, result: Result) -> Figure | None:
         low, high = axis.dataLim.intervaly
         if high > _LOGARITHMIC * low > 0:
             axis.set_yscale("log")
+            # Near a singularity a stiffness grows or vanishes without bounds; what it is elsewhere stays legible.
+            every = np.concatenate(
+                [table[name][np.isfinite(table[name]) & (table[name] > 0)] for name in curves or flat]
+            )
+            usual = np.quantile(every, (_TAIL, 1 - _TAIL)) * (1 / _BEYOND, _BEYOND)
+            axis.set_ylim(max(0.8 * low, usual[0]), min(1.25 * high, usual[1]))
         else:
             axis.set_ylim(0, 1.1 * high)
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -279,7 +292,7 @@ class Coil:
         span = self.anchor - self.place
         anchors = tuple(self.place + share * span for share in (0.5, 0.56, 0.44, 0.62, 0.38))
         heading = float(np.angle(1j * span if (1j * span).real > 0 else -1j * span))
-        return Label(self.text, anchors, style.VERMILION, 11, heading, 9.5)
+        return Label(self.text, anchors, style.VERMILION, 16, heading, 9.5)
 
 
 def quantity(value: float, unit: str) -> str:

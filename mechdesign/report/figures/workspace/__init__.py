@@ -161,13 +161,12 @@ def drives_figure(study: Study, found: Sequence[Region]) -> Figure:
     label = style.axis_label("angle of the ray from the centre of the scan", study.units.label("angle"))
     figure, panels = stack(len(parts), "Drives along the boundary of the workspace", label, tall=_DRIVES_HEIGHT)
     units = {study.units.label(mechanism.quantity(name)) for name in names}
-    limits = {
-        float(np.asarray(in_study_units(study, bound.coordinate, end)))
-        for bound in mechanism.bounds
-        if bound.drive
-        for end in bound.ends(mechanism.nominal)
-        if end is not None
-    }
+    limits: dict[float, list[str]] = {}
+    for bound in mechanism.bounds:
+        for end in bound.ends(mechanism.nominal) if bound.drive else ():
+            if end is not None:
+                value = round(float(np.asarray(in_study_units(study, bound.coordinate, end))), 9)
+                limits.setdefault(value, []).append(bound.coordinate.name)
     entries: dict[str, Line2D] = {}
     for axes, (boundary, side, where) in zip(panels, parts, strict=True):
         for number, name in enumerate(names):
@@ -177,8 +176,10 @@ def drives_figure(study: Study, found: Sequence[Region]) -> Figure:
                 own = boundary.take(rows)
                 (entries[name],) = axes.plot(own["theta"], own[name], color=LINE_COLORS[number % len(LINE_COLORS)],
                                              linestyle=DASHES[number % len(DASHES)], linewidth=1.9)  # fmt: skip
-        for limit in limits:
+        for limit, limited in limits.items():
             entries["limit of a drive"] = axes.axhline(limit, color=style.INK, linewidth=0.9, zorder=1.5)
+            axes.annotate(", ".join(limited), (1, limit), (-2, 1.5), xycoords=axes.get_yaxis_transform(), ha="right",
+                          textcoords="offset points", fontsize=7.5, path_effects=_HALO)  # fmt: skip
         axes.set_title(", ".join(filter(None, (where, f"{side} boundary"))), loc="left", fontsize=9.5)
         axes.set_ylabel(style.axis_label("drive", "".join(units) if len(units) == 1 else ""))
     every = np.concatenate([boundary["theta"] for boundary, *_ in parts])
