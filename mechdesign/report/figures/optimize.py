@@ -31,6 +31,8 @@ MAP_LEVELS = 14
 MARKERS = "osD^vP*X<>"
 # More lines than that are one blot: of more designs every so many are drawn, in the order of their score.
 MAX_LINES = 300
+# Directions from the centre of what the workspace contains to its outline.
+_OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
 _NAME_LETTERS = 14  # of a name in one line below an axis
 _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 
@@ -61,7 +63,14 @@ def _optimum(result: Result, designs: Designs) -> Figure:
     words = in_words(designs, designs.best)
     best, own = result.drawn["best"]()
     if own.command == "workspace":
-        return workspace_figure(best, own, regions(best, own)[0], f"the best design, {words}")
+        region = regions(best, own)[0]
+        there = f", at {region.title}" if region.title else ""
+        dotted = "; dotted: what it contains" if own.drawn["contained"] else ""
+        figure = workspace_figure(best, own, region, f"the best design, {words}{there}{dotted}")
+        for shape, centre in own.drawn["contained"]:
+            z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
+            figure.axes[0].plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
+        return figure
     goals = designs.goals
     if any(each.command == "kinematics" for each in goals) and own.drawn["motion"].poses.motion:
         figure = paths_figure(Sweep.of(own.drawn["motion"]), above=0.4)
