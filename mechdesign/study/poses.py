@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.study.schema import paths
 from mechdesign.study.schema.poses import PoseSection, Sweep
 
@@ -53,6 +53,7 @@ class Poses:
     bends: Mapping[str, Floats] = field(default_factory=dict)
     # Of a grid of rays: those of each patch of the workspace, which turn on from one to the next.
     patches: tuple[slice, ...] = ()
+    outline: tuple[Complexes, ...] = ()  # curves of the workspace's boundary
 
     @property
     def names(self) -> tuple[str, ...]:

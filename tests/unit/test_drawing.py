@@ -5,6 +5,7 @@ import time
 import numpy as np
 import pytest
 from matplotlib.patches import PathPatch
+from matplotlib.text import Text
 
 import mechdesign
 from mechdesign.report.figures import style
@@ -51,7 +52,7 @@ def test_every_joint_drive_slide_and_link_is_named_in_both_poses(study):
 def test_names_do_not_overlap(study):
     figure, _ = drawn(study)
     for axes in figure.axes:
-        boxes = [text.get_window_extent() for text in axes.texts]
+        boxes = [Text.get_window_extent(text) for text in axes.texts]
         for k, box in enumerate(boxes):
             assert not any(box.overlaps(other) for other in boxes[:k])
 
@@ -140,5 +141,5 @@ def test_names_go_where_least_is_covered():
         assert first[1] < -6
         assert abs(first[0]) < 15
         assert second[1] < -6
-        boxes = [text.get_window_extent() for text in axes.texts]
+        boxes = [Text.get_window_extent(text) for text in axes.texts]
         assert not boxes[0].overlaps(boxes[1])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from matplotlib.text import Text
 
 import mechdesign
 from mechdesign.report.figures import style
@@ -64,6 +65,25 @@ def test_paths_and_their_mechanism_lie_within_the_picture_and_names_apart():
         assert not any(box.overlaps(other) for other in names[:k])
 
 
+def test_names_are_nearest_to_their_own_pins_or_have_a_line():
+    study = study_of(FOUR_BAR.replace("points: {C: [45, 40]}", "points: {C: [45, 6], E: [45, -6], F: [51, 0]}"))
+    (axes,) = drawn(study)["paths"].axes
+    names = [text for text in axes.texts if text.get_text() in "ODABCEF"]
+    assert len(names) == 7
+    pins = {text.get_text(): axes.transData.transform(text.xy) for text in names}
+    for text in names:
+        box = Text.get_window_extent(text)
+        gaps = {name: np.hypot(*np.maximum(np.maximum(box.min - pin, pin - box.max), 0)) for name, pin in pins.items()}
+        assert min(gaps, key=gaps.get) == text.get_text() or text.arrow_patch is not None
+
+
+def test_numbers_of_ticks_are_clear_of_the_names_of_axes():
+    figure = drawn(study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 1e-3}\n  sweep:")))["motion"]
+    for axes in figure.axes:
+        name = axes.yaxis.label.get_window_extent()
+        assert all(not name.overlaps(tick.get_window_extent()) for tick in axes.get_yticklabels() if tick.get_text())
+
+
 def test_the_coupler_point_tells_most():
     assert ranks(study_of(FOUR_BAR)) == {"A": 0, "B": 0, "C": 2}
     assert ranks(study_of(FOUR_BAR.replace("sweep:", "outputs: [B.x]\n  sweep:")))["B"] == 2
@@ -74,6 +94,22 @@ def test_the_coupler_point_tells_most():
         (line for line in figure.axes[0].lines if len(line.get_xdata()) == 73), key=lambda line: line.get_linewidth()
     )
     np.testing.assert_array_equal(bold.get_xdata(), path.real)
+
+
+@pytest.mark.parametrize(
+    "poses",
+    ["sweep: {theta: {from: 0, to: 360, step: 45}}", "path: {A: {circle: {center: [0, 0], radius: 30}, points: 8}}"],
+)
+def test_traces_of_few_poses_are_curves(poses):
+    """A crank's pin stays on its circle between the poses of a sweep, and of a path given by few points."""
+    text = FOUR_BAR.replace("sweep: {theta: {from: 0, to: 360, step: 5}}", poses)
+    if "path" in poses:
+        text = text.replace("crank: [O, A, 30]", "crank: {from: O, to: A, telescopic: true}")
+        text = text.replace("drives: {theta: {angle: crank}}", "drives: {theta: {angle: crank}, l: {length: crank}}")
+    trace = sweep_of(study_of(text)).traces["A"]
+    assert len(trace) > 200
+    np.testing.assert_allclose(np.abs(trace), 30, rtol=3e-3)
+    assert abs(trace[-1] - trace[0]) < 1e-9
 
 
 def test_curves_of_what_moves_only():

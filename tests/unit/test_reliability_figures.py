@@ -287,6 +287,17 @@ def test_patches_of_a_workspace_are_kept_apart() -> None:
         assert np.abs(np.diff(z[patch], axis=0)).max() < 0.4 * np.ptp(over.x)
 
 
+def test_outline_of_a_map_is_the_boundary_of_the_workspace() -> None:
+    study = mechdesign.load(Path(__file__).parents[2] / "configs/gallery/five_bar_precision_map.yaml")
+    over = plane(study, study_poses(study, "reliability"))
+    assert over is not None
+    z = np.concatenate(over.outline)
+    # A leg is stretched, or its pin and C are as near as they may be.
+    reach = np.abs(z - np.array([[100], [-100]]))
+    assert np.abs(reach[..., None] - (140, 340)).min(axis=(0, 2)).max() < 1e-6
+    assert len(z) > 300
+
+
 def test_path_in_the_plane_is_drawn_over_its_poses() -> None:
     path = "reliability.path={P: [[60, 100], [70, 110], [80, 100], [70, 90], [60, 100]]}"
     found, _ = drawn(ARM, path, "reliability.methods=[analytic]")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from helpers.stiffness import ARM, FIVE_BAR
@@ -76,6 +78,32 @@ def test_a_leg_without_springs_has_no_picture_of_them() -> None:
 
 def test_poses_that_fail_are_left_out() -> None:
     assert "springs" in pictures(FIVE_BAR, "stiffness.poses=[{P.x: 9, P.y: 9}, {P.x: 0.05, P.y: 0.45}]")
+
+
+def test_ellipse_of_a_point_has_the_axes_of_its_compliance() -> None:
+    study = study_of(FIVE_BAR)
+    result = mechdesign.stiffness(study)
+    with style.context():
+        axes = figures(study, result)["directions"].axes[0]
+    assert axes.get_aspect() == 1
+    edge, soft, stiff, _ = (np.array(line.get_xydata()) @ [1, 1j] for line in axes.lines[-4:])
+    spans = np.abs(edge - edge[:-1].mean())
+    table = result.tables["stiffness"]
+    assert spans.max() / spans.min() == pytest.approx(table["k_max"][0] / table["k_min"][0], rel=1e-3)
+    assert np.abs(np.diff(soft)) == pytest.approx(2 * spans.max(), rel=1e-3)
+    assert np.angle(np.diff(stiff)[0] ** 2) == pytest.approx(np.angle(np.exp(2j * np.radians(table["k_angle"][0]))))
+
+
+def test_each_load_is_drawn_alone_and_legs_stay_on_their_pins() -> None:
+    study = mechdesign.load(Path(__file__).parents[2] / "configs/planar_2rpr_rp.yaml")
+    result = mechdesign.stiffness(study)
+    with style.context():
+        panels = figures(study, result)["deflections"].axes
+    assert len(panels) == len(study.stiffness.loads) == 3  # type: ignore[union-attr]
+    for axes in panels:
+        ends = np.array([end for line in axes.lines if len(line.get_xdata()) > 2 for end in line.get_xydata()[[0, -1]]])
+        for pin in ([-0.6, 0], [0.6, 0], [0.3, -0.2]):
+            assert np.hypot(*(ends - pin).T).min() < 1e-6
 
 
 def test_coil_runs_from_its_point_to_its_anchor() -> None:

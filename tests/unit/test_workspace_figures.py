@@ -68,6 +68,19 @@ def test_held_coordinates_are_shown_side_by_side_at_one_scale() -> None:
     assert len({(axes.get_xlim(), axes.get_ylim()) for axes in panels}) == 1
 
 
+def test_every_value_of_a_held_coordinate_is_in_the_workspace_and_its_drives() -> None:
+    study = study_of(ARM)
+    with style.context():
+        drawn = figures(study, mechdesign.workspace(study))
+    titles = ["hand.angle = -90 deg", "hand.angle = 0 deg", "hand.angle = 60 deg"]
+    assert [axes.get_title(loc="left") for axes in drawn["workspace"].axes] == titles
+    panels = drawn["drives"].axes
+    assert {axes.get_title(loc="left").partition(", ")[0] for axes in panels} == set(titles)
+    # A drive is told apart by its dashes, too, the same in all panels.
+    looks = {str((line.get_color(), line._unscaled_dash_pattern)) for axes in panels for line in axes.lines}
+    assert len(looks) == 3
+
+
 @pytest.mark.parametrize(("kind", "at", "expected"), [
     ("limit", "q1 stretched", "limit"), ("singularity", "upper-lower stretched", "stretched"),
     ("singularity", "upper-lower folded", "folded"), ("singularity", "assembly 0", "singularity"),

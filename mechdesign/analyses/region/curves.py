@@ -133,7 +133,10 @@ def workspace_nodes(study: Study) -> Poses:
         If nothing is reachable.
     """
     asked = regions(study)
-    parts = [(region, grid) for region in asked for grid in _grids(region, MAX_POSES // GRID // len(asked))]
+    panels = [(region, found) for region in asked if (found := _panels(region)) is not None]
+    parts = [
+        (region, grid) for region, each in panels for grid in _grids(region, each, MAX_POSES // GRID // len(asked))
+    ]
     if not parts:
         raise AssemblyError("poses: workspace has no node: nothing is reachable")
     z = np.concatenate([grid.ravel() for _, grid in parts])
@@ -144,16 +147,26 @@ def workspace_nodes(study: Study) -> Poses:
         values[name] = np.concatenate([np.full(grid.size, region.held[name]) for region, grid in parts])
     group = PoseGroup(tuple(values), values, np.arange(len(z)))
     spans = tuple(slice(begin, end) for begin, end in pairwise(ends))
-    return Poses((group,), len(z), False, (len(z) // GRID, GRID), patches=spans)
+    outline = tuple(
+        region.about + radius * np.exp(1j * patch.theta)
+        for region, each in panels
+        for patch in patches(each, region.rays or RAYS)
+        for radius, margin in ((patch.inner, patch.enters), (patch.outer, patch.leaves))
+        if margin >= 0
+    )
+    return Poses((group,), len(z), False, (len(z) // GRID, GRID), patches=spans, outline=outline)
 
 
-def _grids(region: Region, most: int) -> list[Complexes]:
-    """Nodes of the patches of one region, shape (rays, GRID), on about `most` rays."""
+def _panels(region: Region) -> Panels | None:
+    """Panels of the piece of a region that counts, None where nothing is reachable."""
     panels = find_panels(Designs(region.field, {}, 1, region.about, region.scan, SINGLE))
     if region.field.same_assembly:
         panels = Pieces.of(panels).only(0)
-    if not panels.closes[0]:
-        return []
+    return panels if panels.closes[0] else None
+
+
+def _grids(region: Region, panels: Panels, most: int) -> list[Complexes]:
+    """Nodes of the patches of one region, shape (rays, GRID), on about `most` rays."""
     found = list(patches(panels, min(region.rays or RAYS, most)))
     # Every panel has a fewest number of rays: of too many some are left out, never the ends of a patch: others begin.
     total = sum(float(np.ptp(patch.theta)) for patch in found)

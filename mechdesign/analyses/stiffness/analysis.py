@@ -10,7 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.poses import SolvedPoses, judge_failures, pose_in_words, solve_poses, study_poses
+from mechdesign.analyses.poses import (
+    Keeper,
+    Shown,
+    SolvedPoses,
+    judge_failures,
+    pose_in_words,
+    solve_poses,
+    study_poses,
+)
 from mechdesign.analyses.stiffness.compliance import Held, put
 from mechdesign.analyses.stiffness.elements import Guide, Hinge, corners_of
 from mechdesign.analyses.stiffness.force_method import Effects, Loaded, effects_of, load, twists_of
@@ -108,7 +116,8 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 class Solved:
     """How the body is held in every pose, why poses fail (`Reason`, shape (poses,)), and the effects of any loads.
 
-    `first` and `loose` are the first valid pose and the first that has a free twist, with their rows.
+    `first` and `loose` are the first valid pose and the first that has a free twist, with their rows; `shown` are the
+    poses that pictures can show.
     """
 
     held: Held
@@ -117,6 +126,7 @@ class Solved:
     effects: Effects | None
     first: Pose | None
     loose: Pose | None
+    shown: Shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +141,8 @@ class Drawn:
 
 
 def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
-    """All poses; the first valid one, and the first that has a free twist."""
-    drawn: dict[str, Any] = {"poses": poses}
+    """All poses, those that pictures can show; the first valid one, and the first that has a free twist."""
+    drawn: dict[str, Any] = {"poses": poses, "shown": solved.shown}
     for name, pose in (("first", solved.first), ("loose", solved.loose)):
         if pose is not None:
             row, configuration = pose
@@ -153,8 +163,10 @@ def solve(study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress
     effects = Effects.unknown(body.network, poses.count, len(loads)) if loads else None
     first: Pose | None = None
     loose: Pose | None = None
+    keeper = Keeper(study, poses)
     for solved in solve_poses(study, poses):
         configuration = solved.configuration
+        keeper.keep(solved)
         reason[solved.rows] = configuration.reason
         first = first or _pose(solved, configuration.valid)
         assembled = np.flatnonzero(np.isin(configuration.reason, (Reason.OK, Reason.LIMIT)))
@@ -168,7 +180,7 @@ def solve(study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress
                 put(effects, rows, moved)
             progress.update(len(index))
         loose = loose or _pose(solved, np.isfinite(held.free[solved.rows, 0]))
-    return Solved(held, reason, Springs.sorted(springs), effects, first, loose)
+    return Solved(held, reason, Springs.sorted(springs), effects, first, loose, keeper.shown)
 
 
 def _pose(solved: SolvedPoses, wanted: Flags) -> Pose | None:

@@ -29,6 +29,8 @@ PIN = 3.6  # radius of a joint
 GROUND_HEIGHT = 13.0  # height of the ground symbol
 SLIDER_SIZE = (22.0, 13.0)  # points, along its guide and across
 ARC = 25.0  # radius of an angle drive's arrow
+FORCE = 34.0  # length of a force's arrow
+_GHOST = "#777777"
 _STEEL = "#777777"
 Color = str | tuple[float, float, float]
 DRIVE_COLOR = style.VERMILION
@@ -83,7 +85,7 @@ class Pen:
 
     def line(self, ends: Sequence[complex], color: str) -> None:
         """A link as a thin line along its points: for ghosts."""
-        self._line(ends, 0.1, 1.9, color, solid_capstyle="round", solid_joinstyle="round")
+        self._line(ends, 0.1, 1.3, color, solid_capstyle="round", solid_joinstyle="round")
 
     def bar(self, ends: Sequence[complex], color: str, width: float = BAR) -> None:
         """A link as a bar with round ends along a line of points."""
@@ -164,6 +166,15 @@ class Pen:
 
     def turn(self, place: complex, start: float, sweep: float, radius: float, color: str) -> None:
         """An angle drive: a curved arrow from the angle `start` (radians), with the line it is measured from."""
+        self.arc(place, start, sweep, radius, color)
+        base = (radius + 9) * np.exp(1j * start)
+        self._symbol(
+            Path([(0, 0), (base.real, base.imag)]), self._at(place), 0.3, facecolor="none", edgecolor=color, lw=0.9,
+            linestyle=(0, (3, 2)),
+        )  # fmt: skip
+
+    def arc(self, place: complex, start: float, sweep: float, radius: float, color: str) -> None:
+        """A curved arrow about a place, from the angle `start` over `sweep` (radians); the radius in points."""
         angles = start + np.linspace(0.0, sweep, 48)
         # The head is as long on the arc as it looks; a small angle has a small head.
         head = min(7.0, 0.7 * abs(sweep) * radius)
@@ -172,17 +183,17 @@ class Pen:
         tip = radius * np.exp(1j * angles[-1])
         tangent = 1j * sign * np.exp(1j * (angles[-1] - sign * head / (2 * radius)))
         self._arrow(stem, complex(tip), complex(tangent), head, self._at(place), color)
-        base = (radius + 9) * np.exp(1j * start)
-        self._symbol(
-            Path([(0, 0), (base.real, base.imag)]), self._at(place), 0.3, facecolor="none", edgecolor=color, lw=0.9,
-            linestyle=(0, (3, 2)),
-        )  # fmt: skip
 
     def push(self, place: complex, direction: complex, length: float, away: float, color: str) -> None:
         """A length or slide drive: a straight arrow (points) beside a line through the place."""
         where = self._at(place, math.atan2(direction.imag, direction.real))
         stem = np.array([-length / 2, length / 2 - 4]) + 1j * away
         self._arrow(stem, complex(length / 2, away), 1.0, 7.0, where, color)
+
+    def force(self, place: complex, direction: complex, color: str) -> None:
+        """A force: an arrow that ends at the place where it acts."""
+        where = self._at(place, math.atan2(direction.imag, direction.real))
+        self._arrow(np.array([-FORCE - PIN, -PIN - 6], dtype=complex), complex(-PIN), 1.0, 9.0, where, color)
 
     def _arrow(self, stem: np.ndarray, tip: complex, along: complex, head: float, where: Transform, color: str) -> None:
         if len(stem) > 1:
@@ -303,7 +314,7 @@ def draw_mechanism(
     if scene is None:
         return
     colors = link_colors(mechanism)
-    pen = Pen(axes, alpha=0.22, order=2.0) if faint else Pen(axes, size=size)
+    pen = Pen(axes, alpha=0.22, order=2.0, size=size) if faint else Pen(axes, size=size)
     for point in scene.pivots():
         pen.pivot(scene.points[point])
     _draw_guides(pen, scene, colors, travel or {})
@@ -332,22 +343,21 @@ def draw_mechanism(
         place_labels(axes, named, covered(axes), order=pen.order + 2)
 
 
-def draw_ghost(axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int, *, share: float) -> None:
-    """Draw a further pose as pale lines, which many of can lie over one another; `share` of it is colour."""
+def draw_ghost(axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int) -> None:
+    """Draw a further pose as thin grey lines, which lie below the paths and do not look like them."""
     scene = pose(mechanism, configuration, index)
     if scene is None:
         return
-    colors = link_colors(mechanism)
-    pen = Pen(axes, alpha=share, order=2.0)
-    for name, body in _bodies(scene):
+    pen = Pen(axes, alpha=0.4, order=2.0)
+    for _, body in _bodies(scene):
         if len(body) > 1:
-            pen.line([*body, *(body[:1] if len(body) > 2 else [])], colors[name])
-    for name, link in scene.description.links.items():
+            pen.line([*body, *(body[:1] if len(body) > 2 else [])], _GHOST)
+    for link in scene.description.links.values():
         if link.telescopic and link.ends:
-            pen.line([scene.points[end] for end in link.ends], colors[name])
+            pen.line([scene.points[end] for end in link.ends], _GHOST)
     for guide in scene.guides:
         if guide.owner != GROUND:
-            pen.line(_reach(scene, guide, (guide.pin,)), colors[guide.owner])
+            pen.line(_reach(scene, guide, (guide.pin,)), _GHOST)
 
 
 def _bodies(scene: Scene) -> list[tuple[str, list[complex]]]:

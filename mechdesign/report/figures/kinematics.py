@@ -19,7 +19,7 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
 from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, fit, framed, windows
-from mechdesign.report.figures.panels import abscissa, moving_names, tick_abscissa
+from mechdesign.report.figures.panels import abscissa, clear_of_ticks, moving_names, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
 from mechdesign.results import Column, Result
@@ -29,6 +29,8 @@ from mechdesign.study import Study, Units
 MAX_CURVES = 7
 MAX_CURVE_PANELS = 12
 _COLORS = (*style.PALETTE[:6], style.INK)  # yellow is lost on white
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_MARKS = 8  # along a curve, about
 _ORDERS = ("velocity", "acceleration", "error", "effort")
 _RANKS = ("position", *_ORDERS, "det_J", "inverse_condition")
 _MAX_TALL_PANELS = 7  # more panels are lower
@@ -39,8 +41,8 @@ _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
-# Largest number of moving links, and for it the number of ghosts and their share of colour.
-_GHOSTS = ((3, 7, 0.42), (5, 6, 0.38), (8, 4, 0.32), (10**6, 2, 0.3))
+# Largest number of moving links, and for it the number of ghosts.
+_GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
 _PATH_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
@@ -115,6 +117,7 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     axes[-1].margins(x=0.02)
     axes[-1].set_xlabel(over.label)
     tick_abscissa(axes[-1], over)
+    clear_of_ticks(figure, axes)
     return figure
 
 
@@ -190,7 +193,11 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
             if len(curve.of) <= _LEGEND_LETTERS
             else f"{curve.of[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
         )
-        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=label)
+        # In grey the markers tell what the colours tell.
+        which, every = _COLORS.index(color), max(len(x) // _MARKS, 1)
+        marker = _MARKERS[which] if len(panel) > 1 else ""
+        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=label, marker=marker,
+                  markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
         shown.append(values)
     first = panel[0]
     title = first.order.replace("_", " ")
@@ -199,7 +206,6 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
         title = kinds.get(first.column.unit, "value")
     title = title.replace("inverse ", "inverse\n")
     axis.set_ylabel(style.axis_label(title, first.column.unit).replace(" [", "\n["))
-    axis.yaxis.set_label_coords(-0.57 / (axis.get_position().width * style.WIDTH), 0.5)
     axis.ticklabel_format(axis="y", scilimits=(-4, 4))
     known = np.concatenate([values[np.isfinite(values)] for values in shown])
     if np.ptp(known) <= _STILL * max(float(np.abs(known).max()), 1.0):
@@ -255,11 +261,11 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
             zorder=3.7,
         )  # fmt: skip
     count = len(sweep.mechanism.description.links) - 1
-    _, ghosts, share = next(entry for entry in _GHOSTS if count <= entry[0])
+    _, ghosts = next(entry for entry in _GHOSTS if count <= entry[0])
     # A closed motion ends where it begins: its last ghost would hide the first.
     some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
     for index in np.unique(some[1 : -1 if sweep.closed else None]):
-        draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index), share=share)
+        draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index))
     draw_paths(axes, sweep)
     first = int(sweep.valid[0])
     draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
@@ -277,10 +283,7 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
         if name != GROUND:
             for point in link_points(link):
                 owners.setdefault(point, name)
-    for point, path in sweep.places.items():
-        if sweep.closed and sweep.poses.closed:
-            # A closed path is listed without its begin at its end.
-            path = np.append(path, path[0])
+    for point, path in sweep.traces.items():
         line, share = _PATH_LOOKS[min(ranked[point] + lift, 2)]
         axes.plot(
             path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,

@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,6 +23,10 @@ _DIRECTIONS = 16
 _NET = 4.5  # points between two places of what names keep off
 _SYMBOL = 36.0  # largest diagonal of a symbol, points: nothing is written into it
 _HATCHED = 10.0  # width of a hatched line, points
+_CLEARLY = 2.0  # points by which a name must be nearer to what it names than to another
+_UNCLEAR = 4.0  # what it costs where it is not
+_LEADERLESS = 14.0  # points beyond a name's reach from where a line leads to its place
+_LEADER: dict[str, Any] = {"arrowstyle": "-", "linewidth": 0.7, "shrinkA": 0.5}
 _PALE = 0.5  # opacity below which a drawing may be written on
 
 
@@ -53,7 +58,8 @@ class Label:
 def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: float) -> None:
     """Write labels, one after another, each at the place that costs least.
 
-    The axes' limits must be final: what overlaps depends on the scale.
+    A label that is not nearer to what it names than to another of its kind has a line to it. The axes' limits must be
+    final: what overlaps depends on the scale.
 
     Parameters
     ----------
@@ -63,15 +69,20 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
     window = paper(axes, np.array([complex(axes.get_xlim()[0], axes.get_ylim()[0]),
                                    complex(axes.get_xlim()[1], axes.get_ylim()[1])]))  # fmt: skip
     obstacles = obstacles[np.argsort(obstacles[:, 0])]
+    named = [paper(axes, np.array(label.anchors)) for label in labels]
     taken, count = np.empty((len(labels), 4)), 0
-    for label in labels:
+    for label, own in zip(labels, named, strict=True):
+        # Names of one kind could change places.
+        alike = [
+            there for other, there in zip(labels, named, strict=True) if there is not own and other.size == label.size
+        ]
+        others = np.concatenate(alike) if alike else np.full((1, 2), np.inf)
         half = np.array([_LETTER * label.size * len(label.text), label.size]) / 2
         offsets, strains = _offsets(label, half)
         # Only what is within reach of some place can be covered.
         reach = np.abs(offsets).max(axis=0) + half + 2
-        best: tuple[float, complex, Floats, Floats] | None = None
-        for rank, anchor in enumerate(label.anchors):
-            origin = paper(axes, np.array([anchor]))[0]
+        best: tuple[float, complex, Floats, Floats, bool] | None = None
+        for rank, (anchor, origin) in enumerate(zip(label.anchors, own, strict=True)):
             first, last = np.searchsorted(obstacles[:, 0], origin[0] + reach[0] * np.array([-1, 1]))
             near = obstacles[first:last]
             near = near[np.abs(near[:, 1] - origin[1]) <= reach[1]]
@@ -79,19 +90,34 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
             low, high = origin - reach, origin + reach
             written = written[((written[:, :2] < high) & (written[:, 2:] > low)).all(axis=1)]
             boxes = np.column_stack([origin + offsets - half, origin + offsets + half])
-            costs = strains + 0.4 * rank + _costs(boxes, near, written, window)
+            unclear = _distances(boxes, own) + _CLEARLY > _distances(boxes, others)
+            costs = strains + 0.4 * rank + _costs(boxes, near, written, window) + _UNCLEAR * unclear
             k = int(np.argmin(costs))
             if best is None or costs[k] < best[0]:
-                best = float(costs[k]), anchor, offsets[k], boxes[k]
+                best = float(costs[k]), anchor, offsets[k], boxes[k], bool(unclear[k])
         if best is None or (label.optional and best[0] > 5.5):
             continue
-        _, anchor, offset, box = best
+        _, anchor, offset, box, unclear_here = best
         taken[count], count = box, count + 1
+        # A line ends at what is named: a pin, or the arrow about it.
+        leader = None
+        if unclear_here or np.hypot(*np.maximum(np.abs(offset) - half, 0.0)) > label.reach + _LEADERLESS:
+            leader = _LEADER | {"color": label.color, "shrinkB": max(label.reach - 3.0, 3.0)}
         axes.annotate(
             label.text, (anchor.real, anchor.imag), xytext=tuple(offset), textcoords="offset points", ha="center",
-            va="center", color=label.color, fontsize=label.size, fontstyle="italic" if label.optional else "normal",
-            zorder=order, path_effects=[withStroke(linewidth=2.2, foreground="white")],
+            va="center", arrowprops=leader, color=label.color, fontsize=label.size,
+            fontstyle="italic" if label.optional else "normal", zorder=order,
+            path_effects=[withStroke(linewidth=2.2, foreground="white")],
         )  # fmt: skip
+
+
+def _distances(boxes: Floats, places: Floats) -> Floats:
+    """From each box (left, low, right, high) to the nearest of some places."""
+    x, y = places.T
+    left, low, right, high = boxes.T[:, :, None]
+    aside = np.maximum(np.maximum(left - x, x - right), 0.0)
+    above = np.maximum(np.maximum(low - y, y - high), 0.0)
+    return np.asarray(np.hypot(aside, above).min(axis=1))
 
 
 def paper(axes: Axes, places: Complexes) -> Floats:
@@ -138,7 +164,7 @@ def _offsets(label: Label, half: Floats) -> tuple[Floats, Floats]:
     """Where the middle of the text may stand from its anchor (points), shape (n, 2), and how much each displeases."""
     places, strains = [], []
     preferred = math.pi / 4 if label.heading is None else label.heading
-    for stretch, strain in ((1.0, 0.0), (1.8, 0.6), (2.8, 1.4)):
+    for stretch, strain in ((1.0, 0.0), (1.8, 0.6), (2.8, 1.4), (4.5, 3.0)):
         for k in range(_DIRECTIONS):
             angle = preferred + math.tau * k / _DIRECTIONS
             toward = cmath.exp(1j * angle)

@@ -12,7 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -25,6 +25,11 @@ _RIGHT = 0.3
 _TOP = 0.62
 _GAP = 0.42
 _HEIGHT = 1.75
+_EDGE = 0.05  # left of the label of an axis
+_LINE = 0.18  # a line of it
+_TICK = 0.1  # a tick and its gap
+_DIGIT = 0.083  # a digit of its number
+_POWER_LETTERS = 5  # of a power of ten
 BELOW_BARE = 0.6  # below the lowest panel: its axis alone
 BELOW_WITH_LEGEND = 0.95  # and with a legend of one or two rows
 # Inches of a map and its bar of colours.
@@ -34,6 +39,8 @@ _BAR = 1.1
 _MAP_TOP = 0.7
 _MAP_GAP = 0.5
 _MAX_MAP_HEIGHT = 5.2
+_FLAT = 0.8  # height over width below which two maps stand one below the other
+_NARROW = 10.0  # ratio of values up to which levels are at even steps
 _LETTER = 0.56  # mean width of a letter in font sizes
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
@@ -91,11 +98,26 @@ def stack(
         # Given places: to find them from the tick labels would take as long as the rest of the picture.
         axis.set_title("", y=1.02)
         axis.locator_params(axis="y", nbins=5)
-        axis.yaxis.set_label_coords(-(_LEFT - 0.05) / (style.WIDTH - _LEFT - _RIGHT), 0.5, transform=axis.transAxes)
+        axis.yaxis.set_label_coords((_EDGE - _LEFT) / (style.WIDTH - _LEFT - _RIGHT), 0.5, transform=axis.transAxes)
         axis.yaxis.label.set_verticalalignment("top")
     axes[-1].xaxis.set_label_coords(0.5, -0.35 / tall, transform=axes[-1].transAxes)
     axes[-1].set_xlabel(label)
     return figure, axes
+
+
+def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Make room at the left so that no label of an axis lies over the numbers of its ticks; once all is drawn."""
+    numbers = [
+        text for axis in axes for text in axis.yaxis.get_major_formatter().format_ticks(axis.get_yticks().tolist())
+    ]
+    letters = max(len(text) if "$" not in text else _POWER_LETTERS for text in numbers)
+    lines = 1 + max(axis.get_ylabel().count("\n") for axis in axes)
+    left = max(figure.subplotpars.left * style.WIDTH, _EDGE + _LINE * lines + _TICK + _DIGIT * letters)
+    figure.subplots_adjust(left=left / style.WIDTH)
+    for axis in axes:
+        axis.yaxis.set_label_coords((_EDGE - left) / (axis.get_position().width * style.WIDTH), 0.5,
+                                    transform=axis.transAxes)  # fmt: skip
+        axis.yaxis.label.set_verticalalignment("top")
 
 
 def tick_abscissa(axis: Axes, swept: Along) -> None:
@@ -122,13 +144,17 @@ def fitting(labels: Sequence[str]) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Poses in the plane of the two coordinates that vary, shape (lines, nodes), and the lines that are joined."""
+    """Poses in the plane of the two coordinates that vary, shape (lines, nodes), and the lines that are joined.
+
+    `outline` are the curves of the workspace's boundary where the poses are those of a workspace.
+    """
 
     names: tuple[str, str]
     x: Floats
     y: Floats
     equal: bool
     patches: tuple[slice, ...]
+    outline: tuple[Complexes, ...]
 
 
 def plane(study: Study, poses: Poses) -> Plane | None:
@@ -138,21 +164,25 @@ def plane(study: Study, poses: Poses) -> Plane | None:
         return None
     x, y = (poses.values[name].reshape(poses.grid) for name in names)
     quantities = {study.mechanism.quantity(name) for name in names}
-    return Plane((names[0], names[1]), x, y, quantities == {"length"}, poses.patches or (slice(None),))
+    return Plane((names[0], names[1]), x, y, quantities == {"length"}, poses.patches or (slice(None),),
+                 poses.outline)  # fmt: skip
 
 
 def map_sheet(
     study: Study, over: Plane, parts: list[tuple[str, Floats]], heading: str, note: str, *, logarithmic: bool = False
 ) -> Figure:
-    """Maps side by side, or two by two, each with its own bar of colours."""
-    columns = min(len(parts), 2)
+    """Maps side by side, or two by two, flat ones one below the other; each with its own bar of colours."""
+    spans = np.ptp(over.x[np.isfinite(over.x)]), np.ptp(over.y[np.isfinite(over.y)])
+    columns = 1 if over.equal and spans[1] < _FLAT * spans[0] else min(len(parts), 2)
     lines = -(-len(parts) // columns)
     wide = (style.WIDTH - 0.1) / columns - _MAP_LEFT - _BAR
-    spans = np.ptp(over.x[np.isfinite(over.x)]), np.ptp(over.y[np.isfinite(over.y)])
     tall = min(_MAX_MAP_HEIGHT / lines, wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
     tall = max(tall, 1.2)
+    # Of equal scales the height decides: the bar stands beside the map.
+    slack = max(0.0, wide - tall * float(spans[0] / spans[1])) if over.equal and columns == 1 else 0.0
+    wide -= slack
     figure, grid = style.page(
-        len(parts), columns, tall, left=_MAP_LEFT, right=_BAR + 0.1, top=_MAP_TOP, bottom=_MAP_BELOW,
+        len(parts), columns, tall, left=_MAP_LEFT, right=_BAR + 0.1 + slack, top=_MAP_TOP, bottom=_MAP_BELOW,
         across=_MAP_LEFT + _BAR, down=_MAP_BELOW + _MAP_GAP,
     )  # fmt: skip
     title(figure, heading, note, left=_MAP_LEFT)
@@ -174,41 +204,61 @@ def _map(figure: Figure, axes: Axes, bar: Axes, over: Plane, values: Floats, log
     if not known.any():
         bar.set_visible(False)
         return
+    sizes = np.concatenate([node_areas(over.x[patch], over.y[patch]) for patch in over.patches])[known]
     if not logarithmic:
-        levels = style.levels(float(values[known].min()), float(np.quantile(values[known], 0.97)), 9)
+        levels = style.levels(float(values[known].min()), _quantile(values[known], sizes, 0.97), 9)
     else:
-        levels = _powers(values[known])
+        levels = _powers(values[known], sizes)
         # Between nodes powers are interpolated; below the last level is all that is smaller, even 0.
         values, levels = np.log10(np.maximum(values, 1e-3 * levels[0])), np.log10(levels)
     shown = np.ma.masked_invalid(values)
     norm = style.steps(levels, float(shown.min()), float(shown.max()))
     for patch in over.patches:
         style.filled(axes, over.x[patch], over.y[patch], shown[patch], norm, levels)
-        if over.equal:
-            for end in (0, -1):
-                axes.plot(over.x[patch, end], over.y[patch, end], color=style.INK, linewidth=1.2)
+    for curve in over.outline:
+        axes.plot(curve.real, curve.imag, color=style.INK, linewidth=1.2)
     style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
     if logarithmic:
         bar.set_yticks(levels, [_power(10.0**level) for level in levels])
     bar.tick_params(labelsize=8)
 
 
-def _powers(values: Floats) -> Floats:
-    """Levels 1, 2, 5 times powers of ten where values lie close, powers of ten where they do not.
+def node_areas(x: Floats, y: Floats) -> Floats:
+    """Area about each node of a grid."""
+    z = x + 1j * y
+    along, across = np.gradient(z, axis=0), np.gradient(z, axis=1)
+    return np.asarray(np.abs(np.imag(np.conj(along) * across)))
 
-    What a twentieth of the values lies beyond, as near a singularity, gets no levels of its own.
+
+def _quantile(values: Floats, sizes: Floats, share: float) -> float:
+    """The value below which a share of the area lies."""
+    order = np.argsort(values)
+    below = np.cumsum(sizes[order])
+    return float(values[order[min(int(np.searchsorted(below, share * below[-1])), len(order) - 1)]])
+
+
+def _powers(values: Floats, sizes: Floats) -> Floats:
+    """Levels at even steps where values lie close, else 1, 2, 5 times powers of ten, or powers of ten alone.
+
+    What holds on a twentieth of the area (`sizes`), as near a singularity, gets no levels of its own.
     """
-    smallest, largest = (max(float(value), 1e-16) for value in np.quantile(values, (0.05, 0.95)))
+    smallest, largest = (max(_quantile(values, sizes, share), 1e-16) for share in (0.05, 0.95))
+    if largest < _NARROW * smallest:
+        even = style.levels(smallest, largest, 9)
+        return np.asarray(even[even > 0])
     powers = 10.0 ** np.arange(np.floor(np.log10(smallest)), np.ceil(np.log10(largest)) + 1)
     if len(powers) > 4:
         step = -(-len(powers) // 9)
         return np.asarray(powers[::-1][::step][::-1])
     fine = np.outer(powers, (1, 2, 5)).ravel()
-    kept = (fine >= 0.4 * smallest) & (fine <= 2.5 * largest)
-    return fine[kept] if np.count_nonzero(kept) > 1 else fine
+    # From the last level below the smallest to the first above the largest.
+    first, last = np.searchsorted(fine, smallest, "right") - 1, np.searchsorted(fine, largest)
+    return np.asarray(fine[max(first, 0) : last + 1])
 
 
 def _power(level: float) -> str:
-    digit, power = f"{level:.0e}".split("e")
-    ten = f"10$^{{{int(power)}}}$"
-    return ten if digit == "1" else f"{digit}\N{MIDDLE DOT}{ten}"
+    if 1e-2 <= level < 1e4:
+        return f"{level:g}"
+    power = int(np.floor(np.log10(level) + 1e-9))
+    digits, ten = f"{level / 10.0**power:.3g}", f"10$^{{{power}}}$"
+    return ten if digits == "1" else f"{digits}\N{MIDDLE DOT}{ten}"

@@ -11,19 +11,21 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.poses import Shown, pose_in_words
+from mechdesign.analyses.poses import Shown, pose_in_words, radians
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Link, Slot
-from mechdesign.numerics.arrays import Complexes, Ints
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures.framing import extent
 from mechdesign.study import Study
 
 _TRAVEL_POSES = 100  # poses from which the travel of the slides is taken
 # Two poses are one where no point is farther apart than this part of the mechanism's size.
 _SAME_POSE = 1e-3
+_FEW_POSES = 60  # fewer would show a curve as chords
+_TRACE_POSES = 240  # of a curve between few poses, about
 
 
 @dataclass(frozen=True)
@@ -192,6 +194,36 @@ class Sweep(Shown):
         }
 
     @cached_property
+    def traces(self) -> dict[str, Complexes]:
+        """Path of every moving point as a curve: solved between the poses, too, where these are few."""
+        count = len(self.rows)
+        if count < 2 or count >= _FEW_POSES or not self.poses.motion or self.poses.places:
+            # A closed path is listed without its begin at its end.
+            return {
+                name: np.append(path, path[:1]) if self.poses.closed else path for name, path in self.places.items()
+            }
+        names = self.poses.groups[0].names
+        plan = self.mechanism.plan(names)
+        parts = -(-_TRACE_POSES // count)
+        given = [radians(self.study, coordinate, self._between(name, parts))
+                 for coordinate, name in zip(plan.structure.given, names, strict=True)]  # fmt: skip
+        solved = plan.solve(given)
+        return {name: np.where(solved.valid, solved.point(name), complex(np.nan, np.nan)) for name in self.places}
+
+    def _between(self, name: str, parts: int) -> Floats:
+        """Values of a given coordinate at the poses and evenly between each two; on a bent path by cubics."""
+        poses, ends = self.poses, self.rows[np.arange(len(self.rows) + self.poses.closed) % len(self.rows)]
+        values = poses.values[name][ends]
+        begin = end = steps = np.diff(values)
+        if np.any(poses.bends.get(name, 0.0)):
+            bent = [poses.values[each][ends] for each, bends in poses.bends.items() if np.any(bends)]
+            slopes, length = poses.slopes[name][ends], np.linalg.norm(np.diff(bent), axis=0)
+            begin, end = slopes[:-1] * length, slopes[1:] * length
+        t = np.arange(parts)[:, None] / parts
+        cubic = values[:-1] + t * steps + t * (1 - t) * ((1 - t) * (begin - steps) - t * (end - steps))
+        return np.append(cubic.T.ravel(), values[-1])
+
+    @cached_property
     def travel(self) -> dict[str, tuple[float, float]]:
         """Range of each slide."""
         some = self.valid[np.unique(np.linspace(0, len(self.valid) - 1, _TRAVEL_POSES).astype(int))]
@@ -202,7 +234,7 @@ class Sweep(Shown):
         """Everything the motion reaches: points, their paths and the ends of guides."""
         mechanism, configuration = self.mechanism, self.configuration
         ground = [configuration.point(point)[:1] for point in link_points(mechanism.description.links[GROUND])]
-        reached = [np.empty(0, dtype=complex), *ground, *self.places.values()]
+        reached = [np.empty(0, dtype=complex), *ground, *self.traces.values()]
         for index in self.valid[[0, -1]] if len(self.valid) else ():
             scene = pose(mechanism, configuration, int(index))
             if scene is not None:

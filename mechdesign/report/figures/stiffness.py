@@ -17,12 +17,12 @@ from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.analyses.stiffness.elements import corners_of, course_of
 from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.mechanism import Configuration
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism, point_labels
-from mechdesign.report.figures.framing import MAX_HEIGHT, TITLE, framed
+from mechdesign.report.figures.drawing import ARC, Pen, draw_mechanism, point_labels
+from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, TITLE, fit, framed, windows
 from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.panels import Plane, along, map_sheet, plane
+from mechdesign.report.figures.panels import Plane, along, map_sheet, plane, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
@@ -35,6 +35,22 @@ _COIL_SWING = 0.12  # half the width of a coil over its length
 _COIL_TURNS = 7
 _COIL_ORDER = 5.0
 _LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
+_LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
+_ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
+_FLAT = 0.02  # part of its value by which a stiffness changes that is written, not drawn
+_TAIL = 0.04  # share of stiffnesses at either end of which ...
+_BEYOND = 10.0  # ... no more is drawn than this ratio beyond the others
+_LOGARITHMIC = 5.0  # ratio of values above which their axis is logarithmic
+_PALE = "#D5DCE4"  # of the mechanism without load, in the legend
+# Main axes of the ellipse: column, words, angle from that of k_max, colour and dashes.
+_MAIN_AXES: tuple[tuple[str, str, float, str, Any], ...] = (
+    ("k_min", "softest", np.pi / 2, style.VERMILION, "-"),
+    ("k_max", "stiffest", 0.0, style.BLUE, (0, (2, 1))),
+)
+# Inches.
+_PANEL_TITLE = 0.17  # a line
+_HEADING = 0.32
+_LEGEND = 0.3
 # Shape functions of a deflected beam, cubic between its ends as bending makes it, at these parts of its length.
 _ALONG = np.linspace(0.0, 1.0, 25)
 _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _ALONG**3,
@@ -95,61 +111,143 @@ def _coils(study: Study, drawn: Drawn, scene: Scene) -> list[Coil]:
 
 
 def _directions(study: Study, result: Result) -> Figure | None:
-    """Stiffness to a force, over the direction of the force, with its principal values marked."""
-    table, soft = result.tables["stiffness"], result.tables["compliance"]
-    known = np.flatnonzero(np.isfinite(soft["C11"]) & np.isfinite(table["k_max"]))
-    if not len(known):
+    """Where a force of every direction moves the asked point: an ellipse at it, in a few poses, with its main axes."""
+    table, soft, poses = result.tables["stiffness"], result.tables["compliance"], result.drawn["poses"]
+    shown, section = result.drawn["shown"], study.stiffness
+    assert section is not None
+    index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
+    posed = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in spread(index, MAX_DIRECTIONS)}
+    scenes = {k: scene for k, scene in posed.items() if scene is not None}
+    if not scenes:
         return None
-    rows = known[np.unique(np.linspace(0, len(known) - 1, MAX_DIRECTIONS).astype(int))]
-    unit, poses, factor = study.units.label("stiffness"), result.drawn["poses"], study.units.angle_factor
-    figure = style.new_figure(4.2)
-    axes = figure.add_subplot()
-    for k, row in enumerate(rows):
-        color, angle = style.PALETTE[k], float(table["k_angle"][row])
-        # A sharp peak lies between the points of an even grid: the principal directions are among them.
-        principal = np.mod([angle * factor, angle * factor + np.pi / 2], np.pi)
-        turns = np.sort(np.append(np.linspace(0, np.pi, 721), principal))
+    rows = shown.rows[list(scenes)]
+    soft_ends = 1 / table["k_min"][rows]
+    if not (np.isfinite(soft_ends).all() and (soft_ends > 0).all()):
+        return None
+    if soft_ends.max() < _ONE_SCALE * soft_ends.min():
+        soft_ends[:] = soft_ends.max()
+    force, span = _force(study), max(scene.span for scene in scenes.values())
+    scales = [force * round_down(_LARGEST_ELLIPSE * span / (force * end)) for end in soft_ends.tolist()]
+    turns, ellipses = np.exp(1j * np.linspace(0, 2 * np.pi, 361)), []
+    for row, scale in zip(rows, scales, strict=True):
         xx, xy, yy = (float(soft[name][row]) for name in ("C11", "C12", "C22"))
-        moved = xx * np.cos(turns) ** 2 + 2 * xy * np.cos(turns) * np.sin(turns) + yy * np.sin(turns) ** 2
-        axes.plot(turns / factor, 1 / moved, color=color, label=pose_in_words(study, poses, int(row)))
-        softest = np.mod(angle + np.pi / 2 / factor, np.pi / factor)
-        axes.plot([angle, softest], [table["k_max"][row], table["k_min"][row]], "o", color=color, markersize=5)
-    if table["k_max"][rows].max() > 4 * table["k_min"][rows].min():
-        axes.set_yscale("log")
-    axes.set_xlim(0, np.pi / factor)
-    axes.set_xticks(np.linspace(0, np.pi, 7) / factor)
-    axes.set_xlabel(style.axis_label("direction of the force", study.units.label("angle")))
-    axes.set_ylabel(style.axis_label("stiffness (dots: k_min, k_max)", unit))
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+        ellipses.append(scale * (xx * turns.real + xy * turns.imag + 1j * (xy * turns.real + yy * turns.imag)))
+    places = [[*scene.points.values(), *(scene.points[section.at] + ellipse)]
+              for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
+    words = f"{force:g} {style.printed(study.units.label('force'))}"
+    heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
+    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=4)
+    units = study.units.label("stiffness"), study.units.label("angle")
+    shapes = zip(panels, scenes.items(), rows, scales, ellipses, strict=True)
+    for axes, (k, scene), row, scale, ellipse in shapes:
+        at = scene.points[section.at]
+        draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_small(len(panels)))
+        axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
+        axes.plot((at + ellipse).real, (at + ellipse).imag, color=style.INK, linewidth=1.2, zorder=5)
+        angle, said = float(table["k_angle"][row]) * study.units.angle_factor, []
+        for name, what, turn, color, dashes in _MAIN_AXES:
+            stiff, way = float(table[name][row]), np.exp(1j * (angle + turn))
+            line = at + scale / stiff * way * np.array([-1, 1])
+            axes.plot(line.real, line.imag, color=color, linestyle=dashes, linewidth=1.8, zorder=5.2)
+            toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
+            said.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
+        axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
+        said = [pose_in_words(study, poses, int(row)), *said, f"drawn {scale / force:g} times as large"]
+        axes.set_title("\n".join(said), loc="left", fontsize=8.5)
+    handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{what} direction, {name}")
+               for name, what, _, color, dashes in _MAIN_AXES]  # fmt: skip
+    figure.legend(handles=handles, loc="lower left", ncols=2, bbox_to_anchor=(LEFT / style.WIDTH - 0.02, 0.0))
     return figure
+
+
+def _force(study: Study) -> float:
+    """The force of an ellipse: about the largest of the study's loads, or else one unit."""
+    assert study.stiffness is not None
+    loads = [abs(complex(*load[:2])) for load in study.stiffness.loads]
+    return round_down(max(loads)) if any(loads) else 1.0
+
+
+def _panels(
+    study: Study, places: Complexes, count: int, heading: str, lines: int = 3
+) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    """Drawings of one scale, two in a row, under a heading, with room for titles of some lines and a legend."""
+    columns = min(count, 2)
+    window = fit(places, (style.WIDTH - RIGHT - LEFT * columns) / columns, MAX_HEIGHT if columns == 1 else 3.2)
+    above = _PANEL_TITLE * lines + ABOVE
+    figure, axes = windows(window, study.units.label("length"), count, columns, above=above, top=_HEADING,
+                           below=BELOW + _LEGEND)  # fmt: skip
+    figure.text(LEFT / style.WIDTH, 1 - 0.1 / figure.get_figheight(), heading[0].upper() + heading[1:], va="top",
+                fontsize=11)  # fmt: skip
+    return figure, axes
+
+
+def _small(panels: int) -> float:
+    """Size of symbols where several drawings stand side by side."""
+    return 1.0 if panels == 1 else 0.7
+
+
+def spread(values: Ints, most: int) -> Ints:
+    """Of many values some, evenly."""
+    return (
+        values[np.unique(np.linspace(0, len(values) - 1, min(most, len(values))).astype(int))]
+        if len(values)
+        else values
+    )
 
 
 def _curves(study: Study, result: Result) -> Figure | None:
-    """Stiffnesses to a force and to a moment along a path; what is rigid or free everywhere has no curve."""
+    """Stiffnesses to a force and to a moment along a path; what is the same everywhere is written, not drawn."""
     table, poses, units = result.tables["stiffness"], result.drawn["poses"], study.units
     over = along(study, poses)
     assert over is not None
-    forces = {"k_x": ("-", None), "k_y": ("-", None), "k_min": ("--", style.INK), "k_max": (":", style.INK)}
-    moments = {"k_phi": ("-", style.GREEN)}
-    panels: list[tuple[str, str, dict[str, Any]]] = [
-        ("stiffness to a force", "stiffness", forces),
-        ("to a moment", "rotational_stiffness", moments),
-    ]
-    panels = [each for each in panels if any(name in table and np.isfinite(table[name]).any() for name in each[2])]
-    if not panels:
+    forces = {"k_x": ("-", style.BLUE, "o"), "k_y": ("-", style.ORANGE, "s"), "k_min": ("--", style.INK, ""),
+              "k_max": (":", style.INK, "")}  # fmt: skip
+    moments = {"k_phi": ("-", style.GREEN, "")}
+    panels = []
+    for about, kind, looks in (("stiffness to a force", "stiffness", forces),
+                               ("to a moment", "rotational_stiffness", moments)):  # fmt: skip
+        known = [name for name in looks if name in table and np.isfinite(table[name]).any()]
+        flat = [name for name in known if _constant(table[name])]
+        panels.append((about, units.label(kind), looks, [name for name in known if name not in flat], flat))
+    if not any(curves or flat for *_, curves, flat in panels):
         return None
-    figure = style.new_figure(5.2 if len(panels) > 1 else 3.4)
-    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, (about, kind, looks) in zip(axes, panels, strict=True):
-        for name, (look, color) in looks.items():
+    notes = [f"{name} = {quantity(float(np.nanmean(table[name])), unit)}"
+             for _, unit, _, _, flat in panels for name in flat]  # fmt: skip
+    notes += [f"{name} rigid" for name in (*forces, *moments) if name in table and np.isinf(table[name]).all()]
+    drawn = [panel for panel in panels if panel[3]] or [panel for panel in panels if panel[4]]
+    figure = style.new_figure(5.2 if len(drawn) > 1 else 3.6)
+    axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (about, unit, looks, curves, flat) in zip(axes, drawn, strict=True):
+        for k, name in enumerate(curves or flat):
             values = np.where(np.isfinite(table[name]), table[name], np.nan)
-            axis.plot(over.values, values, look, label=name, color=color)
-        axis.set_ylabel(style.axis_label(about, units.label(kind)))
-        axis.set_yscale("log")
+            dashes, color, marker = looks[name]
+            each = max(1, len(values) // 12)
+            axis.plot(over.values, values, dashes, label=name, color=color, marker=marker, markersize=5,
+                      markevery=(k * each // 2, each), linewidth=2.4 if marker else 1.4)  # fmt: skip
+        axis.set_ylabel(style.axis_label(about, unit))
+        low, high = axis.dataLim.intervaly
+        if high > _LOGARITHMIC * low > 0:
+            axis.set_yscale("log")
+            # Near a singularity a stiffness grows or vanishes without bounds; what it is elsewhere stays legible.
+            every = np.concatenate(
+                [table[name][np.isfinite(table[name]) & (table[name] > 0)] for name in curves or flat]
+            )
+            usual = np.quantile(every, (_TAIL, 1 - _TAIL)) * (1 / _BEYOND, _BEYOND)
+            axis.set_ylim(max(0.8 * low, usual[0]), min(1.25 * high, usual[1]))
+        else:
+            axis.set_ylim(0, 1.1 * high)
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes[0].set_title("Stiffness along the motion" + "; everywhere the same: " * bool(notes) + ", ".join(notes),
+                      loc="left", fontsize=10)  # fmt: skip
     axes[-1].set_xlabel(over.label)
+    tick_abscissa(axes[-1], over)
     figure.align_ylabels(axes)
     return figure
+
+
+def _constant(values: Floats) -> bool:
+    known = values[np.isfinite(values)]
+    return len(known) == len(values) and float(np.ptp(known)) <= _FLAT * float(np.abs(known).max())
 
 
 def _map(study: Study, result: Result, over: Plane) -> Figure:
@@ -194,7 +292,7 @@ class Coil:
         span = self.anchor - self.place
         anchors = tuple(self.place + share * span for share in (0.5, 0.56, 0.44, 0.62, 0.38))
         heading = float(np.angle(1j * span if (1j * span).real > 0 else -1j * span))
-        return Label(self.text, anchors, style.VERMILION, 11, heading, 9.5)
+        return Label(self.text, anchors, style.VERMILION, 16, heading, 9.5)
 
 
 def quantity(value: float, unit: str) -> str:
@@ -202,8 +300,8 @@ def quantity(value: float, unit: str) -> str:
     if np.isinf(value):
         return "rigid"
     if 1e-2 <= value < 1e5:
-        return f"{value:.3g} {unit}" if value < 1e3 else f"{value:.0f} {unit}"
-    return f"{style.in_powers(value)} {unit}"
+        return f"{value:.3g} {style.printed(unit)}" if value < 1e3 else f"{value:.0f} {style.printed(unit)}"
+    return f"{style.in_powers(value)} {style.printed(unit)}"
 
 
 def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:
@@ -240,11 +338,11 @@ def posed(study: Study, poses: Poses, drawn: Drawn, places: Complexes, what: str
 
 
 def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
-    """The whole mechanism where each load moves it."""
+    """The whole mechanism where each load moves it, a panel a load, each with its own magnification."""
     scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
     if scene is None or not drawn.twists:
         return None
-    shapes = _shapes(drawn, scene)
+    shapes, at = _shapes(drawn, scene), scene.points[asked.section.at]
     loads = np.array(asked.section.loads[:MAX_LOADS])[:, : asked.size]
     sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
     if not np.isfinite(sizes).all():
@@ -252,14 +350,28 @@ def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     scales = [round_down(_LARGEST_MOVE * scene.span / max(size, 1e-300)) for size in sizes]
     bent = [[rest + scale * move[:, k] for rest, move in shapes] for k, scale in enumerate(scales)]
     places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
-    figure, axes = posed(study, poses, drawn, places, "deflections, enlarged,", faint=True)
-    for color, lines, each, scale in zip(style.PALETTE, bent, loads, scales, strict=False):
+    where = pose_in_words(study, poses, drawn.row)
+    figure, panels = _panels(study, places, len(loads), f"deflections, enlarged, at {where}")
+    length = study.units.label("length")
+    for k, (axes, lines, load, scale) in enumerate(zip(panels, bent, loads.tolist(), scales, strict=True)):
+        draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=_small(len(panels)))
         for line in lines:
-            axes.plot(line.real, line.imag, color=color, linewidth=1.8, zorder=5)
-        axes.plot([], [], color=color, linewidth=1.8, label=_in_words(study, tuple(each), scale))
-        # The asked point begins the first line.
-        axes.plot([lines[0][0].real], [lines[0][0].imag], "o", color=color, zorder=6)
-    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
+            axes.plot(line.real, line.imag, color=style.INK, linewidth=1.8, zorder=5)
+        moved, pen = lines[0][0], Pen(axes, order=5.5)
+        axes.plot([at.real, moved.real], [at.imag, moved.imag], ":", color=style.BLUE, linewidth=1.4, zorder=5.2)
+        axes.plot([moved.real], [moved.imag], "o", color=style.BLUE, zorder=6)
+        # The arrows act where the load does: at the asked point, here where it has moved.
+        if force := complex(*load[:2]):
+            pen.force(moved, force / abs(force), style.VERMILION)
+        if load[2:] and load[2]:
+            pen.arc(moved, -np.pi / 4, np.copysign(1.5 * np.pi, load[2]), ARC, style.VERMILION)
+        size, name = abs(shapes[0][1][0, k]), asked.section.at
+        axes.set_title(f"{_in_words(study, tuple(load))} at {name}\n{name} moves {size:.3g} {length}\n"
+                       f"drawn {scale:g} times as large", loc="left", fontsize=9)  # fmt: skip
+    handles = [Line2D([], [], color=color, linewidth=width, label=words)
+               for color, width, words in ((_PALE, 6.0, "without load"), (style.INK, 1.8, "under the load"),
+                                           (style.VERMILION, 1.8, "load"))]  # fmt: skip
+    figure.legend(handles=handles, loc="lower left", ncols=3, bbox_to_anchor=(LEFT / style.WIDTH - 0.02, 0.0))
     return figure
 
 
@@ -298,7 +410,9 @@ def _bent(
     beam = ways[0].beam
     assert beam is not None
     course = course_of(beam.link, configuration)
-    sitting = [(ways[0].a, corners_of(beam.link)[0]), *((edge.b, edge.point) for edge in ways)]
+    # The rod of a telescopic leg slides in its cylinder, whose pin stays where it is.
+    root = beam.link.name if beam.link.telescopic else ways[0].a
+    sitting = [(root, corners_of(beam.link)[0]), *((edge.b, edge.point) for edge in ways)]
     feet = [float(course.foot(point, configuration.point(point))[0]) for _, point in sitting]
     bases = [complex(course.place(np.array([foot]))[0]) for foot in feet]
     order = sorted(range(len(feet)), key=feet.__getitem__)
@@ -363,11 +477,11 @@ def round_down(value: float) -> float:
     return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
 
 
-def _in_words(study: Study, load: tuple[float, ...], scale: float) -> str:
+def _in_words(study: Study, load: tuple[float, ...]) -> str:
     units = [study.units.label(kind) for kind in ("force", "force", "moment")]
     parts = [
-        f"{name} = {value:g} {unit}"
+        f"{name} = {value:g} {style.printed(unit)}"
         for name, value, unit in zip(("fx", "fy", "mz"), load, units, strict=False)
         if value
     ]
-    return f"{', '.join(parts) or 'no load'} (x {scale:g})"
+    return ", ".join(parts) or "no load"

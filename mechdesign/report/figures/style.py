@@ -133,10 +133,15 @@ def filled(axes: Axes, x: Floats, y: Floats, values: Floats, norm: BoundaryNorm,
 
 
 def axis_label(name: str, unit: str = "") -> str:
-    """``name [unit]``, or the name alone where there is no unit; powers and products as they are set in print."""
-    for plain, printed in _PRINTED.items():
-        unit = unit.replace(plain, printed)
-    return f"{name} [{unit}]" if unit else name
+    """``name [unit]``, or the name alone where there is no unit."""
+    return f"{name} [{printed(unit)}]" if unit else name
+
+
+def printed(unit: str) -> str:
+    """A unit with powers and products as they are set in print."""
+    for plain, sign in _PRINTED.items():
+        unit = unit.replace(plain, sign)
+    return unit
 
 
 def in_powers(value: float) -> str:

@@ -19,6 +19,7 @@ from mechdesign.report.figures.panels import (
     MAX_PANELS,
     Along,
     Plane,
+    clear_of_ticks,
     fitting,
     legend_below,
     map_sheet,
@@ -110,6 +111,7 @@ def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
         axis.set_ylabel(style.axis_label("error", unit))
         axis.set_title(heading(output, order), loc="left", fontsize=9.5)
     legend_below(figure, list(entries.values()), list(entries))
+    clear_of_ticks(figure, axes)
     return figure
 
 
@@ -132,6 +134,7 @@ def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
     looks = [_line(look(method)) | ({} if single else {"color": style.INK}) for method in known]
     legend_below(figure, [Line2D([], [], markersize=4, **shown) for shown in looks],
                  [look(method).words for method in known])  # fmt: skip
+    clear_of_ticks(figure, axes)
     return figure
 
 

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle
 from mechdesign.analyses.reliability.simulation import CELLS
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.panels import MAX_PANELS, legend_below, number, stack, title
+from mechdesign.report.figures.panels import MAX_PANELS, clear_of_ticks, legend_below, number, stack, title
 from mechdesign.report.figures.reliability.looks import (
     SUFFIXES,
     Sampled,
@@ -117,6 +117,7 @@ def convergence_figure(given: Sampled) -> Figure:
         axis.ticklabel_format(axis="y", useOffset=False)
     _sample_axis(axes[-1], table["samples"])
     legend_below(figure, *axes[0].get_legend_handles_labels())
+    clear_of_ticks(figure, axes)
     return figure
 
 

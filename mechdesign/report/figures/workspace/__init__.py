@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -11,18 +12,27 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, Normalize
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import MaxNLocator
 
+from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.workspace.tables import curves
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.panels import coordinate_label
+from mechdesign.report.figures.panels import (
+    MAX_PANELS,
+    Along,
+    coordinate_label,
+    legend_below,
+    node_areas,
+    stack,
+    tick_abscissa,
+)
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace.regions import (
     MAX_REGIONS,
@@ -44,8 +54,12 @@ from mechdesign.study.schema.workspace import Over
 
 # The largest speed ratios may belong to dead centres, where they grow without bounds: this share has its own colours.
 _SHOWN_RATIOS = 0.97
-SIDES = {"inner": style.BLUE, "outer": style.VERMILION}
-DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)), (0, (5, 1.5, 1.5, 1.5)))
+SIDES = ("inner", "outer")
+# Of the drives.
+LINE_COLORS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
+DASHES: tuple[Any, ...] = ("-", (0, (6, 1)), (0, (6, 1, 1.5, 1)), (0, (2, 1)))
+_DRIVES_HEIGHT = 1.9  # inches
+_SMALL_SYMBOLS = 0.7
 CIRCLE = ("circle_x", "circle_y", "circle_radius")
 RECTANGLE = ("rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height")
 _HALO = [withStroke(linewidth=2.2, foreground="white")]
@@ -61,8 +75,8 @@ CLEAR_OF_NAMES = 18.0
 def figures(study: Study, result: Result) -> Mapping[str, Figure]:
     """A map of each local index, the boundary with poses, the largest shapes inside, the drives along the boundary.
 
-    Where several values of held coordinates are asked for, maps show them side by side and the others the first. Of a
-    point with one degree of freedom its path is drawn; over a range of a held coordinate, what ends the region.
+    Several values of held coordinates stand side by side. Of a point with one degree of freedom its path is drawn; over
+    a range of a held coordinate, what ends the region.
     """
     if "path" in result.tables:
         return path_figures(study, result)
@@ -73,10 +87,13 @@ def figures(study: Study, result: Result) -> Mapping[str, Figure]:
         return {}
     drawn = Gallery()
     drawn.add("of indices", map_figures, study, found)
-    drawn.add("workspace", workspace_figure, study, result, found[0])
+    if len(found) == 1:
+        drawn.add("workspace", workspace_figure, study, result, found[0])
+    else:
+        drawn.add("workspace", _side_by_side, study, found)
     drawn.add("inscribed", inscribed_figure, study, result, found)
-    if len(found[0].boundary):
-        drawn.add("drives", _drives, study, found[0].boundary)
+    if any(len(region.boundary) for region in found):
+        drawn.add("drives", drives_figure, study, found)
     return drawn
 
 
@@ -105,26 +122,70 @@ def _sketch(study: Study) -> Complexes:
     return np.concatenate([np.ravel(mechanism.sketch_configuration.point(point)) for point in mechanism.points])
 
 
-def _drives(study: Study, boundary: Table) -> Figure:
-    """Drive values along the boundary over the angle of the scan [S1, Fig. 7]."""
-    names = study.mechanism.drives
-    figure = style.new_figure(3.4 if len(names) < 4 else 5.0)
-    axes = figure.add_subplot()
-    named = set()
-    for number, name in enumerate(names):
-        for rows in curves(boundary):
-            side = str(boundary["side"][rows[0]])
-            label = f"{name}, {side} boundary"
-            axes.plot(boundary["theta"][rows], boundary[name][rows], color=SIDES[side],
-                      linestyle=DASHES[number % len(DASHES)], label="" if label in named else label)  # fmt: skip
-            named.add(label)
-    axes.set_xlim(float(boundary["theta"].min()), float(boundary["theta"].max()))
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 3, 4.5, 6, 9, 10]))
-    axes.set_title("Drives along the boundary of the workspace", loc="left")
-    axes.set_xlabel(style.axis_label("angle of the scan", study.units.label("angle")))
-    units = {study.units.label(study.mechanism.quantity(name)) for name in names}
-    axes.set_ylabel(style.axis_label(", ".join(names), units.pop() if len(units) == 1 else ""))
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+def _side_by_side(study: Study, found: Sequence[Region]) -> Figure:
+    """The region and its boundary for several values of held coordinates, each with the mechanism in a pose there."""
+    section, mechanism, shown = study.workspace, study.mechanism, some(found)
+    assert section is not None
+    poses = [_pose_inside(study, region) for region in shown]
+    reached = [np.ravel(each.point(point)) for each in poses for point in mechanism.points]
+    places = np.concatenate([*(region.places() for region in shown), *(z[np.isfinite(z)] for z in reached)])
+    title = f"workspace of point {section.point}, the mechanism where it is best conditioned"
+    page = sheet(study, places, [region.title for region in shown], title, bar=False, pad=ROOM)
+    for axes, region, configuration in zip(page.axes, shown, poses, strict=True):
+        fill(axes, region.local)
+        draw_mechanism(axes, mechanism, configuration, faint=True, size=_SMALL_SYMBOLS)
+    page.ends(shown)
+    return page.figure
+
+
+def _pose_inside(study: Study, region: Region) -> Configuration:
+    """The pose at the node of a region where the Jacobian is conditioned best."""
+    assert study.workspace is not None
+    mechanism, point, local = study.mechanism, study.workspace.point, region.local
+    best = int(np.argmax(np.nan_to_num(local["inverse_condition"], nan=-1.0)))
+    given = {f"{point}.x": local["x"][best], f"{point}.y": local["y"][best], **region.held}
+    plan = mechanism.plan(tuple(given))
+    values = [np.atleast_1d(radians(study, mechanism.coordinate(name), value)) for name, value in given.items()]
+    return plan.solve(values, limits=False)
+
+
+def drives_figure(study: Study, found: Sequence[Region]) -> Figure:
+    """Drive values along the boundary over the angle of the scan [S1, Fig. 7]: a panel a side of each region."""
+    names, mechanism = study.mechanism.drives, study.mechanism
+    parts = [
+        (region.boundary, side, region.title)
+        for region in some([region for region in found if len(region.boundary)])
+        for side in SIDES
+        if (region.boundary["side"] == side).any()
+    ][:MAX_PANELS]
+    label = style.axis_label("angle of the ray from the centre of the scan", study.units.label("angle"))
+    figure, panels = stack(len(parts), "Drives along the boundary of the workspace", label, tall=_DRIVES_HEIGHT)
+    units = {study.units.label(mechanism.quantity(name)) for name in names}
+    limits: dict[float, list[str]] = {}
+    for bound in mechanism.bounds:
+        for end in bound.ends(mechanism.nominal) if bound.drive else ():
+            if end is not None:
+                value = round(float(np.asarray(in_study_units(study, bound.coordinate, end))), 9)
+                limits.setdefault(value, []).append(bound.coordinate.name)
+    entries: dict[str, Line2D] = {}
+    for axes, (boundary, side, where) in zip(panels, parts, strict=True):
+        for number, name in enumerate(names):
+            for rows in curves(boundary):
+                if boundary["side"][rows[0]] != side:
+                    continue
+                own = boundary.take(rows)
+                (entries[name],) = axes.plot(own["theta"], own[name], color=LINE_COLORS[number % len(LINE_COLORS)],
+                                             linestyle=DASHES[number % len(DASHES)], linewidth=1.9)  # fmt: skip
+        for limit, limited in limits.items():
+            entries["limit of a drive"] = axes.axhline(limit, color=style.INK, linewidth=0.9, zorder=1.5)
+            axes.annotate(", ".join(limited), (1, limit), (-2, 1.5), xycoords=axes.get_yaxis_transform(), ha="right",
+                          textcoords="offset points", fontsize=7.5, path_effects=_HALO)  # fmt: skip
+        axes.set_title(", ".join(filter(None, (where, f"{side} boundary"))), loc="left", fontsize=9.5)
+        axes.set_ylabel(style.axis_label("drive", "".join(units) if len(units) == 1 else ""))
+    every = np.concatenate([boundary["theta"] for boundary, *_ in parts])
+    tick_abscissa(panels[-1], Along(every, label))
+    panels[-1].set_xlim(float(every.min()), float(every.max()))
+    legend_below(figure, list(entries.values()), list(entries))
     return figure
 
 
@@ -204,9 +265,14 @@ def _speed(study: Study, path: Table) -> Figure:
     figure = style.new_figure(3.4)
     axes = figure.add_subplot()
     pieces = _pieces(path)
-    for rows, color in zip(pieces, style.PALETTE * len(pieces), strict=False):
+    looks = zip(style.PALETTE * len(pieces), DASHES * len(pieces), strict=False)
+    for rows, (color, dashes) in zip(pieces, looks, strict=False):
         axes.plot(
-            path[drive][rows], path["speed_ratio"][rows], color=color, label=f"piece {int(path['piece'][rows[0]])}"
+            path[drive][rows],
+            path["speed_ratio"][rows],
+            color=color,
+            linestyle=dashes,
+            label=f"piece {int(path['piece'][rows[0]])}",
         )
     top, tail = _ends(path["speed_ratio"])
     axes.set_ylim(0, 1.3 * top if tail else None)
@@ -396,7 +462,7 @@ def _norm(found: Sequence[Region], column: str) -> BoundaryNorm:
     """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
     patches = [patch for region in found for patch in grids(region.local, column)]
     values = np.concatenate([z.ravel() for _, _, z in patches])
-    areas = np.concatenate([_node_areas(x, y).ravel() for x, y, _ in patches])
+    areas = np.concatenate([node_areas(x, y).ravel() for x, y, _ in patches])
     finite = np.isfinite(values)
     values, areas = values[finite], areas[finite]
     order = np.argsort(values)
@@ -408,10 +474,3 @@ def _norm(found: Sequence[Region], column: str) -> BoundaryNorm:
     else:
         high = top
     return style.steps(style.levels(0.0 if 0 <= low < 0.5 * high else low, high, 11), low, top)
-
-
-def _node_areas(x: Floats, y: Floats) -> Floats:
-    """Area about each node of a grid."""
-    z = x + 1j * y
-    along, across = np.gradient(z, axis=0), np.gradient(z, axis=1)
-    return np.asarray(np.abs(np.imag(np.conj(along) * across)))

@@ -34,7 +34,7 @@ LOOKS: Mapping[str, tuple[str, Any, float, str]] = {
     "singularity": (style.VERMILION, (0, (6, 1.5, 1, 1.5)), 1.5, "ends at a singularity"),
     "other": (style.FAINT, "-", 1.5, "a piece that is left out"),
     "forward": (style.VERMILION, "-", 1.8, "parallel singularity"),
-    "inverse": (style.GREEN, "-", 1.8, "leg in line (serial singularity)"),
+    "inverse": (style.GREEN, (0, (3, 1)), 1.8, "leg in line (serial singularity)"),
 }
 # Of the region itself; opaque, so that patches leave no seams.
 PALE = "#D5EBF8"
@@ -164,7 +164,8 @@ def loci(axes: Axes, region: Region) -> set[str]:
         if len(edge) and np.abs(edge - middle).min() < near:
             continue
         kind = str(table["kind"][rows[0]])
-        axes.plot(table["x"][rows], table["y"][rows], color=LOOKS[kind][0], linewidth=LOOKS[kind][2], zorder=3.2,
+        axes.plot(table["x"][rows], table["y"][rows], color=LOOKS[kind][0], linestyle=LOOKS[kind][1],
+                  linewidth=LOOKS[kind][2], zorder=3.2,
                   marker="o" if len(rows) == 1 else "", markersize=4,
                   path_effects=[withStroke(linewidth=3.4, foreground="white")])  # fmt: skip
         seen.add(kind)
