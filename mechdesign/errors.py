@@ -29,6 +29,11 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {near!r}?" if near is not None else ""
 
 
+def counted(number: int, what: str) -> str:
+    """``1 drive``, ``2 drives``."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
 class MechdesignError(Exception):
     """Base of every error that mechdesign raises on purpose."""
 

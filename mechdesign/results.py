@@ -114,6 +114,7 @@ class Result:
     files: Mapping[str, str] = field(default_factory=dict)  # texts to be written with the tables, by their file names
     interrupted: str = ""  # how far it came, where it is the finished part of an interrupted computation
     drawn: Mapping[str, Any] = field(default_factory=dict)  # what pictures show besides: solved poses, springs; by name
+    absent: Mapping[str, str] = field(default_factory=dict)  # columns and tables without values, by name: why
 
     def __repr__(self) -> str:
         tables = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())

@@ -48,11 +48,13 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
     Raises
     ------
     UnknownColumnError
-        If there is no such column, it holds words, or its rows have several units.
+        If there is no such column (why, where the result says so), it holds words, or its rows have several units.
     """
     table, column, rows = _locate(result, path)
     counts = rows
     values = table[column]
+    if column in result.absent and np.isnan(values).all():
+        raise UnknownColumnError(_why_absent(result, column))
     if not table.column(column).numeric:
         raise UnknownColumnError(
             f"column {column!r} of {table.name} holds words, which cannot be compared with a number"
@@ -107,8 +109,15 @@ def _locate(result: Result, path: str) -> tuple[Table, str, Flags]:
             for words in named.columns if word != rest else ():
                 if not words.numeric and (rows := _equal(words.values, word)).any():
                     return named, column, rows
+    for absent in result.absent:
+        if absent in path.split("."):
+            raise UnknownColumnError(_why_absent(result, absent))
     known = [column for table in result.tables.values() for column in table.names]
     raise UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
+
+
+def _why_absent(result: Result, name: str) -> str:
+    return f"{result.command} has no {name}: {result.absent[name]}"
 
 
 def _unknown(where: str, name: str, known: Iterable[str]) -> str:

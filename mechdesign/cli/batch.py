@@ -75,7 +75,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 terminal.emit("\n".join([f"{label}: {study.name}", describe(study.mechanism), *clearances, ""]))
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
-            foresee(study, COMMANDS)
+            foresee(study, COMMANDS, goals=True)
             if not options.no_plots:
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)

@@ -92,7 +92,8 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     """
     begun = time.perf_counter()
     writer.check_writable(directory)
-    asked = manifest.Extras(not options.no_plots, options.animate and command == "kinematics", options.all_modes)
+    animate = options.animate and command == "kinematics"
+    asked = manifest.Extras(not options.no_plots, options.kinds, animate, options.all_modes)
     if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
     if command in LONG:

@@ -13,6 +13,8 @@ from mechdesign.errors import StudyError
 
 # Template of the study that is taken where there is none.
 BUILT_IN = "two_link_arm"
+# Of pictures.
+FORMATS = ("png", "svg", "pdf")
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
@@ -63,6 +65,7 @@ JOBS = _text(
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
 NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
+FORMAT = _text("formats", str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.")
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
@@ -76,7 +79,7 @@ RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
 # What every question takes, and what only some of them do.
-COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS)
+COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT)
 OWN = {"kinematics": (ANIMATE, ALL_MODES), "optimize": (RESUME_DESIGNS,)}
 
 
@@ -87,7 +90,7 @@ class Options:
     Raises
     ------
     StudyError
-        If two options contradict each other.
+        If two options contradict each other, or a format is none.
     """
 
     out: Path | None = None
@@ -97,6 +100,7 @@ class Options:
     json: bool = False
     quiet: bool = False
     no_plots: bool = False
+    formats: str | None = None
     animate: bool = False
     all_modes: bool = False
     junit: Path | None = None
@@ -106,3 +110,13 @@ class Options:
     def __post_init__(self) -> None:
         if self.animate and self.no_plots:
             raise StudyError("--animate and --no-plots contradict each other")
+        if self.formats is not None and self.no_plots:
+            raise StudyError("--format and --no-plots contradict each other")
+        for kind in self.kinds.split(","):
+            if kind not in FORMATS:
+                raise StudyError(f"--format takes {', '.join(FORMATS)} or several with commas between, not {kind!r}")
+
+    @property
+    def kinds(self) -> str:
+        """Formats of the pictures, with commas between them."""
+        return ",".join(dict.fromkeys((self.formats or FORMATS[0]).replace(" ", "").lower().split(",")))

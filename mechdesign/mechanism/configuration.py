@@ -91,6 +91,8 @@ class Configuration:
             angle = angle_of(turn * np.conj(self.body_rotation(coordinate.reference)))
             near = self.near.get(coordinate.name)
             return angle if near is None else nearest(angle, near)
+        if coordinate.kind == "parameter":
+            return self.vectors.parameters[coordinate.name]
         assert coordinate.expression is not None
         return coordinate.expression.evaluate(self.user_values(coordinate))
 
@@ -125,6 +127,7 @@ class Configuration:
             [pick(w) for w in self.vectors.w],
             [pick(d) for d in self.vectors.d],
             {body: v if isinstance(v, float) else pick(v) for body, v in self.vectors.offsets.items()},
+            {name: pick(v) for name, v in self.vectors.parameters.items()},
         )
         return Configuration(
             self.graph, vectors, np.shape(reason), [pick(x) for x in self.nodes], [pick(u) for u in self.rotations],

@@ -9,9 +9,9 @@ from typing import Literal
 from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import Description, Drive, Measure, Quantity
+from mechdesign.mechanism.model import MEASURED, Description, Drive, Measure, Quantity
 
-Kind = Literal["x", "y", "angle", "slide", "distance", "expression"]
+Kind = Literal["x", "y", "angle", "slide", "distance", "expression", "parameter"]
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,8 @@ class Coordinate:
     """A scalar function of the configuration, by kind.
 
     ``x``, ``y`` of a node; ``angle`` from the x axis of body `reference` to that of `body`; ``slide`` displacement (a
-    telescopic leg's is its length); ``distance`` of nodes `node` and `other`; ``expression`` of coordinates `parts`.
+    telescopic leg's is its length); ``distance`` of nodes `node` and `other`; ``expression`` of coordinates `parts`, of
+    which a ``parameter`` is the same in every pose.
     """
 
     name: str
@@ -89,7 +90,12 @@ def _drive(name: str, drive: Drive, graph: Graph) -> Coordinate:
 
 def _measure(name: str, measure: Measure, description: Description, graph: Graph) -> Coordinate:
     if measure.kind == "expression" and measure.expression is not None:
-        parts = tuple(resolve(part, description, graph) for part in sorted(measure.expression.names))
+        parts = tuple(
+            Coordinate(part, "parameter", "none")
+            if MEASURED + part in description.places
+            else resolve(part, description, graph)
+            for part in sorted(measure.expression.names)
+        )
         return Coordinate(name, "expression", "none", expression=measure.expression, parts=parts)
     return between(name, measure.kind, measure.items or ("", ""), graph)
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -162,7 +162,12 @@ class Linearization(State):
             self.turned(plus(w, 1, times(s, d)), edge.frame)
             for (w, d), s, edge in zip(explicit, self._along(self.slides), self.structure.edges, strict=True)
         ]
-        return self._solve(given, rest, offsets)
+        axes = (1,) * len(self.configuration.shape)
+        parameters = {
+            name: np.array([float(place == own) for place in places]).reshape(-1, *axes)
+            for name, own in self.geometry.measured.items()
+        }
+        return replace(self._solve(given, rest, offsets), parameters=parameters)
 
     @quiet
     def rate_sensitivity(

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, cross, norm2, plus, rotation, vector
 from mechdesign.mechanism.graph import Edge, Graph, Turn
-from mechdesign.mechanism.model import Place, Term
+from mechdesign.mechanism.model import MEASURED, Place, Term
 
 
 def offset_names(link: str, point: str) -> tuple[str, str]:
@@ -20,11 +20,15 @@ def offset_names(link: str, point: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Vectors:
-    """Values of all edges for one set of dimensions: w and d of each edge, the offset rotation of each body."""
+    """Values of all edges for one set of dimensions: w and d of each edge, the offset rotation of each body.
+
+    Also of the parameters that measures take, by their names.
+    """
 
     w: Sequence[Value]
     d: Sequence[Value]
     offsets: Mapping[str, Value]
+    parameters: Mapping[str, Value]
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,11 @@ class Geometry:
         )
 
     @cached_property
+    def measured(self) -> Mapping[str, str]:
+        """Parameters that measures take, and the place of each."""
+        return {name.removeprefix(MEASURED): name for name in self.places if name.startswith(MEASURED)}
+
+    @cached_property
     def dependencies(self) -> tuple[frozenset[str], ...]:
         """Names of the places that each edge depends on, pin offsets included."""
         return tuple(self._places_of(edge) for edge in self.graph.edges)
@@ -131,7 +140,7 @@ class Geometry:
                 d.append(0.0)
             else:
                 d.append(rotation(self.angle(edge.turns, values)) if edge.turns else 1.0 + 0.0j)
-        return Vectors(w, d, offsets)
+        return Vectors(w, d, offsets, {name: self.term(place, values) for name, place in self.measured.items()})
 
     def angle_derivative(self, turns: Sequence[Turn], place: str, values: Mapping[str, Value]) -> Value:
         """Derivative of a sum of turns (radians) with respect to a place."""

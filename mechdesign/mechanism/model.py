@@ -16,6 +16,9 @@ from mechdesign.expressions import Expression
 Term = str | float
 Quantity = Literal["length", "angle", "none"]
 
+# Beginning of the names of places that hold the parameters in measures; no name in a study has a colon.
+MEASURED = "measures:"
+
 
 @dataclass(frozen=True)
 class Place:
@@ -105,7 +108,10 @@ class Drive:
 
 @dataclass(frozen=True)
 class Measure:
-    """A named quantity: the angle from link a's x axis to b's, the distance of two points, or an expression."""
+    """A named quantity: the angle from link a's x axis to b's, the distance of two points, or an expression.
+
+    Of the names in an expression those for which there is a place `MEASURED` are parameters, the others coordinates.
+    """
 
     name: str
     kind: Literal["angle", "distance", "expression"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 
 import numpy as np
@@ -19,8 +19,9 @@ GRADIENT_STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """One derivative of everything: node positions (complex), angles of classes, slides, offsets of bodies.
+    """One derivative of everything: node positions (complex), angles of classes, slides, offsets of bodies, parameters.
 
+    Of the parameters that measures take those that are not named do not change.
     Arrays broadcast to the batch, with further leading axes where several derivatives are taken at once.
     """
 
@@ -28,6 +29,7 @@ class Rates:
     angles: Sequence[Value]
     slides: Sequence[Value]
     offsets: Mapping[str, Value]
+    parameters: Mapping[str, Value] = field(default_factory=dict)
 
 
 @quiet
@@ -49,6 +51,8 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
     if kind == "distance":
         span, change = _span(configuration.nodes, coordinate), _span(rates.nodes, coordinate)
         return dot(span, change) / np.sqrt(norm2(span))
+    if kind == "parameter":
+        return rates.parameters.get(coordinate.name, 0.0)
     gradient = _gradient(coordinate, configuration.user_values(coordinate))
     return sum(g * _user(part, first(configuration, part, rates), coordinate)
                for g, part in zip(gradient, coordinate.parts, strict=True))  # fmt: skip

@@ -243,7 +243,7 @@ def _variables(graph: Graph, roots: Sequence[int], coordinate: Coordinate) -> li
         return [(axis, node) for node in (coordinate.node, coordinate.other) for axis in ("x", "y")]
     if coordinate.kind == "slide":
         return [("slide", coordinate.slide)]
-    return [(coordinate.kind, coordinate.node)]
+    return [] if coordinate.kind == "parameter" else [(coordinate.kind, coordinate.node)]
 
 
 def _match(rows: list[list[int]], columns: int) -> list[int] | None:

@@ -25,6 +25,7 @@ class Extras:
     """What else than tables is wanted of a command: pictures, the animation, every assembly mode."""
 
     plots: bool = True
+    formats: str = "png"  # of the pictures, with commas between them
     animate: bool = False
     all_modes: bool = False
 
@@ -96,9 +97,9 @@ def is_current(directory: Path, study: Study, command: str, asked: Extras) -> di
     if content is None:
         return None
     expected = computed_from(study, command) | asdict(asked)
-    for pictures in ("plots", "animate"):
-        if not expected[pictures]:
-            expected[pictures] = content.get(pictures)
+    without = [name for name in ("plots", "animate") if not expected[name]]
+    for name in (*without, *(("formats",) if not asked.plots else ())):
+        expected[name] = content.get(name)
     files = recorded_files(content)
     if not files or "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.results import Result, Table
 from mechdesign.rows import UnknownColumnError, choose
 from mechdesign.study import Study
-from mechdesign.study.schema.optimize import Condition
+from mechdesign.study.schema.optimize import Requirement
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,18 @@ class Verdict:
         return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}"
 
 
-def command_of(requirement: Condition) -> str:
+def command_of(requirement: Requirement) -> str:
     """The command whose result a requirement judges."""
     return requirement.result.partition(".")[0]
 
 
-def foresee(study: Study, commands: Iterable[str]) -> None:
+def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:
     """Find, at a look, the requirements of commands that name what their results have not.
+
+    Parameters
+    ----------
+    goals : bool
+        Whether to look at the goals and conditions of `optimize` as well, which its own computation begins with.
 
     Raises
     ------
@@ -45,6 +51,16 @@ def foresee(study: Study, commands: Iterable[str]) -> None:
 
     problems: list[Problem] = []
     judged = {command_of(requirement) for requirement in study.requirements}
+    if goals and study.optimize is not None:
+        from mechdesign.analyses.optimize.evaluation import Evaluator
+
+        try:
+            with suppress(AssemblyError):
+                Evaluator(study)
+        except StudyError as error:
+            problems += error.problems
+            # Its requirements would meet the same mistakes.
+            judged.discard("optimize")
     for command in [name for name in commands if name in judged]:
         try:
             # Of so few designs some rows may be missing that all of them have.
@@ -89,7 +105,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     return tuple(verdicts)
 
 
-def judge(result: Result, requirement: Condition, freedom: int = 1, *, whole: bool = True) -> Verdict:
+def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: bool = True) -> Verdict:
     """The verdict on one requirement; `freedom` is how many numbers make a pose, see `requirements`.
 
     Raises
@@ -118,7 +134,7 @@ def judge(result: Result, requirement: Condition, freedom: int = 1, *, whole: bo
     return Verdict(words, met, float(values[worst]), _place(table, int(worst), name, freedom))
 
 
-def _words(requirement: Condition) -> str:
+def _words(requirement: Requirement) -> str:
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
     where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
     given = (("at least", requirement.at_least), ("at most", requirement.at_most))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError, explain
 from mechdesign.files import replace
@@ -18,7 +19,10 @@ from mechdesign.report.tables import csv_blocks
 from mechdesign.results import Result
 from mechdesign.study import Study
 
-MECHANISM = "mechanism.png"
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MECHANISM = "mechanism"
 ANIMATION = "motion.gif"
 FIGURES = "mechdesign.report.figures"
 
@@ -68,7 +72,7 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
         tables = dataclasses.replace(asked, plots=False, animate=False)
         replace(directory / manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
         if asked.plots and not result.interrupted:
-            drawn, warnings = pictures(study, result, animate=asked.animate)
+            drawn, warnings = pictures(study, result, asked.formats.split(","), animate=asked.animate)
             digests |= {name: replace(directory / name, [data]) for name, data in drawn.items()}
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
             replace(directory / manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
@@ -93,7 +97,7 @@ def write_file(path: Path, data: bytes) -> None:
 
 
 def write_sketch(directory: Path, study: Study) -> str:
-    """Draw the sketch as it is understood into a directory, as `MECHANISM`; says where it is, or why there is none.
+    """Draw the sketch as it is understood into a directory, as ``mechanism.png``; says where it is, or why not.
 
     Raises
     ------
@@ -104,17 +108,19 @@ def write_sketch(directory: Path, study: Study) -> str:
     from mechdesign.report.figures.mechanism import sketch_figure
 
     check_writable(directory)
-    path = directory / MECHANISM
+    path = directory / f"{MECHANISM}.png"
     try:
         with style.context():
-            data = style.to_png(sketch_figure(study))
+            data = style.encoded(sketch_figure(study), "png")
     except Exception as error:
-        return f"warning: {_undrawn(MECHANISM, explain(error)[1])}"
+        return f"warning: {_undrawn(path.name, explain(error)[1])}"
     write_file(path, data)
     return f"the sketch as understood is in {path}"
 
 
-def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[dict[str, bytes], tuple[str, ...]]:
+def pictures(
+    study: Study, result: Result, formats: Sequence[str] = ("png",), *, animate: bool = False
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings."""
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
@@ -124,14 +130,19 @@ def pictures(study: Study, result: Result, *, animate: bool = False) -> tuple[di
         gallery = Gallery()
         # What all pictures of a command share may fail too.
         gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
+
+        def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
+            figure = make()
+            return {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
+
         drawings: dict[str, Drawing] = {
-            f"{name}.png": partial(style.to_png, figure) for name, figure in gallery.items()
+            f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
         }
-        drawings[MECHANISM] = lambda: style.to_png(mechanism_figure(study, result))
+        drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
         if animate:
             from mechdesign.report.figures.kinematics import animation
 
-            drawings[ANIMATION] = lambda: animation(result)
+            drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}
         drawn, failed = render(drawings)
     warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":

@@ -31,7 +31,7 @@ from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.optimize import Condition, OptimizeSection, check_result
+from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -69,7 +69,7 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Condition, ...]
+    requirements: tuple[Requirement, ...]
     targets: Mapping[str, Target]  # by the coordinate or point
     warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
 
@@ -91,12 +91,27 @@ class Study:
         """Files that the study reads: the keys of their names, the file, and what it holds."""
         folder = self.path.parent if self.path is not None else pathlib.Path()
         for keys, value in leaves(self.resolved):
-            if isinstance(value, str) and ("path" in keys[:-1] or "targets" in keys[:-1]):
+            if isinstance(value, str) and ({"path", "targets"}.intersection(keys[:-1]) or keys[-1] == "measured"):
                 try:
                     content = (folder / value).read_text(encoding="utf-8-sig")
                 except (OSError, ValueError):
                     continue
                 yield keys, folder / value, content
+
+    def unit_of(self, name: str) -> str | None:
+        """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
+
+        That of a parameter is known where numbers of the geometry, all of one quantity, change as much as it does.
+        """
+        parameters, places = self.parameters, self.mechanism.description.places
+        if name in places:
+            return self.units.label(places[name].quantity)
+        if name not in parameters.nominal:
+            return self.units.label(self.mechanism.quantity(name)) if name in self.mechanism.drives else None
+        slopes = parameters.derivatives(name).items()
+        alike = [places[place].quantity for place, slope in slopes if abs(slope) == parameters.factors[place]]
+        found = set(alike) - {"none"}
+        return self.units.label(*found) if len(found) == 1 else None
 
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text."""
@@ -135,8 +150,9 @@ def load(
     StudyError
         With every mistake found, each as ``file:line:column: key path: what, and what would mend it``.
     """
-    if (source is None) == (text is None):
-        raise StudyError("give a study as a file, a mapping or text=..., one of them")
+    named = isinstance(source, str) and "\n" not in source
+    if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):
+        raise StudyError("give a study as one of a file's name, a mapping, or text=... in YAML")
     if text is not None:
         return load_bytes(text.encode() if isinstance(text, str) else text, None, overrides, seed)
     if isinstance(source, Mapping):
@@ -187,7 +203,7 @@ def _plain_data(value: Any, what: str) -> Any:
             return each.tolist()
         if isinstance(each, os.PathLike):
             return os.fspath(each)
-        raise TypeError(f"it holds {shown(each)}")
+        raise TypeError(f"it holds {type(each).__name__!r}")
 
     try:
         return json.loads(json.dumps(value, default=plainly))
@@ -225,8 +241,8 @@ def load_document(
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
-    parameters = builder.parameters(context.parameters, formulas)
-    parts = _checked(Checker(builder, parameters, parts), folder)
+    parameters = builder.parameters(formulas)
+    parts = _checked(Checker(builder, parameters, parts, folder))
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
@@ -318,13 +334,13 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
     return parts
 
 
-def _checked(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
+def _checked(checker: Checker) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
     found = dict(checker.parts)
     found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
-    found["targets"] = targets.check(checker, checker.mechanism.targets, folder)
+    found["targets"] = targets.check(checker, checker.mechanism.targets)
     return found
 
 
@@ -363,7 +379,11 @@ def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Contex
         # What was wrong may have been what uses them.
         return
     optimize, reliability = parts.get("optimize"), parts.get("reliability")
-    used = context.used.union(optimize.variables if optimize else (), reliability.dimensions if reliability else ())
+    used = context.used.union(
+        *(formula.names for formula in parameters.dependent.values()),
+        optimize.variables if optimize else (),
+        reliability.dimensions if reliability else (),
+    )
     for name, formula in reversed([*parameters.formulas.items()]):
         # A parameter may use those above it.
         if name in used:

@@ -70,6 +70,35 @@ def test_a_wrong_study_has_no_drawing(folder, invoke):
     assert not (folder / "results").exists()
 
 
+def test_goals_and_conditions_of_optimize_are_checked_with_the_requirements(folder, invoke):
+    section = """\
+optimize:
+  variables: {r: {from: 30, to: 40, number: 2}}
+  minimize: [kinematics.nonsense, r]
+  maximize:
+    - kinematics.B.x
+    - {result: kinematics.extremes.range, where: {output: B.z}}
+  subject_to:
+    - {result: kinematics.det_J, at_least: 0, at_most: 9}
+requirements: [{result: kinematics.B.q, at_least: 0}, {result: optimize.scores, at_least: 0}]
+"""
+    (folder / "slider.yaml").write_text(SLIDER + section)
+    begin = SLIDER.count("\n")
+    done = invoke("check", "slider.yaml", "--no-plots")
+    assert done.exit_code == 2
+    told = [line.split(": ")[:2] for line in done.stderr.splitlines()]
+    assert told == [
+        [f"slider.yaml:{begin + 6}:7", "optimize.maximize.1"],
+        [f"slider.yaml:{begin + 3}:14", "optimize.minimize.0"],
+        [f"slider.yaml:{begin + 8}:7", "optimize.subject_to.0"],
+        [f"slider.yaml:{begin + 9}:16", "requirements.0"],
+    ]
+    assert "kinematics has no det_J: no outputs are named" in done.stderr
+    (folder / "slider.yaml").write_text(SLIDER + section.replace("nonsense", "A.y").replace("B.z", "B.x"))
+    change = ["--set", "kinematics.jacobian=[B.x]", "--set", "requirements="]
+    assert invoke("check", "slider.yaml", "--no-plots", *change).exit_code == 0
+
+
 @pytest.mark.parametrize("arguments", [["--no-plots"], []])
 def test_checking_imports_no_solver_of_scipy(folder, arguments):
     code = (

@@ -50,7 +50,7 @@ def test_every_picture_fails(folder, invoke, monkeypatch):
     from mechdesign.report.figures import style
 
     invoke("kinematics", STUDY)
-    monkeypatch.setattr(style, "to_png", failing)
+    monkeypatch.setattr(style, "encoded", failing)
     done = invoke("kinematics", STUDY)
     assert done.exit_code == 0
     for name in ("motion.png", "paths.png", "mechanism.png"):

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from mechdesign.cli.app import app
 from mechdesign.errors import AssemblyError, MechdesignError
+from mechdesign.study import template_path
 
 from .conftest import SLIDER, answer
 
@@ -222,3 +223,21 @@ def test_a_study_on_standard_input(folder, analysis):
     wrong = CliRunner().invoke(app, ["check", "-"], input=SLIDER.replace("O, A, r", "O, A, q"))
     assert wrong.exit_code == 2
     assert wrong.stderr.startswith("<study>:6:19: mechanism.links.crank")
+
+
+def test_pictures_as_vectors_are_the_same_bytes_at_every_run(folder, invoke):
+    for out in ("one", "two"):
+        done = invoke("kinematics", template_path("two_link_arm"), "--format", "svg,pdf", "--out", out)
+        assert done.exit_code == 0, done.output
+    files = {path.name: path.read_bytes() for path in (folder / "one").iterdir()}
+    assert files == {path.name: path.read_bytes() for path in (folder / "two").iterdir()}
+    assert files["mechanism.svg"].startswith(b"<?xml")
+    assert files["mechanism.pdf"].startswith(b"%PDF")
+    assert not any(name.endswith(".png") for name in files)
+
+
+def test_formats_that_are_none_are_refused(folder, invoke):
+    done = invoke("kinematics", "slider.yaml", "--format", "png,jpg")
+    assert done.exit_code == 2
+    assert "--format takes png, svg, pdf or several with commas between, not 'jpg'" in done.stderr
+    assert invoke("kinematics", "slider.yaml", "--format", "svg", "--no-plots").exit_code == 2

@@ -37,7 +37,7 @@ def study(tmp_path):
 def drawn(study):
     with style.context():
         figure = mechanism_figure(study, Result("workspace", {}))
-        return figure, style.to_png(figure)
+        return figure, style.encoded(figure)
 
 
 def test_every_joint_drive_slide_and_link_is_named_in_both_poses(study):

@@ -11,7 +11,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import Goal, goal, goals_of
+from mechdesign.analyses.optimize.goals import Goal, goal, goals_of, unit_of
 from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Condition
@@ -447,3 +447,105 @@ def test_listed_poses_that_follow_the_variables_are_solved_together():
                      "optimize.variables.y={from: -3, to: 9, number: 2}")  # fmt: skip
     designs = {"a": np.array([20.0, 30.0, 25.0, 9.0]), "y": np.array([1.0, 4.0, -20.0, 9.0])}
     agree(study, [goal("kinematics.B.x", smallest=True), goal("kinematics.B.y")], designs)
+
+
+FOUR_BAR = """
+mechanism:
+  parameters: {l1: 30, l2: 90, l3: 60, k: 2}
+  links:
+    ground: {O: [0, 0], D: [100, 0]}
+    crank: [O, A, l1]
+    rod: {from: A, to: B, length: l2, points: {C: [k*l1, 10]}}
+    rocker: [D, B, l3 + 1]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+  measures: {mu: {angle: [rod, rocker]}, total: l1 + l2}
+kinematics: {sweep: {theta: {from: 0, to: 360, step: 30}}, outputs: [C, mu, total]}
+"""
+
+
+def test_expressions_over_parameters_are_goals_and_conditions() -> None:
+    section = """
+optimize:
+  variables: {l1: {from: 20, to: 40, number: 5}, l2: {from: 80, to: 110, number: 4}}
+  maximize: [kinematics.mu]
+  minimize: [l1 + l2, "max(l1, l2)", l1]
+  subject_to: [{result: l1 + l2, at_most: 140}, {result: l1 - l2, abs: true, at_least: 50}]
+  weights: [{kinematics.mu: 3, l1 + l2: 1}, {"max(l1, l2)": 1}]
+"""
+    result = mechdesign.optimize(study_of(FOUR_BAR + section))
+    designs, optimum = result.tables["designs"], result.tables["optimum"]
+    l1, l2 = np.meshgrid(np.linspace(20, 40, 5), np.linspace(80, 110, 4), indexing="ij")
+    kept = (l1 + l2 <= 140) & (l2 - l1 >= 50)
+    assert designs["l1 + l2"] == pytest.approx((l1 + l2).ravel())
+    assert designs["feasible"].tolist() == kept.ravel().tolist()
+    assert designs.names.count("l1") == 1
+    mu = designs["kinematics.mu"].reshape(l1.shape)
+
+    def best(*goals: tuple[np.ndarray, int, float]) -> tuple[float, float]:
+        score = sum(w * s * (v - v[kept].min()) / np.ptp(v[kept]) for v, s, w in goals)
+        winner = int(np.argmax(np.where(kept, score, -np.inf)))
+        return l1.flat[winner], l2.flat[winner]
+
+    assert (optimum["l1"][0], optimum["l2"][0]) == best((mu, 1, 3.0), (l1 + l2, -1, 1.0))
+    assert (optimum["l1"][1], optimum["l2"][1]) == best((np.maximum(l1, l2), -1, 1.0))
+    assert "l1 + l2: 1" not in result.files["optimum.yaml"].partition("optimize:")[0]
+
+
+@pytest.mark.parametrize(
+    ("expression", "unit"),
+    [("l1", "mm"), ("2*l1 - l2/3 + 5", "mm"), ("l3", "mm"), ("l1/l2", ""), ("l1 + k", ""), ("k", ""), ("l1*l2", "")],
+)
+def test_the_unit_of_an_expression_is_given_where_it_is_known(expression: str, unit: str) -> None:
+    assert unit_of(study_of(FOUR_BAR), expression) == unit
+
+
+@pytest.mark.parametrize("method", ["search", "pareto"])
+def test_expressions_alone_are_searched(method: str) -> None:
+    section = f"""
+optimize:
+  method: {method}
+  evaluations: 400
+  variables: {{l1: {{from: 10, to: 90}}, l2: {{from: 10, to: 90}}}}
+  minimize: ["hypot(l1, l2)"{', "abs(l1 - 60)"' * (method == "pareto")}]
+  subject_to: [{{result: l1 + l2, at_least: 100}}]
+"""
+    result = mechdesign.optimize(study_of(FOUR_BAR + section))
+    # Nearest to the origin on the line l1 + l2 = 100.
+    if method == "search":
+        assert result.tables["optimum"]["hypot(l1, l2)"] == pytest.approx(50 * np.sqrt(2), rel=1e-6)
+        return
+    front = result.tables["pareto"]
+    assert front["hypot(l1, l2)"].min() == pytest.approx(50 * np.sqrt(2), rel=1e-3)
+    # Between the ends every design lies on the line.
+    assert front["l1"] + front["l2"] == pytest.approx(np.full(len(front), 100), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("minimize=[l1 + kinematics.mu]", r"minimize\.0: 'kinematics\.mu' in .* is not a parameter.*; a measure takes"),
+        ("minimize=[l1 + l12]", r"minimize\.0: 'l12' in .* is not a parameter.*did you mean 'l2'"),
+        ("minimize=[l3*k]", r"minimize\.0: 'l3\*k' is the same for every design"),
+        ("minimize=[{result: 2*l1, where: {theta: 3}}]", r"'2\*l1' is one number .* leave out 'where'"),
+        ("minimize=[l11]", r"there is no result 'l11'; did you mean 'l1'"),
+        ("minimize=[5]", r"expected a result, such as GII"),
+        (
+            "subject_to=[{result: l1 + l2, at_most: 2*l1 - k}]",
+            r"at_most: '2\*l1 - k' changes with .* \{result: l1 \+ l2 - \(2\*l1 - k\), at_most: 0\}",
+        ),
+        ("subject_to=[{result: kinematics.mu, at_least: l1}]", r"at_least: 'l1' changes with .*a measure may take"),
+    ],
+)
+def test_wrong_expressions_are_told(change: str, message: str) -> None:
+    section = "optimize: {variables: {l1: {from: 20, to: 40, number: 5}}, minimize: [l1]}"
+    with pytest.raises(StudyError, match=message):
+        study_of(FOUR_BAR + section, f"optimize.{change}")
+
+
+def test_a_requirement_on_an_expression_is_one_on_a_measure() -> None:
+    with pytest.raises(StudyError, match=r"give it as a measure, mechanism\.measures: \{NAME: l1 \+ l2\}"):
+        study_of(FOUR_BAR + "requirements: [{result: l1 + l2, at_most: 110}]")
+    study = study_of(FOUR_BAR + "requirements: [{result: kinematics.total, at_most: 110}]")
+    (verdict,) = mechdesign.requirements(study, mechdesign.kinematics(study))
+    assert (verdict.met, verdict.worst) == (False, 120)

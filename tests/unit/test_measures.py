@@ -7,9 +7,11 @@ import pytest
 from helpers.studies import study_of
 
 from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.analyses.optimize.analysis import optimize
 from mechdesign.analyses.reliability.analysis import reliability
 from mechdesign.analyses.stiffness.analysis import stiffness
 from mechdesign.analyses.workspace.analysis import workspace
+from mechdesign.errors import StudyError
 from mechdesign.report.requirements import requirements
 
 ARM = """
@@ -131,3 +133,73 @@ workspace: {point: P, at: {reach: 12}, characteristic_length: 5, scan: {rays: 40
     indices = workspace(study).tables["indices"]
     # The wrist F on a circle of 12, P 3 from it.
     assert indices["area"] == pytest.approx(np.pi * (15**2 - 9**2), rel=1e-4)
+
+
+PARAMETRIC = """
+mechanism:
+  parameters: {r: 30, l: 90, k: 2, double: 2*r}
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, r], rod: [A, B, l], rocker: [D, B, 60]}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 55]}
+  measures: {reach: "hypot(B.x, B.y) - r", steep: "k**2*reach + sin(theta)/double", size: r + l}
+"""
+
+
+def test_measures_take_parameters() -> None:
+    question = "kinematics={poses: [{theta: 40}, {reach: 80}], outputs: [B, reach, steep, size, theta]}"
+    table = kinematics(study_of(PARAMETRIC, question, "mechanism.parameters.r=25")).tables["motion"]
+    reach = np.hypot(table["B.x"], table["B.y"]) - 25
+    assert table["reach"] == pytest.approx(reach, rel=1e-12)
+    assert table["reach"][1] == pytest.approx(80)
+    assert table["steep"] == pytest.approx(4 * reach + np.sin(np.radians(table["theta"])) / 50, rel=1e-12)
+    assert table["size"] == pytest.approx([115, 115])
+    with pytest.raises(StudyError, match=r"measures\.reach: there is no coordinate or parameter 'doubel'; did"):
+        study_of(PARAMETRIC, "mechanism.measures.reach=B.x - doubel")
+
+
+def test_measures_follow_the_parameters_of_designs() -> None:
+    section = (
+        "optimize: {variables: {r: {from: 20, to: 40, number: 3}, k: {from: 1, to: 3, number: 2}},"
+        " maximize: [kinematics.steep], subject_to: [{result: kinematics.size, at_most: 125}]}"
+    )
+    question = "kinematics={poses: [{theta: 40}, {theta: 70}], outputs: [reach, steep, size]}"
+    designs = optimize(study_of(PARAMETRIC + section, question)).tables["designs"]
+    for row in designs:
+        changes = [f"mechanism.parameters.{name}={row[name]}" for name in ("r", "k")]
+        steep = kinematics(study_of(PARAMETRIC, question, *changes)).tables["motion"]["steep"]
+        assert row["kinematics.steep"] == pytest.approx(min(steep), rel=1e-9)
+        assert row["feasible"] == (row["r"] + 90 <= 125)
+
+
+def test_a_parameter_that_varies_changes_measures_directly_too() -> None:
+    section = """
+reliability:
+  dimensions: {r: {sigma: 0.1}, k: {sigma: 0.05}}
+  poses: [{theta: 40}]
+  outputs: [reach, steep, size]
+  samples: 100000
+"""
+    methods = ("analytic", "second_order", "monte_carlo")
+    result = reliability(study_of(PARAMETRIC + section, f"reliability.methods=[{', '.join(methods)}]"))
+    assert not result.warnings
+    contributions = result.tables["contributions"]
+
+    def measured(name: str, r: float, k: float) -> float:
+        changes = [f"mechanism.parameters.r={r!r}", f"mechanism.parameters.k={k!r}"]
+        return float(study_of(PARAMETRIC, *changes).mechanism.solve({"theta": 40})[name])
+
+    h = 1e-4
+    for name in ("reach", "steep", "size"):
+        slopes = [
+            (measured(name, 30 + h, 2) - measured(name, 30 - h, 2)) / (2 * h),
+            (measured(name, 30, 2 + h) - measured(name, 30, 2 - h)) / (2 * h),
+        ]
+        found = contributions["sensitivity"][contributions.where(output=name)]
+        assert found == pytest.approx(slopes, rel=1e-7, abs=1e-9)
+    moments = result.tables["moments"]
+    first, second, sampled = (moments.take(moments.where(method=method)) for method in methods)
+    assert first["sigma"] == pytest.approx(sampled["sigma"], rel=0.01)
+    # E[k**2] is 2**2 + 0.05**2.
+    reach = measured("reach", 30, 2)
+    assert second["mean"][1] - second["nominal"][1] == pytest.approx(0.05**2 * reach, rel=1e-3)
+    assert sampled["mean"] == pytest.approx(second["mean"], abs=0.02 * float(second["sigma"][1]))

@@ -51,10 +51,11 @@ def test_overrides_as_a_mapping() -> None:
 def test_mistakes_of_a_mapping_name_their_keys() -> None:
     with pytest.raises(mechdesign.StudyError, match=re.escape("mechanism.links.crank.2: ")):
         mechdesign.load(DATA, {"mechanism.links.crank": ["O", "A", "q"]})
-    with pytest.raises(mechdesign.StudyError, match="the study is not plain data"):
+    with pytest.raises(mechdesign.StudyError, match=r"the study is not plain data .*: it holds 'object'"):
         mechdesign.load({"mechanism": object()})
-    with pytest.raises(mechdesign.StudyError, match="one of them"):
-        mechdesign.load(DATA, text="mechanism: {}")
+    for source in (DATA, None, "mechanism:\n  links: {}", ["study.yaml"]):
+        with pytest.raises(mechdesign.StudyError, match="give a study as one of"):
+            mechdesign.load(source, text="mechanism: {}" if source is DATA else None)
     with pytest.raises(mechdesign.StudyError, match=r"^<study>:1:12: "):
         mechdesign.load(text="mechanism: 3")
 

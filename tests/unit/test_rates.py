@@ -7,7 +7,9 @@ import pytest
 from helpers.studies import study_of
 
 from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError
+from mechdesign.report.requirements import foresee
 from mechdesign.results import Table
 from mechdesign.study import Study
 
@@ -306,3 +308,40 @@ def test_conditioning_stands_in_every_motion() -> None:
     assert table["conditioning"] == pytest.approx(1)
     failed = kinematics(study_of(ARM, "kinematics.path={P: [[3, 12], [30, 0]]}")).tables["motion"]
     assert np.isnan(failed["conditioning"]).tolist() == [False, True]
+
+
+def test_outputs_of_the_jacobian_are_named_apart_from_those_shown() -> None:
+    poses = "kinematics={poses: [{t1: 30, t2: 75}], outputs: [P, fore.angle, bend], jacobian: [P]}"
+    tables = kinematics(study_of(ARM, poses)).tables
+    assert tables["jacobian"].names == ("t1", "t2", "P.x_by_t1", "P.x_by_t2", "P.y_by_t1", "P.y_by_t2", "valid")
+    assert {"fore.angle", "bend"} < set(tables["motion"].names)
+    # |P_t1 x P_t2| = 10 * 8 * sin(75 - 30).
+    assert tables["motion"]["det_J"] == pytest.approx(80 * np.sin(np.radians(45)))
+    assert "det_J" in kinematics(study_of(ARM, "kinematics={poses: [{t1: 3, t2: 7}], jacobian: [P]}")).tables["motion"]
+    with pytest.raises(StudyError, match=r"kinematics\.jacobian: 1 output \(P\.x\) for 2 drives"):
+        study_of(ARM, "kinematics={poses: [{t1: 30, t2: 75}], outputs: [P], jacobian: [P.x]}")
+
+
+@pytest.mark.parametrize(
+    ("asked", "place"),
+    [
+        ("requirements=[{result: kinematics.inverse_condition, at_least: 0}]", r"requirements\.0"),
+        ("optimize={variables: {upper.length: {from: 9, to: 11, number: 2}}, maximize: [kinematics.inverse_condition]}",
+         r"optimize\.maximize\.0"),
+        ("optimize={variables: {upper.length: {from: 9, to: 11, number: 2}}, maximize: [kinematics.P.x],"
+         " subject_to: [{result: kinematics.motion.inverse_condition, at_least: 0}]}", r"optimize\.subject_to\.0"),
+    ],
+)  # fmt: skip
+def test_why_there_is_no_condition_number_is_told(asked: str, place: str) -> None:
+    kinematic = "kinematics={poses: [{t1: 30, t2: 75}], outputs: [P, fore.angle]}"
+    message = (
+        rf"{place}: kinematics has no inverse_condition: 3 outputs \(P\.x, P\.y, fore\.angle\) for 2 drives; "
+        r"name as many by kinematics\.jacobian: \[P\]"
+    )
+    with pytest.raises(StudyError, match=message):
+        foresee(study_of(ARM, kinematic, asked), COMMANDS, goals=True)
+    # With as many outputs as drives, but of lengths and angles.
+    with pytest.raises(StudyError, match=rf"{place}: .*no inverse_condition: J mixes lengths and angles; give kinem"):
+        foresee(study_of(ARM, kinematic, asked, "kinematics.jacobian=[P.x, bend]"), COMMANDS, goals=True)
+    length = ("kinematics.jacobian=[P.x, bend]", "kinematics.characteristic_length=5")
+    foresee(study_of(ARM, kinematic, asked, *length), COMMANDS, goals=True)

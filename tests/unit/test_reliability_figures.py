@@ -68,7 +68,7 @@ def drawn(text: str, *overrides: str):
     with style.context():
         found = figures(study, result)
         for figure in found.values():
-            assert style.to_png(figure).startswith(b"\x89PNG")
+            assert style.encoded(figure).startswith(b"\x89PNG")
     return found, result
 
 

@@ -19,7 +19,7 @@ def pictures(text: str, *overrides: str) -> set[str]:
     with style.context():
         found = figures(study, mechdesign.stiffness(study))
         for figure in found.values():
-            assert style.to_png(figure).startswith(b"\x89PNG")
+            assert style.encoded(figure).startswith(b"\x89PNG")
     return set(found)
 
 

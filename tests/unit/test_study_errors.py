@@ -71,7 +71,7 @@ MECHANISM = [
     ("A: [0, 30]", "A: 30", "9:15: mechanism.sketch.A: expected [x, y], not the number 30"),
     ("sketch:", "branch: folow\n  sketch:", "9:11: mechanism.branch: expected one of side, follow, not 'folow'"),
     ("sketch:", "measures: {mu: {angle: [rod, rokcer]}}\n  sketch:", "no link 'rokcer'; did you mean 'rocker'?"),
-    ("sketch:", "measures: {mu: B.x - Q.x}\n  sketch:", "there is no coordinate 'Q.x'"),
+    ("sketch:", "measures: {mu: B.x - Q.x}\n  sketch:", "no coordinate or parameter 'Q.x'"),
     (
         "sketch:",
         "measures: {mu: B.x -}\n  sketch:",

@@ -16,7 +16,6 @@ from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles
 from mechdesign.analyses.kinematics.motion import (
     Motion,
     MotionQuestion,
-    characteristic_length,
     entry,
     motion_question,
     move,
@@ -69,7 +68,7 @@ def kinematics(
     Result
         Tables ``motion``, ``extremes``; for a sweep of one coordinate ``limits``; ``loops`` and ``toggles`` of
         four-bars and slider-cranks; ``targets`` where there are some;
-        ``jacobian`` where the study lists as many outputs as drives; ``modes`` with `all_modes`.
+        ``jacobian`` where the study names as many outputs of it, or outputs, as drives; ``modes`` with `all_modes`.
 
     Raises
     ------
@@ -113,7 +112,7 @@ def kinematics(
     if all_modes:
         tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
         warnings += told
-    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn)
+    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn, absent=question.absent)
 
 
 def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
@@ -207,7 +206,7 @@ def jacobian_table(motion: Motion) -> Table:
             meaning = f"derivative of {output.name} by {drive.name}, angles in radians"
             columns.append(Column(name, motion.arrays[name], _per(question.study, output, drive), meaning))
     columns += shared(question.study.units, valid=motion.valid)
-    return Table("jacobian", tuple(columns), "derivatives of the listed outputs by the drives, per radian")
+    return Table("jacobian", tuple(columns), "derivatives of outputs by the drives, per radian")
 
 
 def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
@@ -225,7 +224,7 @@ def _conditioning(motion: Motion) -> list[str]:
         return []
     values = motion.arrays["inverse_condition"]
     regular = motion.valid & (motion.arrays["conditioning"] >= STALLED)
-    if regular.any() and np.isnan(values[regular]).all() and characteristic_length(motion.question.study) is None:
+    if regular.any() and motion.question.mixed:
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
     near = regular & ~(values >= SINGULAR)
     if near.any():

@@ -5,7 +5,7 @@ At a change point that the motion follows, values are interpolated from poses on
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,6 +23,7 @@ from mechdesign.analyses.poses import (
     solve_poses,
     study_poses,
 )
+from mechdesign.errors import counted
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -76,9 +77,10 @@ class MotionQuestion:
     Parameters
     ----------
     outputs : list of Coordinate
-        Outputs in the tables: the listed ones, then those that have a target and are not listed.
+        Outputs in the tables: those that the study names, then others that have a target.
     listed : list of Coordinate
-        Rows of the Jacobian, which is wanted where it is `square`: where the study lists as many outputs as drives.
+        Rows of the Jacobian, which is wanted where it is `square`: where the study names as many of them (or of the
+        outputs) as drives.
     watched : list of Coordinate
         All coordinates whose values are needed: drives, outputs, those that targets depend on, and the angles in
         expressions of these and of limits.
@@ -100,6 +102,32 @@ class MotionQuestion:
         """The mechanism's drives."""
         return [self.study.mechanism.coordinate(name) for name in self.study.mechanism.drives]
 
+    @property
+    def mixed(self) -> bool:
+        """Whether the Jacobian mixes lengths and angles, and the study gives no length that makes them comparable."""
+        return self.square and mixes(self.listed, self.drives) and characteristic_length(self.study) is None
+
+    @property
+    def absent(self) -> Mapping[str, str]:
+        """Columns and tables of the Jacobian that have no values: why, and what to write for them."""
+        if self.square:
+            words = "J mixes lengths and angles; give kinematics.characteristic_length"
+            return {"inverse_condition": words} if self.mixed else {}
+        study, drives = self.study, self.study.mechanism.drives
+        # One point, then angles; of outputs that are left out the last, as the end of a chain.
+        named, others = self.section.outputs or (), default_outputs(study.mechanism)[::-1]
+        known = {c.name: c for c in expand_outputs(study, (*named, *others)) if c.name not in drives}
+        node = next((c.node for c in known.values() if c.kind in ("x", "y")), -1)
+        picked = sorted(known, key=lambda name: (known[name].node != node, known[name].kind != "angle"))[: len(drives)]
+        points = {name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked}
+        rows = dict.fromkeys(name[:-2] if name[:-2] in points else name for name in picked)
+        given = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"
+        told = f"{given} for {counted(len(drives), 'drive')}; name as many"
+        if not named:
+            told = f"no outputs are named; name as many as there are drives, {len(drives)},"
+        told += f" by kinematics.jacobian: [{', '.join(rows)}]"
+        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), told)
+
 
 def motion_question(study: Study) -> MotionQuestion:
     """Read a study's questions about its motion.
@@ -113,8 +141,9 @@ def motion_question(study: Study) -> MotionQuestion:
     """
     section = study.kinematics or KinematicsSection()
     mechanism, poses = study.mechanism, study_poses(study, "kinematics")
-    listed = expand_outputs(study, section.outputs or default_outputs(mechanism))
-    shown = {output.name: output for output in listed}
+    outputs = expand_outputs(study, section.outputs or default_outputs(mechanism))
+    listed = outputs if section.jacobian is None else expand_outputs(study, section.jacobian)
+    shown = {output.name: output for output in outputs}
     for target in study.targets.values():
         shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
     names = dict.fromkeys([*mechanism.drives, *shown, *needed(study, poses)])
@@ -125,7 +154,7 @@ def motion_question(study: Study) -> MotionQuestion:
         poses,
         list(shown.values()),
         listed,
-        section.outputs is not None and len(listed) == len(mechanism.drives),
+        (section.outputs or section.jacobian) is not None and len(listed) == len(mechanism.drives),
         list((watched | angles_of([*watched.values(), *mechanism.counting])).values()),
         of_given(study, section),
     )
@@ -234,9 +263,10 @@ class Motion:
                     columns.append(Column(rate, arrays[rate], label(kind), f"{order} of {name}"))
             point, _, axis = name.rpartition(".")
             columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
+        rows = ", ".join(output.name for output in question.listed)
         for name, meaning in (
-            ("det_J", "determinant of the Jacobian, outputs by drives, per radian"),
-            ("inverse_condition", "smallest over largest singular value of the Jacobian"),
+            ("det_J", f"determinant of the Jacobian of {rows} by the drives, per radian"),
+            ("inverse_condition", f"smallest over largest singular value of the Jacobian of {rows} by the drives"),
             ("conditioning", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the angle "
              "between two links that meet"),
         ):  # fmt: skip

@@ -15,7 +15,7 @@ from mechdesign.analyses.optimize import pareto
 from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import Explorer
-from mechdesign.analyses.optimize.goals import conditions_of, goals_of
+from mechdesign.analyses.optimize.goals import goals_of
 from mechdesign.analyses.optimize.judge import Designs, Judge
 from mechdesign.analyses.optimize.tables import (
     best_table,
@@ -81,7 +81,7 @@ def optimize(
         message = "what is to be best? e.g. maximize: [GII, GRI, SUI], or minimize"
         raise StudyError((study.problem(message, "optimize", "maximize"),))
     weights = np.array(section.weights or [[1.0] * len(goals)], dtype=float).reshape(-1, len(goals))
-    evaluator = Evaluator(study, (*goals, *conditions_of(section)), graded=section.method != "grid")
+    evaluator = Evaluator(study, graded=section.method != "grid")
     meanings = index_meanings(study, evaluator.question) if evaluator.question is not None else {}
     budget = section.evaluations or (
         pareto.FRONT_EVALUATIONS * len(goals)

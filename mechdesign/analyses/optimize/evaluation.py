@@ -69,8 +69,8 @@ class Evaluated(NamedTuple):
 class Evaluator:
     """Evaluates goals for designs of one study, which differ in parameters or single places.
 
-    Graded, it also gives the rows that goals are the worst of, or the root mean square of (those in `squares`), and how
-    far poses are from assembling.
+    Goals that are left out are those of the study, and its conditions. Graded, it also gives the rows that goals are
+    the worst of, or the root mean square of (those in `squares`), and how far poses are from assembling.
 
     Raises
     ------
@@ -78,9 +78,11 @@ class Evaluator:
         If a goal names what no result has, or the study lacks what it needs.
     """
 
-    def __init__(self, study: Study, goals: Sequence[Goal], *, graded: bool = False) -> None:
+    def __init__(self, study: Study, goals: Sequence[Goal] = (), *, graded: bool = False) -> None:
         assert study.optimize is not None
-        self.study, self.goals, self._graded = study, tuple(dict.fromkeys(goals)), graded
+        # Where the study names each.
+        self._keys = goals_of(study.optimize) | conditions_of(study.optimize)
+        self.study, self.goals, self._graded = study, tuple(dict.fromkeys(goals or self._keys)), graded
         self.squares: set[Goal] = set()
         self._rows: dict[Goal, int] = {}
         # Goals of commands and tables whose answers are found for all designs at once; those asked of each design.
@@ -100,12 +102,11 @@ class Evaluator:
             self.question = asked[0]
             one_by_one = follows(study, study.optimize.variables, ("workspace",))
             self._regions_together = not one_by_one and all(batched(each.column) for each in self._regional)
-        # Where the study names each.
-        self._keys = goals_of(study.optimize) | conditions_of(study.optimize)
-        commands = dict.fromkeys(each.command for each in self.goals if not each.regional)
+        commands = dict.fromkeys(each.command for each in self.goals if not each.regional and not each.expression)
         problems = [problem for command in commands for problem in self._look(command)]
         if problems:
-            raise StudyError(problems)
+            # A condition of two bounds would be named twice.
+            raise StudyError([*dict.fromkeys(problems)])
         self._poses = {command: stacked.poses_of(study, command) for command in self._together}
         # By command of which every pose must be valid: the number of its assembly margins.
         clear: dict[str, int] = {}
@@ -177,6 +178,12 @@ class Evaluator:
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
         batch = _Batch(self, designs)
+        values = {**self.study.parameters.nominal, **batch.parameters}
+        for each in self.goals:
+            if each.expression is not None:
+                found = np.asarray(each.expression.evaluate(values))
+                found = np.where(np.isfinite(found), found, np.nan)
+                batch.table[:, self.layout.column[each]] = np.abs(found) if each.absolute else found
         if self.question is not None and self._regions_together:
             self._regions(batch, batch.feasible, self.question, batch.places)
         for command, tables in self._together.items():

@@ -1,4 +1,4 @@
-"""Results by which designs are compared, by name: a number of the workspace, or the worst row of any column."""
+"""What designs are compared by: a number of the workspace, the worst row of any column, or an expression."""
 
 from __future__ import annotations
 
@@ -9,23 +9,25 @@ import numpy as np
 
 from mechdesign.analyses.workspace.question import COLUMNS, split
 from mechdesign.commands import COMMANDS
+from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
+from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Condition, OptimizeSection
 from mechdesign.study.text.document import KeyPath
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A result that is maximised, minimised or bounded: a number of the workspace, or the worst row of a column.
+    """What is maximised, minimised or bounded: a number of the workspace, the worst row of a column, or an expression.
 
     Parameters
     ----------
     name : str
         As the study gives it; of a condition with its bound.
     column : str
-        As `mechdesign.rows.choose` understands it.
+        As `mechdesign.rows.choose` understands it; of an expression its text.
     smallest : bool
         Whether the largest row is the worst one; of a condition, whether its bound is an upper one.
     absolute : bool
@@ -41,6 +43,7 @@ class Goal:
     absolute: bool = False
     where: tuple[tuple[str, object], ...] = ()
     bound: float = 0.0
+    expression: Expression | None = None  # over parameters, which no command computes: its word is empty then
 
     @property
     def regional(self) -> bool:
@@ -101,15 +104,18 @@ def _errors(result: Result, output: str, designs: int) -> Floats:
     return np.asarray(np.where(known, errors, 0.0) / np.sqrt(number)[:, None, None]).reshape(designs, -1)
 
 
-def goal(name: str, *, smallest: bool = False, where: Mapping[str, object] | None = None) -> Goal:
+def goal(
+    result: str | Expression, *, smallest: bool = False, where: Mapping[str, object] | None = None
+) -> Goal:  # fmt: skip
     """Read a result's name, such as ``GII``, ``stiffness.k_min``, ``kinematics.extremes.C.x.range``.
 
     Of an error the absolute value counts.
     """
-    command, column = _parts(name)
+    name, command, column, expression = _parts(result)
     rows = tuple((where or {}).items())
     title = f"{name} ({', '.join(f'{key} {value}' for key, value in rows)})" if rows else name
-    return Goal(title, command, column, smallest, column.endswith("_error"), rows)
+    error = expression is None and column.endswith("_error")
+    return Goal(title, command, column, smallest, error, rows, expression=expression)
 
 
 def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
@@ -129,13 +135,24 @@ def conditions_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
 
 def bounds_of(condition: Condition) -> Iterator[Goal]:
     """The worst rows that a condition judges, one for each of its bounds."""
-    command, column = _parts(condition.result)
+    _, command, column, expression = _parts(condition.result)
     for bound, upper in ((condition.at_least, False), (condition.at_most, True)):
         if bound is not None:
             name = f"{condition.name} {'at most' if upper else 'at least'} {bound:g}"
-            yield Goal(name, command, column, upper, condition.abs, tuple(condition.where.items()), bound)
+            where = tuple(condition.where.items())
+            yield Goal(name, command, column, upper, condition.abs, where, bound, expression)
 
 
-def _parts(name: str) -> tuple[str, str]:
-    command, _, column = name.partition(".")
-    return (command, column) if command in COMMANDS else ("workspace", name)
+def _parts(result: str | Expression) -> tuple[str, str, str, Expression | None]:
+    """Name, command, column and expression of what is judged."""
+    if isinstance(result, Expression):
+        return result.text, "", result.text, result
+    command, _, column = result.partition(".")
+    return (result, command, column, None) if command in COMMANDS else (result, "workspace", result, None)
+
+
+def unit_of(study: Study, text: str) -> str:
+    """Unit of an expression over parameters, known where it is a sum of multiples of parameters of one unit."""
+    expression = Expression.parse(text)
+    units = {study.unit_of(name) for name in expression.names}
+    return (units.pop() or "") if len(units) == 1 and expression.is_linear() else ""

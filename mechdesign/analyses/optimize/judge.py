@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
-from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
+from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of, unit_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube
 from mechdesign.errors import MechanismError
 from mechdesign.journal import Journal, digest
@@ -146,19 +146,20 @@ class Designs:
         return np.asarray(1 - share if self.goals[k].smallest else share)
 
     def unit_of(self, name: str) -> str:
-        """Unit of a goal, or of a variable that is a place of the geometry; none for a parameter."""
+        """Unit of a goal or a variable, where it is known."""
         for each in self.goals:
             if each.name == name:
                 return self._unit_and_meaning(each)[0]
-        place = self.study.mechanism.description.places.get(name)
-        return self.study.units.label(place.quantity) if place is not None else ""
+        return self.study.unit_of(name) or ""
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
         """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
         for name, column in self.variables.items():
             yield Column(name, column[rows], self.unit_of(name), "design variable")
         for each in self.goals:
-            yield Column(each.name, self.found[each][rows], *self._unit_and_meaning(each))
+            # A parameter that varies is a goal and a variable at once.
+            if each.name not in self.variables:
+                yield Column(each.name, self.found[each][rows], *self._unit_and_meaning(each))
         for each, error in self.errors.items() if errors else ():
             if each in self.goals:
                 meaning = f"estimated error of {each.name}"
@@ -166,6 +167,8 @@ class Designs:
         yield from shared(self.study.units, CPI=self.cpi[rows])
 
     def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
+        if judged.expression is not None:
+            return unit_of(self.study, judged.column), "expression over parameters"
         worst = (self._coordinate_unit(judged), f"worst row of {judged.name}")
         return self.meanings.get(judged.column, worst) if judged.regional else worst
 

@@ -32,7 +32,7 @@ _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
 TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*_OF_MOTION, "extremes", "loops"),
     "stiffness": ("stiffness", "compliance", "deflections"),
-    "reliability": ("moments", "reliability", "contributions"),
+    "reliability": ("moments", "reliability", "capability", "contributions"),
 }
 # Sections beside a command's own whose numbers it reads.
 ALSO_READ: Mapping[str, str] = {"kinematics": "workspace", "stiffness": "kinematics", "reliability": "kinematics"}
@@ -161,13 +161,14 @@ def tables(
     """
     torn = np.zeros(poses.designs, dtype=bool)
     solved: list[SolvedPoses] = []
+    absent: Mapping[str, str] = {}
     if command == "kinematics":
         motion = move(dataclasses.replace(motion_question(study), poses=poses), also=solved.append)
         known = {"motion": True, "targets": bool(motion.errors), "jacobian": motion.question.square}
         found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
         # Torn are designs whose motion ends where no limit is known.
         between, torn = kinematics.tables_between(motion, (), wanted, outputs)
-        found, reason = found | between, motion.reason
+        found, reason, absent = found | between, motion.reason, motion.question.absent
     elif command == "reliability":
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
@@ -176,7 +177,9 @@ def tables(
         found, reason = stiffness.tables(study, question, poses, held), held.reason
         found = {name: table for name, table in found.items() if name in TABLES[command]}
     reason = reason.reshape(poses.designs, -1)
-    return Stack(Result(command, found), reason, {"loops": torn | reason.any(axis=1), "extremes": torn}, solved)
+    return Stack(
+        Result(command, found, absent=absent), reason, {"loops": torn | reason.any(axis=1), "extremes": torn}, solved
+    )
 
 
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:

@@ -80,6 +80,8 @@ class Elasticity:
 
     def _knows(self, coordinate: Coordinate) -> bool:
         kind = coordinate.kind
+        if kind == "parameter":
+            return True
         if kind == "expression":
             return all(self._knows(part) for part in coordinate.parts)
         if kind == "angle":

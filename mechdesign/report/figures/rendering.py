@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from mechdesign.errors import explain
 from mechdesign.parallel import map_chunks
 
-Drawing = Callable[[], bytes]
+# To the files of one picture: their bytes by their names.
+Drawing = Callable[[], dict[str, bytes]]
 Arguments = ParamSpec("Arguments")
 
 # Fewer pictures are drawn sooner than processes are forked and their bytes are read.
@@ -55,22 +56,24 @@ def render(drawings: Mapping[str, Drawing]) -> tuple[dict[str, bytes], dict[str,
 
     Returns
     -------
-    pictures, failed : dict
-        Bytes, or why there are none, by name.
+    files : dict
+        Bytes by their names.
+    failed : dict
+        Why there are none, by the names of drawings.
     """
 
-    def draw(name: str) -> bytes | str:
+    def draw(name: str) -> dict[str, bytes] | str:
         try:
             return drawings[name]()
         except Exception as error:
             return explain(error)[1]
 
     names = list(drawings)
-    found: dict[str, bytes | str] = {}
+    found: dict[str, dict[str, bytes] | str] = {}
     with suppress(BrokenExecutor):
         jobs = 2 if sys.platform == "linux" and len(names) >= FEWEST else 1
         for name, drawn in zip(names, map_chunks(draw, names, jobs, processes=True), strict=True):
             found[name] = drawn
     found |= {name: draw(name) for name in names if name not in found}
-    pictures = {name: drawn for name in names if isinstance(drawn := found[name], bytes)}
-    return pictures, {name: why for name in names if isinstance(why := found[name], str)}
+    files = {file: data for name in names if isinstance(drawn := found[name], dict) for file, data in drawn.items()}
+    return files, {name: why for name in names if isinstance(why := found[name], str)}

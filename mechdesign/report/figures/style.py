@@ -62,6 +62,9 @@ _SETTINGS: dict[Any, Any] = {
     "image.cmap": COLORMAP,
     "figure.dpi": DPI,
     "savefig.dpi": DPI,
+    # Names of clips in SVG follow from what they are; PDF has fonts that journals take.
+    "svg.hashsalt": "mechdesign",
+    "pdf.fonttype": 42,
 }
 
 
@@ -142,12 +145,19 @@ def in_powers(value: float) -> str:
     return f"{digits}\N{MIDDLE DOT}10{str(int(power)).translate(_RAISED)}"
 
 
-def to_png(figure: Figure) -> bytes:
-    """The figure as PNG bytes without date, software or host, in at most 256 colours: a third of the size."""
+def encoded(figure: Figure, kind: str = "png") -> bytes:
+    """A figure as a file's bytes, ``png``, ``svg`` or ``pdf``, without date, software or host.
+
+    A PNG has at most 256 colours, a third of the size.
+    """
+    stream = io.BytesIO()
+    if kind != "png":
+        nothing = dict.fromkeys(("Date",) if kind == "svg" else ("CreationDate", "Creator", "Producer"))
+        figure.savefig(stream, format=kind, metadata=nothing)
+        return stream.getvalue()
     pixels = io.BytesIO()
     figure.savefig(pixels, format="rgba", dpi=DPI)
     picture = Image.frombytes("RGBA", figure.canvas.get_width_height(), pixels.getvalue()).convert("RGB")
-    stream = io.BytesIO()
     # Of Pillow's ways this one keeps rare colours: no colour moves by more than some 15 of 255, measured.
     few = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     few.save(stream, format="png", dpi=(DPI, DPI), compress_level=DEFLATE_LEVEL)

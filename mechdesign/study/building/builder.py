@@ -24,10 +24,10 @@ class Builder:
     """What a description is built from; mistakes go to the reporter, and what they spoil is left out."""
 
     def __init__(
-        self, section: models.MechanismSection, units: Units, parameters: Iterable[str], reporter: Reporter
+        self, section: models.MechanismSection, units: Units, parameters: Mapping[str, float], reporter: Reporter
     ) -> None:
         self.section = section
-        self.parameter_names = tuple(parameters)
+        self.parameter_values = parameters
         self.units = units
         self.reporter = reporter
         self.places: dict[str, Place] = {}
@@ -36,12 +36,14 @@ class Builder:
         self.links: dict[str, Link] = {}
         self.sketch = {name: complex(x.nominal, y.nominal) for name, (x, y) in section.sketch.items()}
 
-    def parameters(self, nominal: Mapping[str, float], formulas: Mapping[str, Expression]) -> Parameters:
-        """Parameters with the places that depend on them."""
+    def parameters(self, formulas: Mapping[str, Expression]) -> Parameters:
+        """Parameters, of which some have formulas, with the places that depend on them."""
         factors = {
             name: self.units.angle_factor if place.quantity == "angle" else 1.0 for name, place in self.places.items()
         }
-        return Parameters(dict(nominal), dict(formulas), dict(self.formulas), factors, frozenset(self.measured))
+        return Parameters(
+            dict(self.parameter_values), dict(formulas), dict(self.formulas), factors, frozenset(self.measured)
+        )
 
     def report(self, path: Iterable[str | int], message: str, *, at_key: bool = False) -> None:
         """Note a problem at a path below ``mechanism``."""
@@ -86,7 +88,7 @@ class Builder:
             self.report(("links",), f"there is no 'ground', the fixed link whose frame is the world; {cure}")
         seen: dict[str, str] = {}
         groups: list[tuple[str, str, Iterable[str]]] = [
-            ("parameter", "parameters", self.parameter_names),
+            ("parameter", "parameters", self.parameter_values),
             ("link", "links", section.links),
             ("point", "", self.section.owners),
             ("joint", "joints", section.joints),

@@ -12,6 +12,7 @@ from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import (
+    MEASURED,
     Description,
     Drive,
     Fixed,
@@ -28,6 +29,7 @@ from mechdesign.mechanism.model import (
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import StudyNumber
 
 
 def build(builder: Builder) -> Description:
@@ -251,7 +253,11 @@ def _measures(builder: Builder) -> dict[str, Measure]:
             except ExpressionError as error:
                 builder.report(path, str(error))
                 continue
-            if all(builder.check_name(item, known, "coordinate", path) for item in sorted(expression.names)):
+            parameters = builder.parameter_values
+            what, listed = "coordinate or parameter", [*known, *parameters]
+            if all(builder.check_name(item, listed, what, path) for item in sorted(expression.names)):
+                for item in expression.names & parameters.keys():
+                    builder.place(MEASURED + item, StudyNumber(parameters[item], Expression.parse(item)), "none")
                 found[name] = Measure(name, "expression", None, expression)
         elif pair is not None and builder.check_named(section.kind, pair, (*path, section.kind)):
             found[name] = Measure(name, section.kind, pair)

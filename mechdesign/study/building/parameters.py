@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechdesign.expressions import Expression, Number
+from mechdesign.mechanism.model import MEASURED
 
 
 @dataclass(frozen=True)
@@ -99,11 +100,15 @@ class Parameters:
 
     def match(self, pattern: str) -> tuple[str, ...]:
         """Places that a pattern such as ``*.length`` names."""
-        return tuple(place for place in self.factors if fnmatchcase(place, pattern))
+        return tuple(place for place in self._dimensions() if fnmatchcase(place, pattern))
 
     def known(self) -> Iterable[str]:
-        """Names of all parameters and places."""
-        return [*self.nominal, *self.factors]
+        """Names of all parameters and dimensions."""
+        return [*self.nominal, *self._dimensions()]
+
+    def _dimensions(self) -> Iterator[str]:
+        """Places of the geometry, without those of parameters in measures."""
+        return (place for place in self.factors if not place.startswith(MEASURED))
 
 
 def _number(value: ArrayLike) -> Number:

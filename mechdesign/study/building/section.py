@@ -159,7 +159,7 @@ class Measure(fields.Model):
 
     bare, short = "expression", (fields.NAME_FORM,)
     one_of = (
-        "a measure is one of {angle: [a, b]}, {distance: [P, Q]} or an expression over coordinates",
+        "a measure is one of {angle: [a, b]}, {distance: [P, Q]} or an expression over coordinates and parameters",
         "angle",
         "distance",
         "expression",

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
+from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure
+from mechdesign.study.text.fields import Context, failure, shown
+from mechdesign.study.text.units import QUANTITY
 
 # Results of a workspace that a goal or condition may name without its command.
 INDICES = ("GII", "GRI", "SUI", "area", "box_area")
 # Those of a local index follow its name.
 _STATISTICS = ("mean", "min", "max", "std")
+_RESULT = "a result, such as GII or kinematics.C.y"
 # Commands whose section no default can replace.
 _UNASSUMED = ("reliability", "stiffness")
 
@@ -41,19 +45,62 @@ class Variable(fields.Model):
         return self
 
 
+def _known() -> tuple[str, ...]:
+    """Results of a workspace that need no command's name."""
+    return (*INDICES, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in _STATISTICS))
+
+
+def _result(raw: Any, context: Context) -> str | Expression:
+    """The name of a result, or an expression over parameters; a name that is both is the result's."""
+    if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
+        raise failure(f"expected a result, such as GII or kinematics.mu, or an expression, not {shown(raw)}")
+    if fields.COORDINATE.fullmatch(raw) and (raw not in context.parameters or raw in _known()):
+        return raw
+    try:
+        expression = context.expression(raw)
+    except ExpressionError as error:
+        raise failure(str(error)) from None
+    for name in sorted(expression.names - context.parameters.keys()):
+        cure = suggestion(name, context.parameters)
+        if "." in name:
+            cure = "; a measure takes coordinates and parameters: mechanism.measures: {NAME: ...}, then kinematics.NAME"
+        raise failure(f"{name!r} in {shown(raw)} is not a parameter, and an expression here is over parameters{cure}")
+    return expression
+
+
+def _required(raw: Any, context: Context) -> str:
+    if isinstance(raw, str) and raw.startswith("optimize."):
+        # A column of its tables may be an expression.
+        return raw
+    if isinstance(found := _result(raw, context), str):
+        return found
+    cure = f"give it as a measure, mechanism.measures: {{NAME: {raw}}}, and require kinematics.NAME"
+    raise failure(f"a requirement judges the result of a command, and {shown(raw)} is of parameters alone; {cure}")
+
+
 class Judged(fields.Model):
-    """A result, and the rows of it that count."""
+    """A result, and the rows of it that count; or an expression over parameters."""
 
     bare = "result"
     short: ClassVar[tuple[fields.Form, ...]] = (fields.NAME_FORM,)
-    result: fields.CoordinateName
+    result: Annotated[
+        str | Expression,
+        fields.Read(_result, {**fields.NAME_FORM, "description": f"{_RESULT}, or an expression over parameters"}),
+    ]
     where: dict[str, str | float | int] = Field(default_factory=dict)
 
     @property
     def name(self) -> str:
         """The result, and in parentheses which rows count."""
         where = ", ".join(f"{column} {wanted}" for column, wanted in self.where.items())
-        return f"{self.result} ({where})" if where else self.result
+        text = self.result if isinstance(self.result, str) else self.result.text
+        return f"{text} ({where})" if where else text
+
+    @model_validator(mode="after")
+    def _of_rows(self) -> Self:
+        if self.where and isinstance(self.result, Expression):
+            raise failure(f"{self.result.text!r} is one number for each design: it has no rows, so leave out 'where'")
+        return self
 
 
 class Condition(Judged):
@@ -71,6 +118,12 @@ class Condition(Judged):
         if self.at_least is not None and self.at_most is not None and self.at_most < self.at_least:
             raise failure(f"nothing is at least {self.at_least:g} and at most {self.at_most:g}")
         return self
+
+
+class Requirement(Condition):
+    """A condition on the result of a command."""
+
+    result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "description": _RESULT})]
 
 
 def _weight_row(raw: Any, info: ValidationInfo) -> Any:
@@ -156,22 +209,45 @@ class OptimizeSection(fields.Model):
             report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
         if self.method == "grid" and self.evaluations is not None:
             report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
-        for key, goals in (("maximize", self.maximize), ("minimize", self.minimize)):
-            for index, goal in enumerate(goals):
-                check_result(checker, goal.result, (*root, key, index))
-        for index, condition in enumerate(self.subject_to):
-            check_result(checker, condition.result, (*root, "subject_to", index, "result"))
+        moved = checker.parameters.moved(self.variables)
+        judged: list[tuple[Judged, KeyPath]] = [
+            *((goal, (*root, key, k)) for key in ("maximize", "minimize") for k, goal in enumerate(getattr(self, key))),
+            *((condition, (*root, "subject_to", k, "result")) for k, condition in enumerate(self.subject_to)),
+        ]
+        for each, path in judged:
+            if isinstance(each.result, str):
+                check_result(checker, each.result, path)
+            elif each.result.names.isdisjoint(moved):
+                report(path, f"{each.name!r} is the same for every design: no variable changes it")
+        for k, condition in enumerate(self.subject_to):
+            for key in condition.given("at_least", "at_most"):
+                _check_bound(checker, condition, (*root, "subject_to", k, key), moved)
         return self
+
+
+def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: Collection[str]) -> None:
+    """Note a bound that the parameters in `moved` change."""
+    raw, names = checker.reporter.raw(path), frozenset[str]()
+    # What is no expression has been reported.
+    with suppress(ExpressionError):
+        names = Expression.parse(str(raw)).names
+    if names.isdisjoint(moved):
+        return
+    cure = f"a measure may take parameters, as in mechanism.measures: {{NAME: COORDINATE - ({raw})}}"
+    if isinstance(condition.result, Expression):
+        cure = f"bound the difference, {{result: {condition.result.text} - ({raw}), {path[-1]}: 0}}"
+    checker.report(path, f"{raw!r} changes with the variables, and a bound is the same for every design; {cure}")
 
 
 def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:
     """Check the name of a result: a statistic of the workspace, or ``command.column``, as it must be if `required`."""
     command, _, rest = name.partition(".")
-    known = (*INDICES, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in _STATISTICS))
+    known = _known()
     if rest:
         checker.known(command, COMMANDS, "command", path)
     elif required or name not in known:
-        hint = suggestion(name, known) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+        names = known if required else (*known, *checker.parameters.nominal)
+        hint = suggestion(name, names) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
         checker.report(path, f"there is no result {name!r}{hint}")
     if not required:
         column = name.rpartition(".")[2]

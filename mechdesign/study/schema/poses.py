@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from mechdesign.errors import counted
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.text import fields
@@ -221,12 +222,18 @@ class KinematicsSection(MotionSection):
     """How does it move?"""
 
     command: ClassVar[str] = "kinematics"
+    jacobian: fields.CoordinateNames | None = None
     loads: tuple[Load, ...] = ()
     characteristic_length: fields.PositiveLength | None = None
 
     def checked(self, checker: Checker) -> Self:
         """Check the outputs as well, and what loads act on."""
         checker.outputs(self.outputs, ("kinematics", "outputs"))
+        checker.outputs(self.jacobian, ("kinematics", "jacobian"))
+        rows = [part for name in self.jacobian or () for part in checker.mechanism.coordinates_of(name)]
+        if self.jacobian is not None and len(rows) != (drives := len(checker.mechanism.drives)):
+            what = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
+            checker.report(("kinematics", "jacobian"), f"{what}; a Jacobian has as many outputs as drives", at_key=True)
         for index, load in enumerate(self.loads):
             path: KeyPath = ("kinematics", "loads", index)
             if load.at is not None:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from mechdesign.errors import Problem, StudyError, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
-from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.optimize import OptimizeSection, Requirement
 from mechdesign.study.schema.poses import KinematicsSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.stiffness import StiffnessSection
@@ -32,7 +32,7 @@ class StudyFile(fields.Model):
     optimize: OptimizeSection | None = None
     reliability: ReliabilitySection | None = None
     stiffness: StiffnessSection | None = None
-    requirements: tuple[Condition, ...] = Field((), description="the gate: the worst row of each result counts")
+    requirements: tuple[Requirement, ...] = Field((), description="the gate: the worst row of each result counts")
 
 
 def schema() -> dict[str, Any]:
