@@ -285,7 +285,7 @@ def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:
         return None
     pose, question, scale, errors = setting.pose, setting.question, task.scale, sums[setting.pose].kept
     return Samples(
-        pose, *task.labels, errors * scale[:, None], question.kept(errors).all(axis=0),
+        pose, *task.labels, errors * scale[:, None], np.logical_and.reduce(question.kept(errors)),
         tuple((b.output, b.low * scale[b.output], b.high * scale[b.output]) for b in question.bands),
         tuple((d.x, d.y, d.radius) for d in question.discs), question.pair,
         task.linear.shift()[:, pose] * scale, task.linear.covariance()[pose] * np.outer(scale, scale),

@@ -47,12 +47,25 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
     bars = [100.0 * _shares(block["share"].reshape(poses.count, -1), sobol, each) for block in blocks]
     largest = np.max([np.nan_to_num(bar).mean(axis=0) for bar in bars], axis=0)
     ranked = np.argsort(-largest, kind="stable")[:MAX_SOURCES]
+    where = "" if each and poses.count > 1 else f"average over {poses.count} poses"
+    if sobol is not None or poses.count == 1:
+        section, pose = study.reliability, sobol or 0
+        assert section is not None
+        fails_most = pose == worst and bool(section.limits)
+        where = f"at {worst_in_words(study, poses, pose) if fails_most else pose_in_words(study, poses, pose)}"
+    notes = []
+    if any((bar < -1.0).any() for bar in bars):
+        notes.append("correlated sources make up for each other: negative shares, and others above 100 %")
+    elif sobol is not None:
+        notes.append(f"Sobol indices that differ by less than {100 * _SAME_SHARE:g} % are not marked")
+        if not np.isfinite(table["sobol_total"].reshape(poses.count, -1)[sobol]).all():
+            notes.append("correlated sources have none")
     margin = 0.3 + 0.072 * max(len(names[k]) for k in ranked)
     columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, int((style.WIDTH - margin) / (_ACROSS + _MIN_WIDTH))))
     tall = (0.15 + len(ranked)) * max(_SOURCE_HEIGHT, 0.1 * len(bars[0]) + 0.06)
     figure, grid = style.page(
-        len(pairs), columns, tall, left=margin, right=0.2, top=0.75, bottom=0.95, across=_ACROSS, down=_PANEL_GAP,
-        sharey=True,
+        len(pairs), columns, tall, left=margin, right=0.2, top=0.75 + 0.2 * bool(notes), bottom=0.95, across=_ACROSS,
+        down=_PANEL_GAP, sharey=True,
     )  # fmt: skip
     entries: dict[str, Any] = {}
     for k, (axis, block, shown) in enumerate(zip(grid, blocks, bars, strict=True)):
@@ -69,19 +82,8 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         _name(axis, [names[k] for k in ranked])
         axis.set_title(heading(*pairs[k]), loc="left", fontsize=9.5)
         axis.set_xlabel("share of the variance [%]" if k + columns >= len(pairs) else "")
-    notes = [] if each and poses.count > 1 else [f"average over {poses.count} poses"]
-    if sobol is not None or poses.count == 1:
-        section, pose = study.reliability, sobol or 0
-        assert section is not None
-        fails_most = pose == worst and bool(section.limits)
-        notes = [f"at {worst_in_words(study, poses, pose) if fails_most else pose_in_words(study, poses, pose)}"]
-    if any((bar < -1.0).any() for bar in bars):
-        notes.append("correlated sources: negative shares, where one makes up for another, let others exceed 100 %")
-    if sobol is not None:
-        known = np.isfinite(np.concatenate([block["sobol_total"][sobol * len(names) + ranked] for block in blocks]))
-        notes += [f"Sobol indices that differ by less than {100 * _SAME_SHARE:g} % are not marked"] * bool(known.any())
-        notes += ["correlated sources have none"] * (not known.all())
-    title(figure, "Where the variance of the error comes from", "; ".join(notes), left=margin)
+    title(figure, "Where the variance of the error comes from", where, left=margin)
+    figure.text(margin / style.WIDTH, 1 - 0.5 / figure.get_figheight(), "; ".join(notes), va="top", fontsize=8.5)
     legend_below(figure, list(entries.values()), list(entries))
     return figure
 
@@ -121,8 +123,8 @@ def _name(axis: Axes, names: list[str]) -> None:
     axis.tick_params(axis="y", length=0)
     axis.set_yticks(np.arange(len(names)), names)
     axis.set_ylim(len(names) - 0.42, -0.58)
-    axis.margins(x=0.18)
-    axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.get_xlim()[0] < -2.0 else 0.0)
+    axis.margins(x=0.25)
+    axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.dataLim.x0 < -1.0 else 0.0)
 
 
 def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:

@@ -121,7 +121,7 @@ def _histogram(axis: Axes, shown: _Histogram, entries: dict[str, Any], *, logari
         axis.text(0.99, 0.98, f"limit {told} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
                   fontsize=8, color=style.VERMILION)  # fmt: skip
     axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}" if unit else ""))
-    axis.locator_params(axis="x", nbins=5)
+    axis.locator_params(axis="x", nbins=4)
 
 
 def _limits(axis: Axes, limits: tuple[float, float], entries: dict[str, Any]) -> list[float]:
