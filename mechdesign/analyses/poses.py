@@ -16,7 +16,7 @@ from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value, wrap
 from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.mechanism import drawn
+from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.parallel import map_chunks
@@ -175,12 +175,12 @@ def dimensions(poses: Poses, rows: Ints) -> dict[str, Value]:
 
 
 def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | None:
-    """Where poses of other designs without a closed form start: their own assembled sketch, shape of `rows`."""
+    """Where poses of other designs without a closed form start, see `begun`; shape of `rows`."""
     if not poses.places:
         return None
     each = poses.count // poses.designs
     designs, which = np.unique(rows // each, return_inverse=True)
-    return drawn(mechanism, dimensions(poses, designs * each)).take(which.reshape(rows.shape))
+    return begun(mechanism, dimensions(poses, designs * each)).take(which.reshape(rows.shape))
 
 
 def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -> list[Column]:

@@ -206,14 +206,12 @@ class Variant(Mechanism):
     """A mechanism with other dimensions than its original: nothing of its topology is compiled again.
 
     The assembly modes stay those of the original; groups without a closed form start from its sketch, brought to the
-    new dimensions by continuation at the same values of the drives.
+    new dimensions by continuation at the same values of the drives, or as it is where that does not close.
 
     Raises
     ------
     MechanismError
         If the angles of slides and clamps in a closed chain contradict each other.
-    AssemblyError
-        If a group without a closed form has no assembly to start from.
     """
 
     def __init__(self, original: Mechanism, description: Description) -> None:
@@ -241,12 +239,11 @@ class Variant(Mechanism):
     def _assemble_sketch(self) -> Configuration:
         before = self.original.nominal
         changed = {name: value for name, value in self.nominal.items() if value != before[name]}
+        if self.forward.iterative:
+            found = begun(self.original, changed)
+            return replace(found, places={name: v for name, v in found.places.items() if v == before[name]})
         found = drawn(self.original, changed)
-        if not found.valid:
-            if self.forward.iterative:
-                raise AssemblyError("the sketch cannot be assembled with these dimensions")
-            found = elsewhere(self.original, changed)
-        return replace(found, places={})
+        return replace(found if found.valid else elsewhere(self.original, changed), places={})
 
 
 def elsewhere(mechanism: Mechanism, changed: Mapping[str, Value]) -> Configuration:
@@ -269,3 +266,14 @@ def drawn(mechanism: Mechanism, places: Mapping[str, Value]) -> Configuration:
     sketch = mechanism.sketch_configuration
     given = [sketch.value(coordinate) for coordinate in mechanism.forward.structure.given]
     return mechanism.forward.solve(given, places, limits=False)
+
+
+def begun(mechanism: Mechanism, places: Mapping[str, Value]) -> Configuration:
+    """Where groups without a closed form are continued from: the sketch with other dimensions, if it closes so.
+
+    Where it does not it is the sketch with its own dimensions: these change on the way to a pose as the drives do.
+    """
+    found = drawn(mechanism, places)
+    if found.valid.all():
+        return found
+    return drawn(mechanism, {name: np.where(found.valid, v, mechanism.nominal[name]) for name, v in places.items()})

@@ -9,6 +9,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.study.variants import variant
 
 # A platform on three legs, each a crank and a rod; its angle is asked for as it is, or by a measure.
 PLATFORM = """
@@ -117,3 +118,18 @@ def test_a_region_between_folds_has_its_area() -> None:
     (question,) = questions(study_of(PLATFORM.format(held="lead: [0.45]", assembly="any")), wanted=("area",))
     found = answer(question, {}, 1, BATCH)
     assert found.values["area"][0] == pytest.approx(reached(0.45), rel=1e-6)
+
+
+def test_region_of_a_design_that_does_not_close_where_the_sketch_is_drawn() -> None:
+    """With so short cranks the point cannot be where it is drawn; by the platform's angle there is a closed form."""
+    far = (
+        "mechanism.sketch={P: [0.8, 0.16], B1: [0.69338, 0.01463], B2: [0.9752, 0.1175], B3: [0.73142, 0.34787], "
+        "D1: [0.39814, -0.03856], D2: [1.1142, 0.38335], D3: [0.47338, 0.50089]}"
+    )
+    areas = []
+    for held in (BY_ANGLE, BY_MEASURE):
+        study = variant(study_of(PLATFORM.format(held=held, assembly="any"), far), {"crank": 0.16})
+        (question,) = questions(study, wanted=("area",))
+        areas.append(answer(question, {}, 1, BATCH).values["area"][0])
+    assert areas[0] > 0.008
+    assert areas[1] == pytest.approx(areas[0], rel=1e-4)

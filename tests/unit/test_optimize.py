@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.variables import grid
 from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.study.variants import variant
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 COARSE = ("optimize.variables.l_min.step=0.5", "optimize.variables.l_a.step=0.5")
@@ -148,3 +150,59 @@ def test_threads_do_not_change_a_bit() -> None:
     for column in one.columns:
         if column.values.dtype.kind == "f":
             assert column.values.tobytes() == two[column.name].tobytes(), column.name
+
+
+FOUR_BAR = """
+mechanism:
+  parameters: {r: 30}
+  links:
+    ground: {O: [0, 0], D: [100, 0]}
+    crank: [O, A, r]
+    rod: {from: A, to: B, length: 90, points: {P: [45, 20]}}
+    rocker: [D, B, 60]
+  drives: [crank]
+  sketch: {A: [-25, 20], B: [60, 50]}
+kinematics: {poses: [{crank: 20}, {crank: 60}], outputs: [P]}
+optimize: {variables: {r: {from: 30, to: 60, step: 30}}, maximize: kinematics.P.y}
+"""
+# Three legs, of which the sketch stretches one: with shorter cranks it does not close where they are drawn.
+PLATFORM = (
+    "mechanism.sketch={A1: [-87.54, -30.3], A2: [57.55, -106.76], A3: [124.76, 149.83], "
+    "C1: [31.43, -45.96], C2: [129.09, -10.42], C3: [49.48, 56.38]}",
+    "optimize={variables: {crank: {from: 80, to: 160, step: 80}}, maximize: [kinematics.inverse_condition]}",
+)
+
+
+def test_design_of_dyads_that_closes_at_the_poses_asked_but_not_at_the_sketchs() -> None:
+    with pytest.raises(StudyError, match="the sketch cannot be assembled"):
+        study_of(FOUR_BAR, "mechanism.parameters.r=60")
+    designs = mechdesign.optimize(study_of(FOUR_BAR)).tables["designs"]
+    poses = mechdesign.kinematics(study_of(FOUR_BAR, "mechanism.parameters.r=60", "mechanism.sketch.A=[40, 45]"))
+    assert designs["feasible"].all()
+    assert designs["kinematics.P.y"][1] == pytest.approx(poses.tables["motion"]["P.y"].min())
+
+
+def test_design_without_closed_form_that_closes_at_the_poses_asked_but_not_at_the_sketchs() -> None:
+    drawn = mechdesign.load(CONFIGS / "gallery" / "rrr_orientations.yaml", PLATFORM)
+    asked, short = {"P.x": 0.0, "P.y": 0.0, "platform.angle": 0.0}, {f"crank_{k}.length": 80.0 for k in (1, 2, 3)}
+    there = drawn.mechanism.solve(asked, short)
+    drives = ", ".join(f"{name}: {float(there[name])!r}" for name in drawn.mechanism.drives)
+    with pytest.raises(StudyError, match="the sketch cannot be assembled"):
+        mechdesign.load(CONFIGS / "gallery" / "rrr_orientations.yaml", [*PLATFORM, "mechanism.parameters.crank=80"])
+    by_drives, by_pose = (
+        mechdesign.optimize(
+            mechdesign.load(
+                CONFIGS / "gallery" / "rrr_orientations.yaml",
+                [*PLATFORM, f"kinematics={{outputs: [P, platform.angle], poses: [{{{pose}}}]}}",
+                 "kinematics.characteristic_length=60"],
+            )
+        )
+        for pose in (drives, ", ".join(f"{name}: {value}" for name, value in asked.items()))
+    )  # fmt: skip
+    name = "kinematics.inverse_condition"
+    assert by_drives.tables["designs"]["feasible"][0]
+    assert by_drives.tables["designs"][name][0] == pytest.approx(by_pose.tables["designs"][name][0])
+    # Alone, as designs are asked for tables that are not found of all at once.
+    alone = variant(drawn, {"crank": 80.0}).mechanism
+    values = [float(there[name]) for name in alone.drives]
+    assert alone.solve(dict(zip(alone.drives, values, strict=True)))["P.x"] == pytest.approx(0, abs=1e-9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -25,17 +25,23 @@ from mechdesign.analyses.optimize.tables import (
     sensitivity_table,
 )
 from mechdesign.analyses.optimize.variables import grid, in_words
-from mechdesign.analyses.poses import solve_shown
+from mechdesign.analyses.poses import solve_poses, solve_shown, study_poses
+from mechdesign.analyses.region.curves import workspace_nodes
+from mechdesign.analyses.region.rays import SINGLE
 from mechdesign.analyses.workspace.analysis import index_meanings, workspace
+from mechdesign.analyses.workspace.contained import fitting_scale
+from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import one_thread, workers
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
+from mechdesign.study.schema.workspace import Over
 from mechdesign.study.variants import changed_data, rewritten, variant
 
 # Numbers that a search keeps of the rows behind its goals.
@@ -82,7 +88,7 @@ def optimize(
         raise StudyError((study.problem(message, "optimize", "maximize"),))
     weights = np.array(section.weights or [[1.0] * len(goals)], dtype=float).reshape(-1, len(goals))
     evaluator = Evaluator(study, graded=section.method != "grid")
-    meanings = index_meanings(study, evaluator.question) if evaluator.question is not None else {}
+    meanings = _meanings(study, evaluator)
     budget = section.evaluations or (
         pareto.FRONT_EVALUATIONS * len(goals)
         if section.method == "pareto"
@@ -133,7 +139,7 @@ def _ask(
     dimensions, smallest = len(section.variables), [each.smallest for each in judge.goals]
     judge.progress.start(budget, "designs")
     # Values of a workspace are known to a tolerance only.
-    rough = evaluator.question is not None
+    rough = bool(evaluator.questions)
     explorer = Explorer(judge.known, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
     if section.method == "search":
         use_all = section.evaluations is not None
@@ -185,13 +191,30 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[str]:
         yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {place})"
     if len(reasons) > MAX_REASONS:
         yield f"designs are infeasible for {len(reasons) - MAX_REASONS} more reasons; see designs.csv"
-    if evaluator.question is None or evaluator.question.rule != "gauss":
+    if not evaluator.questions or evaluator.questions[0].rule != "gauss":
         return
     for each, error in designs.errors.items():
-        loose = designs.feasible & (error > 2 * evaluator.question.tolerance * np.abs(designs.found[each]))
+        loose = designs.feasible & (error > 2 * evaluator.questions[0].tolerance * np.abs(designs.found[each]))
         if loose.any():
             told = f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for"
             yield f"{told}; see {each.name}_error"
+
+
+def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each number of the workspace, by its column."""
+    if not evaluator.questions:
+        return {}
+    assert study.workspace is not None
+    found = index_meanings(study, evaluator.questions[0])
+    for each in evaluator.goals:
+        if each.shape is not None:
+            told = f"largest factor by which the {each.shape.name} may be scaled for the workspace to hold it"
+            found[each.column] = "", f"{told}: contained from 1 on, negative where its centre lies outside"
+    if len(evaluator.questions) > 1:
+        held = [f"{name} = {', '.join(f'{v:g}' for v in values)}"
+                for name, values in study.workspace.at.items() if not isinstance(values, Over)]  # fmt: skip
+        return {name: (unit, f"{meaning}; the worst at {'; '.join(held)}") for name, (unit, meaning) in found.items()}
+    return found
 
 
 def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> tuple[dict[str, str], list[str]]:
@@ -213,19 +236,35 @@ def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> 
         heading = f"{heading}: {in_words(numbers)}"
         data = changed_data(study, numbers)
         try:
-            mechanism = variant(study, numbers).mechanism
-            if not _assembles_alike(study, mechanism, data):
-                # With the sketch as it assembles.
-                sketch = data["mechanism"]["sketch"]
-                places = [np.asarray(mechanism.sketch_configuration.point(point)).item() for point in sketch]
-                sketch |= {point: [z.real, z.imag] for point, z in zip(sketch, places, strict=True)}
-                if not _assembles_alike(study, mechanism, data):
+            best = variant(study, numbers)
+            judged = [each for each in (*designs.goals, *designs.conditions) if not each.expression]
+            drawings = _drawings(best, dict.fromkeys(each.command for each in judged))
+            while not _assembles_alike(study, best.mechanism, data):
+                pose = next(drawings, None)
+                if pose is None:
                     doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
+                    break
+                sketch = data["mechanism"]["sketch"]
+                places = [np.asarray(pose.point(point)).item() for point in sketch]
+                sketch |= {point: [z.real, z.imag] for point, z in zip(sketch, places, strict=True)}
         except MechdesignError as error:
             doubts.append(f"{name}.yaml: {str(error).splitlines()[0]}")
         text, beside = rewritten(study, data, heading)
         files |= {f"{name}.yaml": text, **beside}
     return files, doubts
+
+
+def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:
+    """Poses that a design may be drawn in: its sketch as it assembles, or else one that a command asks for."""
+    yield study.mechanism.sketch_configuration
+    for command in commands:
+        poses = workspace_nodes(study) if command == "workspace" else study_poses(study, command)
+        for solved in solve_poses(study, poses):
+            valid = np.flatnonzero(solved.configuration.valid)
+            if valid.size:
+                # Not the first: a workspace begins at its boundary, where legs are stretched.
+                yield solved.configuration.take(int(valid[valid.size // 2]))
+                break
 
 
 def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]) -> bool:
@@ -240,12 +279,16 @@ def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]
 def drawn_design(designs: Designs, numbers: Mapping[str, float]) -> tuple[Study, Result]:
     """A design as a study, with what was judged of it: its workspace, or else its motion with the targets' errors."""
     made = variant(designs.study, numbers)
-    if made.workspace is not None and any(each.command == "workspace" for each in designs.goals):
+    judged = (*designs.goals, *designs.conditions)
+    if made.workspace is not None and any(each.command == "workspace" for each in judged):
         # The region is drawn, not its indices.
         plain = dataclasses.replace(made, workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:
-            return plain, result
+            shapes = [each.shape for each in designs.conditions if each.shape is not None]
+            panels = answer(questions(plain, wanted=("area",))[0], {}, 1, SINGLE).panels
+            contained = [(shape, complex(fitting_scale(shape, panels)[1][0])) for shape in shapes]
+            return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
     with suppress(MechdesignError):
         if any(each.command == "kinematics" for each in designs.goals):
             return made, kinematics(made)

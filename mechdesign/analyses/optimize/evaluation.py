@@ -17,7 +17,10 @@ from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
 from mechdesign.analyses.poses import POSES_AT_ONCE, solve_poses, study_poses
 from mechdesign.analyses.region.rays import BATCH
+from mechdesign.analyses.workspace.contained import fitting_scale
 from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, split
+from mechdesign.analyses.workspace.ranged import Ranged
+from mechdesign.analyses.workspace.tables import where
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -91,17 +94,16 @@ class Evaluator:
         # Outputs whose extremes are asked.
         self._outputs: set[str] = set()
         self._regional = [each for each in self.goals if each.regional]
-        self._columns = tuple(dict.fromkeys(("area", *(each.column for each in self._regional))))
-        self.question: Question | None = None
+        whole = [each for each in self._regional if each.shape is None]
+        self._columns = tuple(dict.fromkeys(("area", *(each.column for each in whole))))
+        # One for each value of the held coordinates; of each design the worst counts.
+        self.questions: list[Question] = []
         self._regions_together = True
         if self._regional:
-            asked = questions(study, GRID_TOLERANCE, self._columns)
-            if len(asked) > 1:
-                message = "an optimisation compares one workspace a design: hold one value of each coordinate"
-                raise StudyError([study.problem(message, "workspace", "at")])
-            self.question = asked[0]
+            self.questions = questions(study, GRID_TOLERANCE, self._columns)
             one_by_one = follows(study, study.optimize.variables, ("workspace",))
-            self._regions_together = not one_by_one and all(batched(each.column) for each in self._regional)
+            one_by_one |= isinstance(self.questions[0].field, Ranged)
+            self._regions_together = not one_by_one and all(batched(each.column) for each in whole)
         commands = dict.fromkeys(each.command for each in self.goals if not each.regional and not each.expression)
         problems = [problem for command in commands for problem in self._look(command)]
         if problems:
@@ -184,8 +186,8 @@ class Evaluator:
                 found = np.asarray(each.expression.evaluate(values))
                 found = np.where(np.isfinite(found), found, np.nan)
                 batch.table[:, self.layout.column[each]] = np.abs(found) if each.absolute else found
-        if self.question is not None and self._regions_together:
-            self._regions(batch, batch.feasible, self.question, batch.places)
+        if self.questions and self._regions_together:
+            self._regions(batch, batch.feasible, self.questions, batch.places)
         for command, tables in self._together.items():
             rows, size = batch.feasible, max(1, POSES_AT_ONCE // self._poses[command](1, {}, {}).count)
             for begin in range(0, len(rows), size):
@@ -198,26 +200,37 @@ class Evaluator:
             batch.note(slice(None), np.isnan(values), f"{each.name} has no value")
         return Evaluated(batch.table, [str(reason) for reason in batch.reasons])
 
-    def _regions(self, batch: _Batch, rows: Ints, question: Question, places: Mapping[str, Number]) -> None:
-        """Numbers of the workspaces of some designs."""
+    def _regions(
+        self, batch: _Batch, rows: Ints, asked: Sequence[Question], places: Mapping[str, Number]
+    ) -> None:  # fmt: skip
+        """Numbers of the workspaces of some designs, the worst of all values of the held coordinates."""
         if not len(rows):
             return
         try:
-            given = answer(question, batch.take(places, rows), len(rows), BATCH)
+            given = [answer(question, batch.take(places, rows), len(rows), BATCH) for question in asked]
         except AssemblyError as error:
             # One design's workspace has no end; the others are asked in halves.
             if len(rows) == 1:
                 batch.reasons[rows] = _plainly(error)
                 return
             for half in np.array_split(rows, 2):
-                self._regions(batch, half, question, places)
+                self._regions(batch, half, asked, places)
             return
-        for each in self._regional:
-            column = self.layout.column[each]
-            batch.table[rows, column] = given.values[each.column]
-            if split(each.column)[1] == "mean":
-                batch.table[rows, len(self.goals) + column] = given.errors[each.column]
-        batch.note(rows, ~(given.panels.closes & (given.values["area"] > 0)), NO_REGION)
+        for question, each in zip(asked, given, strict=True):
+            there = where(question) if len(asked) > 1 else ""
+            batch.note(rows, ~(each.panels.closes & (each.values["area"] > 0)), NO_REGION + there)
+        lanes = np.arange(len(rows))
+        for goal in self._regional:
+            column, shape = self.layout.column[goal], goal.shape
+            values = np.stack([
+                each.values[goal.column] if shape is None else fitting_scale(shape, each.panels)[0] for each in given
+            ])  # fmt: skip
+            # Where one has no value none is worse.
+            worst = np.where(np.isnan(values), np.inf, values if goal.smallest else -values).argmax(axis=0)
+            batch.table[rows, column] = values[worst, lanes]
+            if split(goal.column)[1] == "mean":
+                errors = np.stack([each.errors[goal.column] for each in given])
+                batch.table[rows, len(self.goals) + column] = errors[worst, lanes]
 
     def _tables(self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints) -> None:
         poses = self._poses[command](len(rows), batch.take(batch.places, rows), batch.take(batch.parameters, rows))
@@ -260,7 +273,7 @@ class Evaluator:
         try:
             other = variant(self.study, {name: float(column[k]) for name, column in batch.designs.items()})
             if not self._regions_together:
-                self._regions(batch, row, questions(other, GRID_TOLERANCE, self._columns)[0], {})
+                self._regions(batch, row, questions(other, GRID_TOLERANCE, self._columns), {})
                 if batch.reasons[k]:
                     return str(batch.reasons[k])
             other = self._needed(other)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.analyses.workspace.contained import Shape
 from mechdesign.analyses.workspace.question import COLUMNS, split
 from mechdesign.commands import COMMANDS
 from mechdesign.expressions import Expression
@@ -14,8 +15,11 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result
 from mechdesign.rows import choose, worst
 from mechdesign.study import Study
-from mechdesign.study.schema.optimize import Condition, OptimizeSection
+from mechdesign.study.schema.optimize import Condition, Containment, OptimizeSection
 from mechdesign.study.text.document import KeyPath
+
+# A shape that fits but for this part of its size is contained.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,8 @@ class Goal:
         Judge absolute values.
     where : tuple of (str, object)
         Only rows whose columns have these values count.
+    shape : Shape, optional
+        What the workspace is to hold; the largest scale at which it does is judged.
     """
 
     name: str
@@ -44,11 +50,12 @@ class Goal:
     where: tuple[tuple[str, object], ...] = ()
     bound: float = 0.0
     expression: Expression | None = None  # over parameters, which no command computes: its word is empty then
+    shape: Shape | None = None
 
     @property
     def regional(self) -> bool:
         """Whether it is a number of the whole workspace."""
-        found = self.column in COLUMNS or bool(split(self.column)[0])
+        found = self.shape is not None or self.column in COLUMNS or bool(split(self.column)[0])
         return self.command == "workspace" and found and not self.where
 
     def margin(self, values: Floats) -> Floats:
@@ -133,8 +140,18 @@ def conditions_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
     return {each: ("optimize", "subject_to", k) for k, condition in given for each in bounds_of(condition)}
 
 
-def bounds_of(condition: Condition) -> Iterator[Goal]:
-    """The worst rows that a condition judges, one for each of its bounds."""
+def bounds_of(condition: Condition | Containment) -> Iterator[Goal]:
+    """The worst rows that a condition judges, one for each of its bounds; or the scale at which a shape is held."""
+    if isinstance(condition, Containment):
+        outline = condition.contains
+        width, height = outline.rectangle or (outline.circle, outline.circle)
+        assert width is not None
+        assert height is not None
+        centre = None if outline.center is None else complex(*(each.nominal for each in outline.center))
+        factor = 1.0 if outline.rectangle else 2.0
+        shape = Shape(factor * width.nominal, factor * height.nominal, not outline.rectangle, centre)
+        yield Goal(f"{shape.name} contained", "workspace", f"scale of {shape.name}", bound=1 - ROUNDING, shape=shape)
+        return
     _, command, column, expression = _parts(condition.result)
     for bound, upper in ((condition.at_least, False), (condition.at_most, True)):
         if bound is not None:

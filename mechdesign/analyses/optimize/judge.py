@@ -164,6 +164,9 @@ class Designs:
             if each in self.goals:
                 meaning = f"estimated error of {each.name}"
                 yield Column(f"{each.name}_error", error[rows], self._unit_and_meaning(each)[0], meaning)
+        for each in self.conditions:
+            if each.shape is not None:
+                yield Column(each.column, self.found[each][rows], "", self.meanings[each.column][1])
         yield from shared(self.study.units, CPI=self.cpi[rows])
 
     def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:

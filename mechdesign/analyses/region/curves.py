@@ -83,7 +83,7 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
             # At its very ends a panel meets its neighbour, or an interval vanishes.
             theta = np.clip(theta, low + BESIDE * (high - low), high - BESIDE * (high - low))
             traced = panels.trace(zero, theta, SLACK)
-        ray, inner, outer, enters, leaves = _whole(traced, SAME_ROOT * float(panels.reach[0]))
+        ray, inner, outer, enters, leaves = whole(traced, SAME_ROOT * float(panels.reach[0]))
         counts = np.bincount(ray, minlength=number)
         usual = _most(counts)
         kept = np.flatnonzero(counts == usual)
@@ -103,7 +103,7 @@ def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:
     return found
 
 
-def _whole(traced: Intervals, near: float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
+def whole(traced: Intervals, near: Floats | float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
     """Intervals with those made one that a single point divides, such as where a leg has no length."""
     ray = traced.ray
     meets = (ray[1:] == ray[:-1]) & (traced.inner[1:] - traced.outer[:-1] <= near)

@@ -16,6 +16,7 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.margins import LIMIT, SINGULARITY, Cause, causes
+from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
@@ -63,7 +64,7 @@ class Field:
         """
         given: list[Value] = [z.real, z.imag, *self.held]
         if self.plan.iterative:
-            return self._atlas.solve(z, places)[0]
+            return self._poses(z, places)[0]
         vectors = self.mechanism.geometry.vectors(places)
         state = self.plan.run(given, vectors, None)
         graph = self.mechanism.graph
@@ -76,11 +77,24 @@ class Field:
     @property
     def rootless(self) -> bool:
         """Whether poses would have to grow from the sketch's place of the point, and cannot be had there."""
-        return self.plan.iterative and self._atlas.empty
+        return self.plan.iterative and self._atlas[0].empty
 
     @cached_property
-    def _atlas(self) -> Atlas:
-        return Atlas.of(self.plan, self.held)
+    def _atlas(self) -> tuple[Atlas, Places]:
+        """Poses to continue from, and dimensions in which the mechanism differs from theirs.
+
+        A variant that is not assembled at the sketch's place of the point continues poses of its original.
+        """
+        found, mechanism = Atlas.of(self.plan, self.held), self.mechanism
+        if not (found.empty and isinstance(mechanism, Variant)):
+            return found, {}
+        before = mechanism.original.nominal
+        changed = {name: np.asarray(value) for name, value in mechanism.nominal.items() if value != before[name]}
+        return Atlas.of(mechanism.original.plan(tuple(each.name for each in self.outputs)), self.held), changed
+
+    def _poses(self, z: Complexes, places: Places, *, beyond: bool = False) -> tuple[Configuration, Floats]:
+        atlas, changed = self._atlas
+        return atlas.solve(z, {**changed, **places}, beyond=beyond)
 
     def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
         """All margins at points `z`, shape (margins, *z.shape), in the order of `labels`; nan where unknown.
@@ -89,7 +103,7 @@ class Field:
         """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             if self.plan.iterative:
-                configuration, fold_distance = self._atlas.solve(z, places, beyond=True)
+                configuration, fold_distance = self._poses(z, places, beyond=True)
             else:
                 configuration = self.configuration(z, places)
             found = [*configuration.closures]

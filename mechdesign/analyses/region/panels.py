@@ -12,9 +12,9 @@ import numpy as np
 
 from mechdesign.analyses.region.breaks import TOGETHER, all_breaks
 from mechdesign.analyses.region.raster import Raster
-from mechdesign.analyses.region.rays import Designs, Intervals, trace
+from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, ray_through, trace
 from mechdesign.errors import AssemblyError
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Times that the reach is doubled at most.
 DOUBLINGS = 16
@@ -56,6 +56,18 @@ class Panels:
     def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
         """Rays of designs, as long as they need be; `slack` as in `mechdesign.analyses.region.rays.trace`."""
         return trace(self.designs, design, theta, self.reach[design], slack)
+
+    def through(self, design: Ints, z: Complexes) -> tuple[Floats, Intervals, Flags]:
+        """Angles of rays through places, their intervals, and which of these hold the place; none does off the scan."""
+        (begin, end), way = self.designs.scan, z - self.designs.about
+        # At the centre of the scan one ray is as good as another.
+        centre = np.abs(way) <= SAME_ROOT * self.reach[design]
+        theta = np.where(centre, begin + MIDDLE * (end - begin), ray_through(way, begin))
+        known = np.isfinite(way) & (theta <= end)
+        theta, radius = np.where(known, theta, begin), np.where(centre, 0.0, np.abs(way))
+        found = self.trace(design, theta)
+        at = radius[found.ray]
+        return theta, found, known[found.ray] & (found.inner <= at) & (at <= found.outer)
 
 
 def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:

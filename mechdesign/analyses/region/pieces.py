@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.region.panels import MIDDLE, Panels
-from mechdesign.analyses.region.rays import SAME_ROOT, Intervals, is_turn, ray_through
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.rays import Intervals, is_turn
 from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -164,21 +164,9 @@ class Pieces:
 
     def _holding(self, design: Ints) -> Ints:
         """The piece that holds the point's place in the sketch; -1 where none does."""
-        (begin, end), about = self.panels.designs.scan, self.panels.designs.about
-        place = self._sketched(design) - about
-        reach = self.panels.reach[design]
-        theta = ray_through(place, begin)
-        # At the centre of the scan one ray is as good as another.
-        centre = np.abs(place) <= SAME_ROOT * reach
-        theta = np.where(centre, begin + MIDDLE * (end - begin), theta)
-        radius = np.where(centre, 0.0, np.abs(place))
+        theta, found, inside = self.panels.through(design, self._sketched(design))
         held = np.full(len(design), -1, dtype=np.intp)
-        known = np.flatnonzero(np.isfinite(place) & (theta <= end))
-        found = self.panels.trace(design[known], theta[known])
-        piece = self.of_intervals(design[known], theta[known], found)
-        at = radius[known][found.ray]
-        inside = (found.inner <= at) & (at <= found.outer)
-        held[known[found.ray[inside]]] = piece[inside]
+        held[found.ray[inside]] = self.of_intervals(design, theta, found)[inside]
         return held
 
     def _sketched(self, design: Ints) -> Complexes:

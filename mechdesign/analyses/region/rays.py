@@ -81,6 +81,8 @@ class Designs:
         Where the rays start.
     scan : (float, float)
         First and last angle of the rays (radians).
+    centres : ndarray of complex, shape (designs,), optional
+        Where rays are traced from instead, of each design.
     """
 
     field: Field
@@ -89,10 +91,15 @@ class Designs:
     about: complex
     scan: tuple[float, float]
     effort: Effort
+    centres: Complexes | None = None
 
     def of(self, index: Ints) -> Places:
         """Dimensions of the designs `index`, in the shape of `index`."""
         return {name: np.asarray(value)[index] for name, value in self.places.items()}
+
+    def starts(self, design: Ints) -> Complexes:
+        """Where rays of the designs `design` start."""
+        return np.full(design.shape, self.about) if self.centres is None else self.centres[design]
 
     def inside(self, z: Complexes, design: Ints) -> Flags:
         """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
@@ -188,8 +195,8 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
 
     Each ray is judged by itself: what else is traced with it changes nothing.
     """
-    places, direction = designs.of(design), np.exp(1j * theta)
-    values = designs.field.margins(designs.about + FIVE[:, None] * reach * direction, places, assembly=False)
+    places, start_of, direction = designs.of(design), designs.starts(design), np.exp(1j * theta)
+    values = designs.field.margins(start_of + FIVE[:, None] * reach * direction, places, assembly=False)
     quadratic, (a, b, c) = _parabolas(values)
     if not quadratic.all():
         # What is not quadratic has no roots here.
@@ -197,7 +204,7 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
     margin, ray, turn, x, start = _quadratic_roots(a, b, c)
     found = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
     if not (quadratic.all() and not designs.field.same_assembly):
-        found = _others(designs, places, direction, found, quadratic, slack * reach, reach)
+        found = _others(designs, places, start_of, direction, found, quadratic, slack * reach, reach)
     return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
 
 
@@ -231,6 +238,7 @@ def _quadratic_roots(a: Floats, b: Floats, c: Floats) -> tuple[Ints, Ints, Ints,
 def _others(
     designs: Designs,
     places: Places,
+    start_of: Complexes,
     direction: Complexes,
     found: Intervals,
     quadratic: Flags,
@@ -248,7 +256,7 @@ def _others(
     rows = np.flatnonzero(~known.all(axis=1))
 
     def margins_at(lane: Ints, radius: Floats) -> Floats:
-        z = designs.about + radius * direction[owner[lane]]
+        z = start_of[owner[lane]] + radius * direction[owner[lane]]
         values = designs.field.margins(z, {name: value[lane] for name, value in local.items()})[rows]
         # Roots that are known have ended the intervals.
         margin, of = np.nonzero(known[rows][:, owner[lane]])

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.analyses.columns import SHARED, shared
-from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
-from mechdesign.analyses.region.rays import SINGLE, Designs, Effort
+from mechdesign.analyses.region.rays import SINGLE, Effort
 from mechdesign.analyses.region.regions import RAYS
 from mechdesign.analyses.workspace.index import Local, determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
@@ -18,6 +18,7 @@ from mechdesign.analyses.workspace.point_path import point_path
 from mechdesign.analyses.workspace.quadrature import FINEST_AREA
 from mechdesign.analyses.workspace.question import (
     COLUMNS,
+    OF_RANGE,
     Evaluation,
     Question,
     answer,
@@ -25,7 +26,7 @@ from mechdesign.analyses.workspace.question import (
     questions,
     split,
 )
-from mechdesign.analyses.workspace.ranged import Every, Ranged, Some, SomeDesigns
+from mechdesign.analyses.workspace.ranged import Ranged
 from mechdesign.analyses.workspace.singularities import causes, singular_everywhere
 from mechdesign.analyses.workspace.tables import (
     boundary_columns,
@@ -38,7 +39,7 @@ from mechdesign.analyses.workspace.tables import (
     stacked,
     where,
 )
-from mechdesign.errors import AssemblyError, Problem, StudyError
+from mechdesign.errors import AssemblyError
 from mechdesign.indices import index
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.parallel import one_thread
@@ -49,9 +50,8 @@ from mechdesign.study.schema.workspace import Over
 
 # An error of the area beyond this part of it is told.
 AREA_SURE = 1e-3
-# How finely a region over a range is looked for, and what is answered of it; its margins cost a hundred times as much.
+# How finely a region over a range is looked for; its margins cost a hundred times as much.
 OVER_RANGE = Effort(48, 16, 96)
-OF_RANGE = ("SUI", "area", "box_area")
 ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; redraw the sketch at those values"
 
 
@@ -250,7 +250,7 @@ def _reachable(study: Study, progress: Progress) -> Result:
     section = study.workspace
     assert section is not None
     name, over = next((name, value) for name, value in section.at.items() if isinstance(value, Over))
-    asked = list(_questions(study, name, over))
+    asked = questions(study, wanted=OF_RANGE)
     progress.start(len(asked), "regions")
     answers: list[Evaluation] = []
     boundaries: list[list[Column]] = []
@@ -290,28 +290,6 @@ def _reachable(study: Study, progress: Progress) -> Result:
         )
     counts = {"regions": len(asked), "empty": len(asked) - len(boundaries)}
     return Result("workspace", {table.name: table for table in tables}, tuple(warnings), counts)
-
-
-def _questions(study: Study, name: str, over: Over) -> Iterator[Question]:
-    """One question a value of the other held coordinates."""
-    assert study.workspace is not None
-    # Only the area is asked, in which angles and lengths do not mix.
-    update = {"at": {**study.workspace.at, name: (over.from_,)}, "indices": (),
-              "characteristic_length": study.workspace.characteristic_length or 1.0}  # fmt: skip
-    coordinate = study.mechanism.coordinate(name)
-    low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
-    for question in questions(replace(study, workspace=study.workspace.model_copy(update=update)), wanted=OF_RANGE):
-        base = question.field
-        if base.plan.iterative:
-            message = (
-                f"over a range of {name} the inverse problem must have a closed form, which it has not here; "
-                f"ask for single values: at: {{{name}: [...]}}"
-            )
-            raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
-        common = base.mechanism, base.plan, base.held, base.same_assembly, base.length
-        field = (Every if over.all else Some)(*common, list(study.workspace.at).index(name), low, high)
-        held = {k: v for k, v in question.held.items() if k != name}
-        yield replace(question, field=field, held=held, rays_through=Designs if over.all else SomeDesigns)
 
 
 def _outline(study: Study, question: Question, name: str, found: Sequence[Patch]) -> list[Column]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.analyses.poses import radians
 from mechdesign.analyses.region.field import Places
 from mechdesign.analyses.region.panels import Panels, find_panels
 from mechdesign.analyses.region.pieces import Pieces
@@ -15,11 +16,14 @@ from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
+from mechdesign.analyses.workspace.ranged import Every, Some, SomeDesigns
+from mechdesign.errors import Problem, StudyError
 from mechdesign.indices import INDEX_NAMES, USUAL, needed_section
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.roots import dips
 from mechdesign.parallel import keep_freed_memory
 from mechdesign.study import Study
+from mechdesign.study.schema.workspace import Over
 
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6
@@ -31,6 +35,8 @@ PEAK_TOLERANCE = 1e-5
 COLUMNS = ("GII", "GRI", "SUI", "area", "box_area")
 MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
 STATISTICS = ("mean", "min", "max", "std")
+# What is answered of a region over a range.
+OF_RANGE = ("SUI", "area", "box_area")
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9
 # Distances that differ by this part of themselves are equal; steps towards the farthest place of a smooth curve.
@@ -99,7 +105,7 @@ def batched(column: str) -> bool:
 
 
 def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:
-    """One question a value of ``at``.
+    """One question a value of ``at``; over a range of one of them one for all its values.
 
     Parameters
     ----------
@@ -113,7 +119,11 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     StudyError
         If the section lacks what cannot be assumed.
     """
-    found, section = regions(study), study.workspace
+    section = study.workspace
+    over = {} if section is None else {name: values for name, values in section.at.items() if isinstance(values, Over)}
+    for name, values in over.items():
+        return list(_over_range(study, name, values, tolerance, columns(()) if wanted is None else wanted))
+    found = regions(study)
     assert section is not None
     (start, stop), margin = found[0].scan, section.margin * study.units.angle_factor
     if stop - start <= 2 * margin:
@@ -129,6 +139,35 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
                  nodes=integrate_by.nodes, indices=indices, wanted=wanted)
         for region in found
     ]  # fmt: skip
+
+
+def _over_range(
+    study: Study, name: str, over: Over, tolerance: float, wanted: Sequence[str]
+) -> Iterator[Question]:  # fmt: skip
+    """One question a value of the other held coordinates."""
+    assert study.workspace is not None
+    for column in wanted:
+        if column not in OF_RANGE:
+            known = f"over a range of {name} there are {', '.join(OF_RANGE)} only"
+            raise problem(study, "at", f"{column} has no value: {known}; ask for single values: at: {{{name}: [...]}}")
+    # Only the area is asked, in which angles and lengths do not mix.
+    update = {"at": {**study.workspace.at, name: (over.from_,)}, "indices": (),
+              "characteristic_length": study.workspace.characteristic_length or 1.0}  # fmt: skip
+    coordinate = study.mechanism.coordinate(name)
+    low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
+    single = replace(study, workspace=study.workspace.model_copy(update=update))
+    for question in questions(single, tolerance, wanted):
+        base = question.field
+        if base.plan.iterative:
+            message = (
+                f"over a range of {name} the inverse problem must have a closed form, which it has not here; "
+                f"ask for single values: at: {{{name}: [...]}}"
+            )
+            raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
+        common = base.mechanism, base.plan, base.held, base.same_assembly, base.length
+        field = (Every if over.all else Some)(*common, list(study.workspace.at).index(name), low, high)
+        held = {k: v for k, v in question.held.items() if k != name}
+        yield replace(question, field=field, held=held, rays_through=Designs if over.all else SomeDesigns)
 
 
 def answer(question: Question, places: Places, count: int, effort: Effort) -> Evaluation:

@@ -263,13 +263,13 @@ class SomeDesigns(Designs):
     def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
         """As `Designs.traced`: between places of each ray of which some samples of the range tell that they matter."""
         over, rays = self._over, np.arange(len(theta))
-        direction = np.exp(1j * theta)
+        start, direction = self.starts(design), np.exp(1j * theta)
 
         def height(ray: Ints, radius: Floats) -> Floats:
-            found: Floats = over.deciding(self.about + radius * direction[ray])[0][0]
+            found: Floats = over.deciding(start[ray] + radius * direction[ray])[0][0]
             return found
 
-        x = self._places(theta, reach)
+        x = self._places(start, theta, reach)
         values = height(np.broadcast_to(rays, x.shape), x)
         positive = values > 0
         cell, ray = np.nonzero(positive[1:] != positive[:-1])
@@ -278,7 +278,7 @@ class SomeDesigns(Designs):
             lambda which, radius: height(ray[which], radius), a, fa, b, fb, none, none, ROUNDING * reach[ray]
         )
         turn = np.where(fb > 0, 1, -1)
-        _, value, pair = over.deciding(self.about + radius * direction[ray])
+        _, value, pair = over.deciding(start[ray] + radius * direction[ray])
         (one, other), count = pair[:, 0], len(over.single)
         # Beside where a leg is stretched or folded it is for rounding to say whether that decides, too.
         one = np.where(over.sliced.singular[one], np.where(over.sliced.singular[other], one, other), one)
@@ -287,12 +287,12 @@ class SomeDesigns(Designs):
         found = intervals_between(label, ray, turn, radius, (~positive[0]).astype(np.intp), reach, slack)
         return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
 
-    def _places(self, theta: Floats, reach: Floats) -> Floats:
+    def _places(self, start: Complexes, theta: Floats, reach: Floats) -> Floats:
         """Radii of each ray, ascending, shape (places, rays), of which two neighbours hold at most one end."""
         over, rays = self._over, len(theta)
         lanes = np.arange(rays * SAMPLES)
         values = {VALUE: np.tile(over.values, rays)}
-        slices = Designs(over.sliced, values, len(lanes), self.about, self.scan, self.effort)
+        slices = Designs(over.sliced, values, len(lanes), self.about, self.scan, self.effort, np.repeat(start, SAMPLES))
         found = trace(slices, lanes, np.repeat(theta, SAMPLES), np.repeat(reach, SAMPLES))
         # Stretches that some sample of the range reaches, by how many do.
         ray, radius = np.tile(found.ray // SAMPLES, 2), np.concatenate([found.inner, found.outer])

@@ -38,6 +38,8 @@ ENVELOPE_STEPS = 40
 MAX_VALUES = 200
 # Fewer designs of a grid are drawn as they are, a cell each: what a field shows between them is not known.
 FEWEST_OF_FIELD = 1000
+# Directions from the centre of what the workspace contains to its outline.
+_OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
 _NAME_LETTERS = 14  # of a name in one line below an axis
 _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 
@@ -88,11 +90,18 @@ def _optimum(result: Result, designs: Designs) -> Figure:
         if len(parts) > 1 and all(moving):
             return designs_figure(parts)
     best, own = result.drawn["design"](designs.numbers(designs.best))
-    words = f"The best design, {_listed(designs.numbers(designs.best))}"
+    words = _listed(designs.numbers(designs.best))
     if own.command == "workspace":
-        return workspace_figure(best, own, regions(best, own)[0], words)
+        region = regions(best, own)[0]
+        there = f", at {region.title}" if region.title else ""
+        dotted = "; dotted: what it contains" if own.drawn["contained"] else ""
+        figure = workspace_figure(best, own, region, f"the best design, {words}{there}{dotted}")
+        for shape, centre in own.drawn["contained"]:
+            z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
+            figure.axes[0].plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
+        return figure
     # A title may be broken between variables only.
-    words = words.replace(" = ", _UNBROKEN_EQUALS)
+    words = f"The best design, {words}".replace(" = ", _UNBROKEN_EQUALS)
     if "motion" in own.tables:
         return design_figure(best, own, words)
     return mechanism_figure(best, own, words)

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, model_validator
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
@@ -126,6 +126,49 @@ class Requirement(Condition):
     result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "description": _RESULT})]
 
 
+_PAIR = fields.pair_of("[width, height]")
+
+
+def _centre(raw: Any) -> Any:
+    if raw != "free" and (not isinstance(raw, list) or len(raw) != 2):
+        raise failure(f"expected [x, y] or free, not {shown(raw)}")
+    return None if raw == "free" else raw
+
+
+class Outline(fields.Model):
+    """A circle, or a rectangle with sides along x and y; its centre is None where it may lie anywhere."""
+
+    one_of = ("a shape is one of rectangle: [width, height], circle: radius", "rectangle", "circle")
+    rectangle: Annotated[tuple[fields.PositiveLengthValue, fields.PositiveLengthValue], _PAIR] | None = None
+    circle: fields.PositiveLengthValue | None = None
+    center: Annotated[
+        tuple[fields.LengthValue, fields.LengthValue] | None,
+        BeforeValidator(_centre),
+        fields.OrShort({"const": "free"}),
+    ] = None
+
+    @property
+    def numbers(self) -> Mapping[str, tuple[fields.StudyNumber, ...]]:
+        """Every number that is given, by its key."""
+        given = {"rectangle": self.rectangle, "circle": self.circle and (self.circle,), "center": self.center}
+        return {key: numbers for key, numbers in given.items() if numbers}
+
+
+class Containment(fields.Model):
+    """A shape that the workspace must hold."""
+
+    contains: Outline
+
+
+def _condition_form(raw: Any) -> str:
+    return "shape" if isinstance(raw, Containment) or (isinstance(raw, dict) and "contains" in raw) else "bounds"
+
+
+AnyCondition = Annotated[
+    Annotated[Containment, Tag("shape")] | Annotated[Condition, Tag("bounds")], Discriminator(_condition_form)
+]
+
+
 def _weight_row(raw: Any, info: ValidationInfo) -> Any:
     """Bring ``{GII: 1, SUI: 1}`` to a list in the order maximize then minimize; say what is wrong with a row."""
     if "maximize" not in info.data or "minimize" not in info.data:
@@ -169,7 +212,7 @@ class OptimizeSection(fields.Model):
     maximize: Goals = ()
     minimize: Goals = ()
     weights: tuple[WeightRow, ...] | None = None
-    subject_to: tuple[Condition, ...] = ()
+    subject_to: tuple[AnyCondition, ...] = ()
     evaluations: Annotated[int, fields.whole(10, 10_000_000)] | None = None
 
     @model_validator(mode="after")
@@ -210,19 +253,38 @@ class OptimizeSection(fields.Model):
         if self.method == "grid" and self.evaluations is not None:
             report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
         moved = checker.parameters.moved(self.variables)
-        judged: list[tuple[Judged, KeyPath]] = [
-            *((goal, (*root, key, k)) for key in ("maximize", "minimize") for k, goal in enumerate(getattr(self, key))),
-            *((condition, (*root, "subject_to", k, "result")) for k, condition in enumerate(self.subject_to)),
+        goals = [
+            (goal, (*root, key, k)) for key in ("maximize", "minimize") for k, goal in enumerate(getattr(self, key))
         ]
-        for each, path in judged:
-            if isinstance(each.result, str):
-                check_result(checker, each.result, path)
-            elif each.result.names.isdisjoint(moved):
-                report(path, f"{each.name!r} is the same for every design: no variable changes it")
+        for goal, at in goals:
+            _check_judged(checker, goal, at, moved)
         for k, condition in enumerate(self.subject_to):
+            at = (*root, "subject_to", k)
+            if isinstance(condition, Containment):
+                _check_fixed(checker, condition.contains, (*at, "contains"), moved)
+                continue
+            _check_judged(checker, condition, (*at, "result"), moved)
             for key in condition.given("at_least", "at_most"):
-                _check_bound(checker, condition, (*root, "subject_to", k, key), moved)
+                _check_bound(checker, condition, (*at, key), moved)
         return self
+
+
+def _check_judged(checker: Checker, judged: Judged, path: KeyPath, moved: Collection[str]) -> None:
+    """Note a result that does not exist, or an expression that none of the parameters in `moved` changes."""
+    if isinstance(judged.result, str):
+        check_result(checker, judged.result, path)
+    elif judged.result.names.isdisjoint(moved):
+        checker.report(path, f"{judged.name!r} is the same for every design: no variable changes it")
+
+
+def _check_fixed(checker: Checker, shape: Outline, path: KeyPath, moved: Collection[str]) -> None:
+    """Note a shape without a workspace to hold it, and numbers of it that the parameters in `moved` change."""
+    checker.needs("workspace", "'contains'", path)
+    for key, numbers in shape.numbers.items():
+        names = {name for number in numbers if number.expression for name in number.expression.names}
+        for name in sorted(names.intersection(moved)):
+            told = f"{name!r} changes with the variables, and what is to be contained is the same for every design"
+            checker.report((*path, key), told)
 
 
 def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: Collection[str]) -> None:

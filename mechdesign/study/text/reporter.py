@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Tag, ValidationError
 from pydantic.fields import FieldInfo
 
 from mechdesign.errors import Problem, StudyError, nearest, suggestion
@@ -168,6 +168,9 @@ class Reporter:
                 message = item["msg"] if kind == "study" else f"expected {_EXPECTED[kind]}, not {shown(item['input'])}"
                 if kind in _MAPPINGS and isinstance(item["input"], str) and ":" in item["input"]:
                     message += "; a ':' needs a space after it"
+                *holder, last = self.written(location)
+                # Of a whole mapping pydantic names the form last.
+                location = location if has(self.raw(holder), last) else tuple(holder)
                 self.report(location, message, at_key=at_key)
 
     def mended(self, error: ValidationError, root: type[BaseModel], key: str, raw: Any) -> Any:
@@ -196,8 +199,14 @@ def schema_fields(root: type[BaseModel], location: Sequence[str | int]) -> dict[
     """Fields, by their keys in the text, of the model at a location of the schema; none where there is no model."""
     current: Any = root
     for segment in (*location, None):
-        while get_origin(current) in (Annotated, Union, UnionType):
-            current = next(arm for arm in get_args(current) if arm is not NoneType)
+        tagged = False
+        while get_origin(current) in (Annotated, Union, UnionType) and not tagged:
+            arms = [arm for arm in get_args(current) if arm is not NoneType]
+            # pydantic names the form that was meant among the keys.
+            named = [arm for arm in arms if any(isinstance(tag, Tag) and tag.tag == segment for tag in get_args(arm))]
+            current, tagged = (named or arms)[0], bool(named)
+        if tagged:
+            continue
         model = isinstance(current, type) and issubclass(current, BaseModel)
         fields = {field.alias or name: field for name, field in current.model_fields.items()} if model else {}
         if segment is None:

@@ -1,0 +1,221 @@
+"""Workspaces that must contain a circle or a rectangle, and the worst of several held values, in an optimisation.
+
+Against formulas of a two-link arm, whose region is the ring between |l1 - l2| and l1 + l2, against places sampled along
+the outline, and against studies of single values.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+from scipy.optimize import brentq
+
+import mechdesign
+from mechdesign.analyses.region.rays import BATCH
+from mechdesign.analyses.workspace.contained import Shape, fitting_scale
+from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.errors import StudyError
+from mechdesign.numerics.arrays import Floats
+
+ARM = """
+mechanism:
+  parameters: {l1: 100, l2: 60}
+  links: {ground: {O: [0, 0]}, upper: [O, A, l1], fore: [A, P, l2]}
+  drives: {q1: {angle: upper}, q2: {angle: fore, from: upper}}
+  sketch: {A: [80, 60], P: [80, 120]}
+workspace: {point: P}
+optimize:
+  variables: {l1: {from: 60, to: 100, step: 10}, l2: {from: 50, to: 80, step: 15}}
+  minimize: area
+"""
+RRR = """
+mechanism:
+  parameters: {base: 250, crank: 160, rod: 120, side: 60}
+  links:
+    ground: {O1: [-base*cos(30), -base/2], O2: [base*cos(30), -base/2], O3: [0, base]}
+    crank_1: [O1, A1, crank]
+    crank_2: [O2, A2, crank]
+    crank_3: [O3, A3, crank]
+    rod_1: [A1, C1, rod]
+    rod_2: [A2, C2, rod]
+    rod_3: [A3, C3, rod]
+    platform: {C1: [-side*cos(30), -side/2], C2: [side*cos(30), -side/2], C3: [0, side], P: [0, 0]}
+  drives: {q1: {angle: crank_1}, q2: {angle: crank_2}, q3: {angle: crank_3}}
+  sketch: {A1: [-140, 8], A2: [63, -126], A3: [77, 118], C1: [-52, -30], C2: [52, -30], C3: [0, 60]}
+workspace: {point: P, at: {platform.angle: 0}, scan: {about: [0, 0]}, assembly: any, characteristic_length: 60}
+optimize:
+  variables: {crank: {from: 150, to: 170, step: 10}}
+  maximize: [area]
+  subject_to: [{contains: {circle: 60, center: [0, 0]}}]
+"""
+CIRCLE = Shape(80, 80, round=True)
+RECTANGLE = Shape(180, 90, round=False)
+
+
+def scales(text: str, shape: Shape, *changes: str, places: dict[str, Floats] | None = None) -> Floats:
+    """Scales that fit, of the study's own design or of several with other places."""
+    (question,) = questions(study_of(text, *changes), wanted=("area",))
+    count = len(next(iter(places.values()))) if places else 1
+    return fitting_scale(shape, answer(question, places or {}, count, BATCH).panels)[0]
+
+
+def ring_of_rectangle(width: float, height: float, inner: float, outer: float) -> float:
+    """Scale of a rectangle with a side that touches the inner circle, and the far corners on the outer one."""
+    return float(brentq(lambda s: np.hypot(s * width / 2, inner + s * height) - outer, 0, 100))
+
+
+def test_largest_scale_of_a_free_circle_and_rectangle_in_a_ring() -> None:
+    rng = np.random.default_rng(2)
+    upper, fore = rng.uniform(60, 140, 12), rng.uniform(40, 100, 12)
+    # A hole much smaller than any distance of rays.
+    fore[0] = upper[0] - 0.3
+    places = {"upper.length": upper, "fore.length": fore}
+    assert scales(ARM, CIRCLE, places=places) == pytest.approx(np.minimum(upper, fore) / 40, rel=1e-6)
+    ends = np.stack([np.abs(upper - fore), upper + fore], axis=1)
+    wanted = [max(ring_of_rectangle(180, 90, *end), ring_of_rectangle(90, 180, *end)) for end in ends]
+    assert scales(ARM, RECTANGLE, places=places) == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("shape", "wanted"),
+    [
+        (Shape(60, 60, True, 100j), 2.0),
+        (Shape(60, 60, True, 200j), -40 / 30),  # beyond the ring
+        (Shape(60, 60, True, 10j), -1.0),  # in its hole
+        (Shape(300, 1, False, 50j), brentq(lambda s: np.hypot(150 * s, 50 + 0.5 * s) - 160, 0, 9)),  # long and thin
+        (Shape(40, 20, False, 100j), brentq(lambda s: np.hypot(20 * s, 100 + 10 * s) - 160, 0, 9)),
+        (Shape(20, 40, False, 100 + 0j), brentq(lambda s: np.hypot(20 * s, 100 + 10 * s) - 160, 0, 9)),
+    ],
+)
+def test_scale_about_a_given_centre(shape: Shape, wanted: float) -> None:
+    assert scales(ARM, shape) == pytest.approx([wanted], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("to", "centre", "wanted"),
+    [(180, 100 + 20j, 2 / 3), (180, -100j, -1.0), (270, 100 + 20j, 2 / 3), (270, 100 - 20j, -2 / 3), (270, 100j, 2.0)],
+)
+def test_sides_of_a_scan_end_what_is_contained(to: float, centre: complex, wanted: float) -> None:
+    (found,) = scales(ARM, Shape(60, 60, True, centre), f"workspace.scan={{about: [0, 0], from: 0, to: {to}}}")
+    assert found == pytest.approx(wanted) if wanted > -1 else found < wanted
+
+
+def test_outline_lies_inside_and_a_larger_one_does_not() -> None:
+    study = study_of(RRR, "workspace.assembly=same")
+    rng = np.random.default_rng(3)
+    places = {name: rng.uniform(110, 150, 3) for name in ("rod_1.length", "rod_2.length", "rod_3.length")}
+    (question,) = questions(study, wanted=("area",))
+    given = answer(question, places, 3, BATCH)
+    theta = np.linspace(0, 2 * np.pi, 721)[:, None]
+    for shape in (RECTANGLE, Shape(50, 90, False, 10 + 5j)):
+        scale, centre = fitting_scale(shape, given.panels)
+        outline = scale * shape.radius(theta) * np.exp(1j * theta)
+        inside = given.panels.designs.inside(centre + (1 - 1e-6) * outline, np.arange(3))
+        assert inside.all()
+        assert not given.panels.designs.inside(centre + (1 + 1e-2) * outline, np.arange(3)).all(axis=0).any()
+
+
+def test_other_pieces_of_the_region_contain_nothing() -> None:
+    """Two bands beside x from 0 to 0.5, the left one the sketch's."""
+    text = """
+    units: {length: dimensionless}
+    mechanism:
+      measures: {across: (C.x - 0.5)*C.x}
+      links:
+        ground: {B1: [1, 0], B2: [-1, 0]}
+        leg_1: {from: B1, to: C, telescopic: true}
+        leg_2: {from: B2, to: C, telescopic: true}
+      drives: {l1: {length: leg_1}, l2: {length: leg_2}}
+      limits: [{drive: l1, min: 0.2, max: 3}, {drive: l2, min: 0.2, max: 3}, {measure: across, min: 0}]
+      sketch: {C: [-0.5, 1]}
+    workspace: {point: C, scan: {about: [0, 0]}}
+    """
+    assert scales(text, Shape(0.4, 0.4, True, -0.5 + 1j)) == pytest.approx([2.5])
+    assert scales(text, Shape(0.4, 0.4, True, 1 + 1j))[0] < 0
+    assert scales(text, Shape(0.4, 0.4, True, 1 + 1j), "workspace.assembly=any") == pytest.approx([2.5])
+    assert scales(text, Shape(0.4, 0.4, True, 0.25 + 1j)) == pytest.approx([-1.25])
+
+
+def test_designs_are_feasible_where_the_workspace_contains_the_shape() -> None:
+    shapes = "[{contains: {rectangle: [180, 90], center: free}}, {contains: {circle: 20, center: [0, 80]}}]"
+    study = study_of(ARM, f"optimize.subject_to={shapes}")
+    designs = mechdesign.optimize(study).tables["designs"]
+    inner, outer = np.abs(designs["l1"] - designs["l2"]), designs["l1"] + designs["l2"]
+    free = [
+        max(ring_of_rectangle(180, 90, a, b), ring_of_rectangle(90, 180, a, b))
+        for a, b in zip(inner, outer, strict=True)
+    ]
+    fixed = np.minimum(outer - 80, 80 - inner) / 20
+    # Around a point no place but itself is lost.
+    free = np.where(inner == 0, np.hypot(180, 90) ** -1 * 2 * outer, free)
+    assert designs["scale of rectangle 180 x 90"] == pytest.approx(free, rel=1e-6)
+    assert designs["scale of circle 20 at (0, 80)"] == pytest.approx(fixed)
+    wanted = (np.array(free) >= 1) & (fixed >= 1 - 1e-9)
+    assert designs["feasible"].tolist() == wanted.tolist()
+    assert 0 < wanted.sum() < len(wanted)
+    assert "not rectangle 180 x 90 contained" in designs["reason"].tolist()
+
+
+def test_search_ends_where_the_shape_just_fits() -> None:
+    study = study_of(
+        ARM, "optimize.variables={l1: {from: 60, to: 140}, l2: {from: 60, to: 61}}", "optimize.method=search",
+        "optimize.evaluations=60", "optimize.subject_to=[{contains: {rectangle: [40, 20], center: [0, 120]}}]",
+    )  # fmt: skip
+    best = mechdesign.optimize(study).tables["optimum"]
+    # The smallest ring whose outer circle holds the far corners.
+    assert best["l1"] + best["l2"] == pytest.approx([np.hypot(20, 130)], rel=1e-4)
+    assert best["scale of rectangle 40 x 20 at (0, 120)"] == pytest.approx([1], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("condition", "message"),
+    [
+        ("{contains: {center: free}}", "a shape is one of rectangle: [width, height], circle: radius"),
+        ("{contains: {circle: 5, center: middle}}", "expected [x, y] or free, not 'middle'"),
+        ("{contains: {rectangle: 5}}", "expected [width, height], not the number 5"),
+        ("{contains: {rectangle: [5, 0]}}", "must be positive, not 0"),
+        ("{contains: {circle: 5, centre: free}}", "subject_to.0.contains.centre: unknown key; did you mean 'center'?"),
+        ("{result: area}", "subject_to.0: a condition needs 'at_least', 'at_most' or both"),
+        ("{result: area, at_lest: 5}", "did you mean 'at_least'?"),
+        ("{contains: {circle: 2*l1}}", "subject_to.0.contains.circle: 'l1' changes with the variables"),
+    ],
+)
+def test_wrong_shapes_are_reported(condition: str, message: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        study_of(ARM, f"optimize.subject_to=[{condition}]")
+    assert message in str(caught.value)
+
+
+def test_worst_of_several_held_values_counts() -> None:
+    goals = "optimize={variables: {crank: {from: 150, to: 170, step: 20}}, maximize: [GII], minimize: [area], "
+    goals += "subject_to: [{contains: {circle: 60, center: [0, 0]}}, {contains: {rectangle: [120, 90]}}]}"
+    every = mechdesign.optimize(study_of(RRR, goals, "workspace.at.platform.angle=[-20, 40]"))
+    single = [
+        mechdesign.optimize(study_of(RRR, goals, f"workspace.at.platform.angle={angle}")).tables["designs"]
+        for angle in (-20, 40)
+    ]
+    designs = every.tables["designs"]
+    for name in ("GII", "scale of circle 60 at (0, 0)", "scale of rectangle 120 x 90"):
+        assert designs[name] == pytest.approx(np.min([each[name] for each in single], axis=0), rel=1e-9)
+    assert designs["area"] == pytest.approx(np.max([each["area"] for each in single], axis=0), rel=1e-9)
+    assert designs.column("GII").meaning.endswith("the worst at platform.angle = -20, 40")
+
+
+def test_held_values_that_leave_nothing_are_named() -> None:
+    result = mechdesign.optimize(study_of(RRR, "optimize.variables.crank={from: 90, to: 160, step: 70}",
+                                          "workspace.at.platform.angle=[0, 60]", "optimize.subject_to=[]"))  # fmt: skip
+    assert result.tables["designs"]["reason"][0] == "nothing of the workspace can be reached at platform.angle = 60"
+
+
+def test_designs_over_a_range_of_a_held_coordinate() -> None:
+    over = "workspace.at.platform.angle={from: -10, to: 10, all: true}"
+    designs = mechdesign.optimize(study_of(RRR, over, "optimize.variables.crank.step=20")).tables["designs"]
+    region = mechdesign.workspace(study_of(RRR, over, "mechanism.parameters.crank=150")).tables["indices"]
+    assert designs["area"][0] == pytest.approx(region["area"][0], rel=1e-4)
+    ends = [scales(RRR, Shape(120, 120, True, 0j), f"workspace.at.platform.angle={angle}")[0] for angle in (-10, 10)]
+    single = scales(RRR, Shape(120, 120, True, 0j), over)
+    # The corners of the platform are farthest from the motors at the ends of the range.
+    assert single == pytest.approx([min(ends)], rel=1e-6)
+    with pytest.raises(StudyError, match="GII has no value: over a range of"):
+        mechdesign.optimize(study_of(RRR, over, "optimize.maximize=[GII]"))
