@@ -5,12 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from matplotlib.collections import PolyCollection
 
 import mechdesign
 from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.report.figures import style
-from mechdesign.report.figures.optimize import MAX_LINES, convergence, figures, front_figure, parallel_axes
+from mechdesign.report.figures.optimize import (
+    ENVELOPE_STEPS,
+    MAX_LINES,
+    convergence,
+    figures,
+    front_figure,
+    parallel_axes,
+    score_curves,
+)
 from mechdesign.results import Column, Table
 
 ARM = """
@@ -64,8 +73,8 @@ def test_the_best_design_is_marked_and_drawn_with_its_own_dimensions() -> None:
 
 def test_a_single_goal_is_shown_in_its_own_unit() -> None:
     found, result = drawn("a", goals="minimize: [kinematics.P.x]")
-    axes = found["CPI"].axes[0]
-    assert axes.get_ylabel().startswith("kinematics.P.x")
+    axes = found["objective"].axes[0]
+    assert axes.get_ylabel().replace("\n", "") == "kinematics.P.x [mm]"
     line = axes.lines[0].get_xydata()
     assert line[:, 1] == pytest.approx(result.tables["designs"]["kinematics.P.x"])
 
@@ -105,6 +114,82 @@ def test_the_front_is_drawn_with_its_knee() -> None:
                   knee=[False, True, False])  # fmt: skip
     with style.context():
         axes = front_figure(designs, front).axes[0]
-    labels = {line.get_label(): line.get_xydata() for line in axes.lines}
-    assert labels["knee: x = 0.2, y = 0.1, z = 0.5"].tolist() == [[0.3, 0.9]]
+    labels = {line.get_label(): line.get_xydata().tolist() for line in axes.lines}
+    assert labels["A: best cost, x = 0.1, y = 0.1, z = 0.5"] == [[0.2, 1.4]]
+    assert labels["knee, x = 0.2, y = 0.1, z = 0.5"] == [[0.3, 0.9]]
+    assert labels["B: best mass, x = 0.3, y = 0.1, z = 0.5"] == [[0.4, 0.8]]
     assert "less is better" in axes.get_xlabel()
+
+
+def test_scattered_designs_are_dots_over_their_lower_envelope() -> None:
+    x, y = np.random.default_rng(0).random((2, 2000))
+    cost = Goal("cost", "", "", smallest=True)
+    values = {cost: 1 + (x - 0.5) ** 2 + y}
+    designs = Designs(study_of(ARM), {"x": x, "y": y}, (cost,), (), values, {}, np.zeros(2000, dtype=np.int32), [""],
+                      np.ones((1, 1)), {})  # fmt: skip
+    with style.context():
+        figure = score_curves(designs)
+    dots, envelope = figure.axes[0].lines[:2]
+    assert len(dots.get_xdata()) == 2000
+    along, least = envelope.get_data()
+    assert len(along) == ENVELOPE_STEPS
+    assert (np.diff(along) > 0).all()
+    assert least == pytest.approx(1 + (along - 0.5) ** 2, abs=0.15)
+    for left, right, lowest in zip(np.arange(40) / 40, np.arange(1, 41) / 40, least, strict=True):
+        near = (x > left + 1e-3) & (x < right - 1e-3)
+        assert lowest <= values[cost][near].min()
+
+
+def test_few_designs_of_a_grid_are_cells() -> None:
+    found, result = drawn("a", "b", goals="minimize: [kinematics.P.x]")
+    (cells,) = [each for each in found["objective"].axes[0].collections if isinstance(each, PolyCollection)]
+    assert np.asarray(cells.get_array()) == pytest.approx(result.tables["designs"]["kinematics.P.x"])
+    corners = np.array([path.vertices[:4].mean(axis=0) for path in cells.get_paths()])
+    assert corners[:, 0] == pytest.approx(result.tables["designs"]["a"])
+
+
+FOUR_BAR = """
+units: {length: mm}
+mechanism:
+  parameters: {b: 90}
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, b], rocker: [D, B, 60]}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [75, 55]}
+  targets: TARGETS
+kinematics: POSES
+optimize: {variables: {b: {from: 85, to: 95, number: 3}}, minimize: [GOAL]}
+"""
+
+
+def optimum(targets: str, poses: str, goal: str):
+    text = FOUR_BAR.replace("TARGETS", targets).replace("POSES", poses).replace("GOAL", goal)
+    result = mechdesign.optimize(study := study_of(text))
+    best = study_of(text, f"mechanism.parameters.b={float(result.main['b'][0])}")
+    with style.context():
+        return figures(study, result)["optimum"], mechdesign.kinematics(best).tables["motion"]
+
+
+def test_the_optimum_shows_the_function_wanted_and_reached_and_the_error() -> None:
+    figure, motion = optimum("{rocker.angle: 100 + 0.2*crank}", "{sweep: {crank: {from: 20, to: 80, number: 40}}}",
+                             "kinematics.rocker.angle_error")  # fmt: skip
+    _, curve, error = figure.axes
+    wanted, got = (line.get_ydata() for line in curve.lines)
+    assert wanted == pytest.approx(100 + 0.2 * motion["crank"])
+    assert got == pytest.approx(motion["rocker.angle"])
+    assert error.lines[1].get_ydata() == pytest.approx(motion["rocker.angle_error"])
+    assert error.get_xlabel() == "crank [deg]"
+    assert error.get_ylabel() == "error [deg]"
+
+
+def test_the_optimum_at_listed_poses_shows_places_wanted_and_the_worst_pose() -> None:
+    figure, motion = optimum("{B.y: [54, 50, 45]}", "{poses: [{crank: 30}, {crank: 60}, {crank: 90}], outputs: [B]}",
+                             "kinematics.B.y_error")  # fmt: skip
+    axes = figure.axes[0]
+    lines = {line.get_label(): line.get_xydata() for line in axes.lines}
+    assert lines["B wanted"] == pytest.approx(np.column_stack([motion["B.x"], [54, 50, 45]]))
+    assert lines["B reached"] == pytest.approx(np.column_stack([motion["B.x"], motion["B.y"]]))
+    # Between the poses the rocker's end runs on its circle.
+    assert np.hypot(*(lines["path of B"] - [100, 0]).T) == pytest.approx(60.0)
+    worst = motion["crank"][np.argmax(np.abs(motion["B.y_error"]))]
+    title = axes.get_title(loc="left").replace("\n", " ").replace("\N{NO-BREAK SPACE}", " ")
+    assert title.endswith(f"drawn at the worst pose, crank = {worst:g} deg")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 from matplotlib.figure import Figure
+from matplotlib.path import Path as Outline
 
 import mechdesign
 from mechdesign.analyses.poses import study_poses
@@ -15,6 +16,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import number, plane
 from mechdesign.report.figures.reliability import figures
 from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
+from mechdesign.report.figures.reliability.densities import SHARES, smoothed
 from mechdesign.report.figures.reliability.looks import look
 from mechdesign.results import Column, Table
 from mechdesign.study.schema.methods import METHODS
@@ -165,24 +167,49 @@ def test_velocities_have_panels_and_limits_of_their_own() -> None:
     assert set(limits[1][0].get_ydata()) == {0.3}
 
 
-def test_histogram_shows_every_sample_and_the_limits() -> None:
-    found, _ = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]")
-    (axes,) = found["histogram"].axes
-    (bars,) = axes.containers
-    assert sum(bar.get_width() * bar.get_height() for bar in bars) == pytest.approx(1.0, abs=2e-3)
+def test_histogram_shows_every_sample_its_failures_and_the_limits() -> None:
+    found, result = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]")
+    for axes in found["histogram"].axes:
+        every, failed = (np.array([bar.get_width() * bar.get_height() for bar in bars]) for bars in axes.containers)
+        assert every.sum() == pytest.approx(1.0, abs=2e-3)
+        failure = result.tables["reliability"]["failure"].max()
+        assert failed.sum() == pytest.approx(failure, abs=2e-3)
+        limits = [line.get_xdata()[0] for line in axes.lines if line.get_color() == style.VERMILION]
+        assert limits == [-0.2, 0.2]
+    upper, lower = found["histogram"].axes
+    assert (upper.get_yscale(), lower.get_yscale()) == ("linear", "log")
+    assert lower.get_xlabel() == "error [mm]"
+    assert lower.get_ylabel() == "density [1/mm]"
     assert "2,000 samples" in texts(found["histogram"])
-    assert "crank = 30 deg" in texts(found["histogram"])
-    limits = [line.get_xdata()[0] for line in axes.lines if line.get_color() == style.VERMILION]
-    assert limits == [-0.2, 0.2]
-    assert axes.get_xlabel() == "error [mm]"
-    assert axes.get_ylabel() == "density [1/mm]"
+
+
+def test_pictures_of_samples_show_the_pose_that_fails_most_and_say_so() -> None:
+    found, result = drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", "reliability.methods=[monte_carlo]")
+    failure = result.tables["reliability"]["failure"]
+    assert failure[1] > 1.2 * failure[0]
+    for name in ("histogram", "convergence", "estimate"):
+        assert "at the pose that fails most, crank = 10 deg" in texts(found[name])
+        assert set(result.tables[name]["crank"]) == {10}
 
 
 def test_a_far_limit_is_told_in_words() -> None:
     found, _ = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]", "reliability.limits.B.x=5")
-    (axes,) = found["histogram"].axes
+    axes = found["histogram"].axes[0]
     assert [text.get_text() for text in axes.texts] == ["limit -5, +5 mm, outside"]
     assert max(abs(x) for x in axes.get_xlim()) < 2
+
+
+def test_a_circle_limits_a_distance_not_the_coordinates() -> None:
+    found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]")
+    axes = found["histogram"].axes
+    assert [axis.get_title(loc="left") for axis in axes[:3]] == ["P: distance from no error", "P.x", "P.y"]
+    limits = [[line.get_xdata()[0] for line in axis.lines if line.get_color() == style.VERMILION] for axis in axes[:3]]
+    assert limits == [[0.25], [], []]
+    every, failed = axes[0].containers
+    assert all(bar.get_height() == 0 for bar in failed if bar.get_x() + bar.get_width() <= 0.25)
+    assert [bar.get_height() for bar in failed if bar.get_x() > 0.25] == [
+        bar.get_height() for bar in every if bar.get_x() > 0.25
+    ]
 
 
 def test_estimate_stands_beside_the_other_methods() -> None:
@@ -197,51 +224,99 @@ def test_estimate_stands_beside_the_other_methods() -> None:
     assert f"plain samples: {number(first['monte_carlo'])}" in legend(found["estimate"])
 
 
-def test_density_has_the_circle_of_the_limit() -> None:
-    found, _ = drawn(ARM, CORNER, "reliability.methods=[auto]")
-    axes = found["density_contours"].axes
-    assert [axis.patches[0].get_radius() for axis in axes] == [0.25, 0.25]
-    assert [axis.get_xlabel() for axis in axes] == ["P.x error [mm]"] * 2
-    assert axes[1].get_title() == "simulation (auto)"
+def contours(*overrides: str):
+    found, result = drawn(ARM, CORNER, *overrides)
+    (axes,) = found["density_contours"].axes
+    return axes, found["density_contours"], result
+
+
+def limit_of(axes):
+    (found,) = [patch for patch in axes.patches if not patch.get_fill()]
+    return found
+
+
+def test_density_is_true_to_scale_with_the_circle_of_the_limit() -> None:
+    axes, figure, _ = contours("reliability.methods=[auto]")
+    assert limit_of(axes).get_radius() == 0.25
+    assert axes.get_aspect() == 1
+    assert axes.get_xlim()[0] < -0.25 < 0.25 < axes.get_xlim()[1]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("P.x error [mm]", "P.y error [mm]")
+    assert "limit: 0.25 mm from no error" in legend(figure)
+    assert "auto: holds 90 %" in legend(figure)
+
+
+def test_ellipses_hold_their_shares() -> None:
+    axes, _, result = contours("reliability.methods=[analytic, monte_carlo]")
+    samples = result.drawn["samples"]
+    lines = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 100 and line.get_marker() == "None"]
+    for points, share in zip(lines, SHARES, strict=True):
+        away = points - samples.mean
+        squares = np.einsum("ni,ij,nj->n", away, np.linalg.inv(samples.covariance), away)
+        # Of two normal variables the squared distance is exponential.
+        assert 1 - np.exp(-squares / 2) == pytest.approx(share)
+        assert Outline(points).contains_points(samples.errors.T).mean() == pytest.approx(share, abs=0.03)
+
+
+def test_smoothed_regions_hold_their_shares_and_end_where_samples_end() -> None:
+    errors = np.random.default_rng(1).normal(size=(2, 40_000)) * [[1.0], [0.1]]
+    region = smoothed(errors)
+    assert region is not None
+    assert len(region.levels) == len(SHARES)
+    assert region.outside.mean() == pytest.approx(1 - SHARES[-1], abs=1e-3)
+    # Half of two independent normal errors lies within sqrt(2 ln 2) deviations.
+    inside = region.density > region.levels[0]
+    assert np.hypot(region.x, 10 * region.y)[inside].max() == pytest.approx(np.sqrt(2 * np.log(2)), rel=0.05)
+    few = smoothed(errors[:, :2000])
+    assert few is not None
+    assert len(few.levels) == 2
+    assert smoothed(errors[:, :50]) is None
+
+
+def test_samples_that_fail_are_marked() -> None:
+    axes, figure, result = contours("reliability.methods=[monte_carlo]")
+    (marks,) = [line for line in axes.lines if line.get_marker() == "x"]
+    failures = round(float(result.tables["reliability"]["failure"][0]) * 2000)
+    assert 0 < len(marks.get_xydata()) == failures
+    assert (np.hypot(*marks.get_xydata().T) > 0.25).all()
+    assert f"2,000 samples, {failures} of them fail" in texts(figure)
 
 
 def test_open_and_far_limits_of_a_density() -> None:
-    found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]",
-                     "reliability.limits={P.x: {max: 0.2}, P.y: 9}")  # fmt: skip
-    (axes, _) = found["density_contours"].axes
-    assert [line.get_xdata().tolist() for line in axes.lines[:1]] == [[0.2, 0.2]]
+    axes, figure, _ = contours("reliability.methods=[monte_carlo]", "reliability.limits={P.x: {max: 0.2}, P.y: 9}")
+    (left, low), (right, high) = limit_of(axes).get_bbox().get_points()
+    assert right == pytest.approx(0.2)
+    assert left < axes.get_xlim()[0]
+    assert low < axes.get_ylim()[0] < axes.get_ylim()[1] < high
     assert max(abs(y) for y in axes.get_ylim()) < 1
-    assert "dashed: limits, others lie outside" in texts(found["density_contours"])
+    assert "limits outside: -9 mm of P.y, +9 mm of P.y" in texts(figure)
 
 
-@pytest.mark.parametrize(("radius", "words"), [(0.3, "dashed: limits"), (9.0, "limits lie outside")])
-def test_circle_of_a_density_is_told(radius: float, words: str) -> None:
-    found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]", f"reliability.limits.P.radius={radius}")
-    assert texts(found["density_contours"]).endswith(f"; {words}")
+def test_a_far_circle_of_a_density_is_told() -> None:
+    axes, figure, _ = contours("reliability.methods=[monte_carlo]", "reliability.limits.P.radius=9")
+    assert texts(figure).endswith("limit: 9 mm from no error, outside")
+    assert not axes.patches
 
 
 def test_density_of_velocities_has_their_limits() -> None:
-    found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
-                     "reliability.limits={P.x_velocity: 0.3, P.y_velocity: {min: -0.2, max: 0.3}}")  # fmt: skip
-    ends = [line.get_xydata().tolist() for line in found["density_contours"].axes[0].lines]
-    assert ends == [[[-0.3, -0.2], [-0.3, 0.3]], [[0.3, -0.2], [0.3, 0.3]], [[-0.3, -0.2], [0.3, -0.2]],
-                    [[-0.3, 0.3], [0.3, 0.3]]]  # fmt: skip
-    assert found["density_contours"].axes[0].get_xlabel() == "P.x velocity error [mm/s]"
+    axes, _, _ = contours("reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
+                          "reliability.limits={P.x_velocity: 0.3, P.y_velocity: {min: -0.2, max: 0.3}}")  # fmt: skip
+    assert limit_of(axes).get_bbox().get_points() == pytest.approx(np.array([[-0.3, -0.2], [0.3, 0.3]]))
+    assert axes.get_xlabel() == "P.x velocity error [mm/s]"
 
 
 def test_density_of_an_output_and_its_velocity() -> None:
-    found, result = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
-                          "reliability.limits={P.x: 0.2, P.x_velocity: 0.3}")  # fmt: skip
+    axes, _, result = contours("reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
+                               "reliability.limits={P.x: 0.2, P.x_velocity: 0.3}")  # fmt: skip
     table = result.tables["density"]
     assert [c.name for c in table.columns if c.name.endswith("_error")] == ["P.x_error", "P.x_velocity_error"]
     assert not np.array_equal(table["P.x_error"], table["P.x_velocity_error"])
-    axes = found["density_contours"].axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("P.x error [mm]", "P.x velocity error [mm/s]")
+    assert axes.get_aspect() == "auto"
 
 
 def test_density_of_one_sided_tolerances_lies_about_their_mean() -> None:
-    found, result = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]",
-                          "reliability.dimensions={'*.length': {tolerance: [0, 0.6]}}")  # fmt: skip
+    axes, _, result = contours("reliability.methods=[monte_carlo]",
+                               "reliability.dimensions={'*.length': {tolerance: [0, 0.6]}}")  # fmt: skip
     table, moments = result.tables["density"], result.tables["moments"]
     for name, mean in zip(("P.x", "P.y"), moments["mean"] - moments["nominal"], strict=True):
         assert abs(mean) > 0.1
@@ -250,7 +325,7 @@ def test_density_of_one_sided_tolerances_lies_about_their_mean() -> None:
             assert weights @ table[f"{name}_error"] == pytest.approx(mean, abs=0.01)
     cell = np.prod([np.diff(np.unique(table[axis])).mean() for axis in "xy"])
     assert table["simulated"].sum() * cell == pytest.approx(1.0, abs=0.02)
-    left, right = found["density_contours"].axes[0].get_xlim()
+    left, right = axes.get_xlim()
     assert left < -0.25 < table["P.x_error"].max() < right
 
 
@@ -318,40 +393,59 @@ def test_poses_out_of_reach_leave_gaps() -> None:
     assert known.tolist() == [True, True, False, True, True]
 
 
-def test_contributions_are_ranked_with_sobol_indices_beside() -> None:
+def test_contributions_are_one_bar_with_sobol_indices_where_these_differ() -> None:
     study = study_of(SLIDER, "reliability.poses=[{crank: 60}]")
     columns = {
-        "crank": [60.0, 60.0], "source": ["r", "l"], "output": ["B.x", "B.x"], "order": ["position"] * 2,
-        "share": [0.3, 0.7], "sobol_first": [0.28, 0.6], "sobol_first_low": [0.2, 0.5], "sobol_first_high": [0.3, 0.7],
-        "sobol_total": [0.4, 0.72], "sobol_total_low": [0.3, 0.7], "sobol_total_high": [0.5, 0.75],
+        "crank": [60.0] * 4, "source": ["r", "l"] * 2, "output": ["B.x"] * 2 + ["A.x"] * 2, "order": ["position"] * 4,
+        "share": [0.3, 0.7, 0.4, 0.6], "sobol_first": [0.3, 0.6, 0.4, 0.6], "sobol_first_low": [0.29, 0.58, 0.39, 0.58],
+        "sobol_first_high": [0.31, 0.62, 0.41, 0.62], "sobol_total": [0.4, 0.7, 0.4, 0.6],
+        "sobol_total_low": [0.37, 0.69, 0.39, 0.59], "sobol_total_high": [0.45, 0.71, 0.41, 0.61],
     }  # fmt: skip
     table = Table("contributions", tuple(Column(name, np.array(values)) for name, values in columns.items()))
     with style.context():
         figure = contributions_figure(study, table, study_poses(study, "reliability"))
-    (axes,) = figure.axes
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["l", "r"]
-    widths = [[bar.get_width() for bar in bars] for bars in axes.containers if hasattr(bars, "patches")]
-    assert widths == [pytest.approx([70, 30]), pytest.approx([60, 28]), pytest.approx([72, 40])]
-    assert legend(figure) == ["first-order share", "Sobol index, alone", "Sobol index, with all interactions"]
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["l", "r"]
+    for axes, shares in zip(figure.axes, ([70, 30], [60, 40]), strict=True):
+        assert [bar.get_width() for bar in axes.patches] == pytest.approx(shares)
+    marks = [[bars.lines[0].get_xydata().tolist() for bars in axes.containers if not hasattr(bars, "patches")]
+             for axes in figure.axes]  # fmt: skip
+    assert marks == [[[[60.0, 0.0]], [[40.0, 1.0]]], []]
+    assert legend(figure) == ["share, to the first order", "Sobol index, alone", "Sobol index, with all interactions"]
 
 
-def test_allocation_shows_given_beside_allocated() -> None:
+def test_shares_of_correlated_sources_are_explained() -> None:
+    found, result = drawn(SLIDER, "reliability.poses=[{crank: 30}]", "reliability.methods=[analytic]",
+                          "reliability.correlation=[[r, l, -0.9]]")  # fmt: skip
+    assert result.tables["contributions"]["share"].min() < 0
+    assert "negative shares" in texts(found["contributions"])
+
+
+def test_allocation_shows_given_beside_allocated_and_how_often_either_fails() -> None:
     study = study_of(SLIDER, LISTED, "reliability.allocate={reliability: 0.999}")
     columns = {
         "source": ["r", "l", "O"], "kind": ["tolerance", "sigma", "clearance"], "given": [0.3, 0.3, 0.1],
         "allocated": [0.2, 0.25, 0.1], "unit": ["mm"] * 3,
         "cost_given": [10.0, 5.0, np.nan], "cost_allocated": [15.0, 6.0, np.nan], "share": [0.5, 0.4, 0.1],
     }  # fmt: skip
-    table = Table("allocation", tuple(Column(name, np.array(values)) for name, values in columns.items()))
+    before = {"scope": ["pose", "pose", "cycle"], "method": ["analytic"] * 3, "failure": [0.02, 0.05, 0.06],
+              "failure_low": [0.02, 0.05, 0.06], "failure_high": [0.02, 0.05, 0.06]}  # fmt: skip
+    after = {"simulated": [0.9995, 0.9991], "low": [0.9993, 0.999], "high": [0.9997, 0.9992]}
+    tables = {
+        name: Table(name, tuple(Column(key, np.array(values)) for key, values in data.items()))
+        for name, data in {"allocation": columns, "reliability": before, "confirmation": after}.items()
+    }
     with style.context():
-        figure = allocation_figure(study, table)
-    tolerances, costs = figure.axes
+        figure = allocation_figure(study, tables)
+    tolerances, costs, failures = figure.axes
     assert [[bar.get_width() for bar in bars] for bars in tolerances.containers] == [[0.3, 0.3, 0.1], [0.2, 0.25, 0.1]]
     assert [label.get_text() for label in tolerances.get_yticklabels()] == ["r", "l (sigma)", "O (clearance)"]
     assert tolerances.get_xlabel() == "tolerance [mm]"
     assert costs.get_xlabel() == "cost"
     assert "0.999" in texts(figure)
     assert "cost 15 as given, 21 allocated (+40.0 %)" in texts(figure)
+    places = [bars.lines[0].get_xydata()[0].tolist() for bars in failures.containers]
+    assert places == [[0.05, 0], [pytest.approx(0.0009), 1]]
+    assert "allowed: 0.001" in legend(figure)
 
 
 @pytest.mark.parametrize(("value", "text"), [(1.6566e-9, "1.66·10⁻⁹"), (0.0277, "0.0277"), (0.0, "0")])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.analyses.optimize import pareto
 from mechdesign.analyses.optimize import search as searching
 from mechdesign.analyses.optimize.evaluation import Evaluator
@@ -120,7 +121,7 @@ def optimize(
     files, wrong = optimum_files(study, designs, marked)
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
     warnings = (*doubts, *_warnings(evaluator, designs), *wrong)
-    drawn = {"designs": designs, "best": lambda: best_design(designs)}
+    drawn = {"designs": designs, "design": lambda numbers: drawn_design(designs, numbers)}
     return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files, drawn=drawn)
 
 
@@ -275,20 +276,21 @@ def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]
     return alone.mechanism.forward.modes == mechanism.forward.modes
 
 
-def best_design(designs: Designs) -> tuple[Study, Result]:
-    """The design that is best on the whole as a study, and its workspace where that was judged, or else its motion."""
-    best = variant(designs.study, designs.numbers(designs.best))
+def drawn_design(designs: Designs, numbers: Mapping[str, float]) -> tuple[Study, Result]:
+    """A design as a study, with what was judged of it: its workspace, or else its motion with the targets' errors."""
+    made = variant(designs.study, numbers)
     judged = (*designs.goals, *designs.conditions)
-    if best.workspace is not None and any(each.command == "workspace" for each in judged):
+    if made.workspace is not None and any(each.command == "workspace" for each in judged):
         # The region is drawn, not its indices.
-        plain = dataclasses.replace(best, workspace=best.workspace.model_copy(update={"indices": ()}))
+        plain = dataclasses.replace(made, workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:
             shapes = [each.shape for each in designs.conditions if each.shape is not None]
             panels = answer(questions(plain, wanted=("area",))[0], {}, 1, SINGLE).panels
             contained = [(shape, complex(fitting_scale(shape, panels)[1][0])) for shape in shapes]
             return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
-    drawn = {}
     with suppress(MechdesignError):
-        drawn["motion"] = solve_shown(best)
-    return best, Result("kinematics", {}, drawn=drawn)
+        if any(each.command == "kinematics" for each in designs.goals):
+            return made, kinematics(made)
+        return made, Result("kinematics", {}, drawn={"motion": solve_shown(made)})
+    return made, Result("kinematics", {})

@@ -15,11 +15,14 @@ from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of, unit_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube
+from mechdesign.errors import MechanismError
 from mechdesign.journal import Journal, digest
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
 from mechdesign.results import Column
 from mechdesign.study import Study
+from mechdesign.study.schema.checker import ORDERS
+from mechdesign.study.schema.reliability import SUFFIXES
 
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
 DESIGNS_AT_ONCE = 384
@@ -169,8 +172,18 @@ class Designs:
     def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
         if judged.expression is not None:
             return unit_of(self.study, judged.column), "expression over parameters"
-        worst = ("", f"worst row of {judged.name}")
+        worst = (self._coordinate_unit(judged), f"worst row of {judged.name}")
         return self.meanings.get(judged.column, worst) if judged.regional else worst
+
+    def _coordinate_unit(self, judged: Goal) -> str:
+        """Unit of a coordinate, its rates and its error; none where a goal is something else."""
+        column = judged.column.removeprefix("motion.")
+        order = next((order for order, suffix in enumerate(SUFFIXES) if suffix and column.endswith(suffix)), 0)
+        try:
+            quantity = self.study.mechanism.quantity(column.removesuffix(SUFFIXES[order]).removesuffix("_error"))
+        except MechanismError:
+            return ""
+        return self.study.units.label(ORDERS[quantity][order]) if quantity in ORDERS else ""
 
 
 class Judge:

@@ -121,12 +121,13 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         made += [tables.success(task, found), tables.capability(task, found)]
     made += [tables.contributions(task, indices)]
     # Of the first method that samples the errors.
-    made += tables.of_drawn(task, next((each.sums for each in found if each.sums), {}))
+    sampled = next((each.sums for each in found if each.sums), {})
+    made += tables.of_drawn(task, sampled)
     result = Result(
         "reliability", {table.name: table for table in made} | dict(allocated.tables),
         [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,
         "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
-        {"poses": poses},
+        {"poses": poses, "samples": tables.drawn_samples(task, sampled)},
     )  # fmt: skip
     if interrupted:
         raise Interrupted(result)
@@ -203,6 +204,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     mechanism, pair = task.study.mechanism, task.question.pair
     mean, sigma = task.linear.shift(), task.linear.deviation()
     assembled = np.flatnonzero(task.assembled).tolist()
+    worst = _worst(task)
     settings = []
     for solved, rates in groups:
         given = set(solved.given) == set(mechanism.drives)
@@ -211,7 +213,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                 continue
             pose = solved.configuration.take(k)
             scale = None
-            if pair is not None and task.poses.listed and row in assembled[:_DENSITIES]:
+            if pair is not None and task.poses.listed and row in (*assembled[:_DENSITIES], worst):
                 one, two = ((float(mean[channel, row]), float(sigma[channel, row])) for channel in pair)
                 scale = (one, two) if one[1] > 0 and two[1] > 0 else None
             settings.append(
@@ -219,10 +221,20 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                     task.question.at(task.nominal[:, row]), row, mechanism,
                     mechanism.forward if given else forward_plan(mechanism, pose), pose, rates.take(k),
                     task.nominal[:, row].tolist(),
-                    None if task.elastic is None else task.elastic.take([row]), scale, row == assembled[0],
+                    None if task.elastic is None else task.elastic.take([row]), scale, row == worst,
                 )
             )  # fmt: skip
     return sorted(settings, key=lambda setting: setting.pose)
+
+
+def _worst(task: Task) -> int:
+    """The pose that fails most by the first order, whose samples are followed; without limits the first; -1: none."""
+    section, assembled = task.study.reliability, np.flatnonzero(task.assembled)
+    assert section is not None
+    if not task.question.limited or len(assembled) < 2 or not any(METHODS[name].sampled for name in section.methods):
+        return int(assembled[0]) if len(assembled) else -1
+    estimates = methods.run("analytic", task).estimates
+    return max(estimates, key=lambda pose: np.nan_to_num(estimates[pose].failure))
 
 
 def notes(found: Sequence[MethodResult], task: Task) -> list[str]:

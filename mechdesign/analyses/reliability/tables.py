@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import ReliabilityQuestion, links_meant
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.analyses.reliability.sobol import SobolIndices
-from mechdesign.analyses.reliability.task import MethodResult, Task
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.analyses.reliability.task import MethodResult, Strings, Task
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 
 # Bins of a histogram.
@@ -246,6 +246,52 @@ def _index_columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) ->
     return columns
 
 
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Errors of made mechanisms at the pose that fails most (without limits the first), in the study's units.
+
+    Parameters
+    ----------
+    outputs, orders, units : ndarray of str, shape (channels,)
+    errors : ndarray, shape (channels, n)
+        Of samples that can be assembled.
+    kept : ndarray of bool, shape (n,)
+        Which of them keep every limit.
+    bands, discs
+        The limits as those of errors: channel, lowest and highest error; channels of x and y, radius.
+    pair : (int, int) or None
+        The two channels whose density is drawn.
+    mean, covariance : ndarray, shapes (channels,) and (channels, channels)
+        Of the errors to the first order.
+    """
+
+    pose: int
+    outputs: Strings
+    orders: Strings
+    units: Strings
+    errors: Floats
+    kept: Flags
+    bands: tuple[tuple[int, float, float], ...]
+    discs: tuple[tuple[int, int, float], ...]
+    pair: tuple[int, int] | None
+    mean: Floats
+    covariance: Floats
+
+
+def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:
+    """The samples that pictures show; None where no errors are drawn."""
+    setting = next((each for each in task.settings if each.followed), None)
+    if setting is None or setting.pose not in sums or not sums[setting.pose].kept.size:
+        return None
+    pose, question, scale, errors = setting.pose, setting.question, task.scale, sums[setting.pose].kept
+    return Samples(
+        pose, *task.labels, errors * scale[:, None], np.logical_and.reduce(question.kept(errors)),
+        tuple((b.output, b.low * scale[b.output], b.high * scale[b.output]) for b in question.bands),
+        tuple((d.x, d.y, d.radius) for d in question.discs), question.pair,
+        task.linear.shift()[:, pose] * scale, task.linear.covariance()[pose] * np.outer(scale, scale),
+    )  # fmt: skip
+
+
 def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:
     """Density, histogram, convergence and estimate, as far as there is something to say; sums by pose."""
     made = [_density(task, sums), _histogram(task, sums)]
@@ -288,7 +334,7 @@ def _density(task: Task, sums: Mapping[int, Sums]) -> Table | None:
 
 
 def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
-    """Each output's error at the first pose, beside the normal law of the same mean and deviation."""
+    """Each output's error at the pose that fails most, beside the normal law of the same mean and deviation."""
     row = next((row for row, each in sorted(sums.items()) if each.kept.shape[1] > 1), None)
     if row is None:
         return None
@@ -321,11 +367,11 @@ def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
         Column("normal", normal_, meaning="density of the normal law of the samples' mean and deviation, in 1/`unit`"),
         Column("unit", units[channel], meaning="unit of the error"),
     ]
-    return Table("histogram", tuple(columns), "errors that were drawn at the first pose, and their normal fit")
+    return Table("histogram", tuple(columns), "errors drawn at the pose that fails most, and their normal fit")
 
 
 def _convergence(task: Task, row: int, sums: Sums) -> Table:
-    """Mean of each output after so many samples, at the first pose [S3, Fig. 4]."""
+    """Mean of each output after so many samples, at the pose that fails most [S3, Fig. 4]."""
     trend = sums.trend[sums.trend[:, 1] > 0]
     means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
     step, channel = (index.ravel() for index in np.indices(means.shape))
@@ -340,7 +386,7 @@ def _convergence(task: Task, row: int, sums: Sums) -> Table:
 
 
 def _estimate(task: Task, row: int, sums: Sums) -> Table:
-    """Share of failures after so many samples, with its interval, at the first pose."""
+    """Share of failures after so many samples, with its interval, at the pose that fails most."""
     samples, failures = (sums.trend[:, k].astype(np.int64) for k in (0, 2))
     interval = np.array([binomial(k, n) for k, n in zip(failures.tolist(), samples.tolist(), strict=True)])
     columns = [

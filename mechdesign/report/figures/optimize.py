@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from itertools import combinations
+from string import ascii_uppercase
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter
 from matplotlib.tri import Triangulation
 
 from mechdesign.analyses.optimize.judge import Designs
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
-from mechdesign.report.figures.kinematics import paths_figure
 from mechdesign.report.figures.mechanism import mechanism_figure
+from mechdesign.report.figures.optimum import design_figure, designs_figure
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.scene import Sweep
 from mechdesign.report.figures.workspace import workspace_figure
 from mechdesign.report.figures.workspace.regions import regions
 from mechdesign.results import Result, Table
@@ -29,8 +30,14 @@ from mechdesign.study import Study
 MIN_MAP_DESIGNS = 9
 MAP_LEVELS = 14
 MARKERS = "osD^vP*X<>"
+_FRONT_MARKS = "so^DvPX"
 # More lines than that are one blot: of more designs every so many are drawn, in the order of their score.
 MAX_LINES = 300
+# Steps along a variable in which the best of scattered designs is found, and how many values no grid exceeds.
+ENVELOPE_STEPS = 40
+MAX_VALUES = 200
+# Fewer designs of a grid are drawn as they are, a cell each: what a field shows between them is not known.
+FEWEST_OF_FIELD = 1000
 # Directions from the centre of what the workspace contains to its outline.
 _OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
 _NAME_LETTERS = 14  # of a name in one line below an axis
@@ -38,16 +45,17 @@ _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """``CPI`` (the score over the variables), ``indices``, ``designs``, ``pareto``, ``convergence`` and ``optimum``."""
+    """``CPI`` (``objective`` of one goal), ``indices``, ``designs``, ``pareto``, ``convergence``, ``optimum``."""
     assert study.optimize is not None
     designs: Designs = result.drawn["designs"]
     found = Gallery()
+    score = "CPI" if len(designs.goals) > 1 else "objective"
     if len(designs.variables) == 2 and len(designs) >= MIN_MAP_DESIGNS:
-        found.add("CPI", score_surface, designs)
+        found.add(score, score_surface, designs)
         if len(designs.goals) > 1:
             found.add("indices", goal_maps, designs)
     else:
-        found.add("CPI", score_curves, designs)
+        found.add(score, score_curves, designs)
     if len(designs.variables) > 2:
         found.add("designs", parallel_axes, designs)
     if "pareto" in result.tables:
@@ -58,10 +66,31 @@ def figures(study: Study, result: Result) -> Gallery:
     return found
 
 
+def _marked(designs: Designs, front: Table) -> list[tuple[str, int]]:
+    """Designs of a front that are shown, and their rows: the best of each goal, and the knee between them."""
+    found: dict[int, str] = {}
+    for letter, goal in zip(ascii_uppercase, designs.goals, strict=False):
+        best = np.argmin if goal.smallest else np.argmax
+        found.setdefault(int(best(front[goal.name])), f"{letter}: best {goal.name}")
+    found.setdefault(int(np.argmax(front["knee"])), "knee")
+    # Along the first goal, as the front runs.
+    return [(found[row], row) for row in sorted(found)]
+
+
 def _optimum(result: Result, designs: Designs) -> Figure:
-    """The best design itself: in its workspace where that was judged, in its motion where that was."""
-    words = in_words(designs, designs.best)
-    best, own = result.drawn["best"]()
+    """The best design itself: in its workspace where that was judged, in its motion where that was.
+
+    Of a front whose designs move, those that are marked in it, side by side.
+    """
+    if "pareto" in result.tables:
+        front = result.tables["pareto"]
+        parts = [(_described(designs, front, name, row), *result.drawn["design"](_variables(designs, front, row)))
+                 for name, row in _marked(designs, front)]  # fmt: skip
+        moving = ("motion" in own.drawn and own.drawn["motion"].configuration.valid.any() for _, _, own in parts)
+        if len(parts) > 1 and all(moving):
+            return designs_figure(parts)
+    best, own = result.drawn["design"](designs.numbers(designs.best))
+    words = _listed(designs.numbers(designs.best))
     if own.command == "workspace":
         region = regions(best, own)[0]
         there = f", at {region.title}" if region.title else ""
@@ -71,13 +100,27 @@ def _optimum(result: Result, designs: Designs) -> Figure:
             z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
             figure.axes[0].plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
         return figure
-    goals = designs.goals
-    if any(each.command == "kinematics" for each in goals) and own.drawn["motion"].poses.motion:
-        figure = paths_figure(Sweep.of(own.drawn["motion"]), above=0.4)
-        figure.axes[0].set_title(f"The best design, {words}", loc="left")
-        return figure
     # A title may be broken between variables only.
-    return mechanism_figure(best, own, f"The best design, {words.replace(' = ', _UNBROKEN_EQUALS)}")
+    words = f"The best design, {words}".replace(" = ", _UNBROKEN_EQUALS)
+    if "motion" in own.tables:
+        return design_figure(best, own, words)
+    return mechanism_figure(best, own, words)
+
+
+def _variables(designs: Designs, front: Table, row: int) -> dict[str, float]:
+    return {name: float(front[name][row]) for name in designs.variables}
+
+
+def _described(designs: Designs, front: Table, name: str, row: int) -> str:
+    """Lines that name a design of a front, its variables and its goals; none is broken at a space."""
+    lines = [f"{variable} = {value:.4g}" for variable, value in _variables(designs, front, row).items()]
+    lines += [f"{goal.column} = {front[goal.name][row]:.3g} {designs.unit_of(goal.name)}" for goal in designs.goals]
+    return "\n".join([name, *(line.strip().replace(" ", "\N{NO-BREAK SPACE}") for line in lines)])
+
+
+def _listed(numbers: Mapping[str, float]) -> str:
+    """``l_a = 1, l_b = 2.15``."""
+    return ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())
 
 
 def label(designs: Designs, name: str) -> str:
@@ -85,50 +128,57 @@ def label(designs: Designs, name: str) -> str:
     return style.axis_label(name, designs.unit_of(name))
 
 
-def in_words(designs: Designs, row: int) -> str:
-    """``l_a = 1, l_b = 2.15`` of a design."""
-    return ", ".join(f"{name} = {value:.4g}" for name, value in designs.numbers(row).items())
-
-
 def score_curves(designs: Designs) -> Figure:
-    """The best score for each value of each variable, with the goals of that design [S1, Fig. 3(a)].
+    """Every design's score over each variable, and the best design near each value of it [S1, Fig. 3(a)].
 
-    Of scattered designs each is a dot.
+    Of a single variable also the goals of that design.
     """
     winner = designs.best
     many, count, one = len(designs.goals) > 1, len(designs.variables), designs.goals[0]
     across = min(count, 3) if count > 2 else 1
     down = -(-count // across)
     figure = style.new_figure(0.9 + (2.9 if across == 1 else 2.5) * down)
-    score, told = (designs.cpi, "CPI") if many else (designs.values[:, 0], one.name)
+    score = designs.cpi if many else designs.values[:, 0]
+    told = "CPI" if many else label(designs, one.name)
+    feasible = np.flatnonzero(designs.feasible & np.isfinite(score))
+    steep = not many and _steep(score[feasible])
     for number, (name, column) in enumerate(designs.variables.items()):
         axes = figure.add_subplot(down, across, number + 1)
-        inside = column[designs.feasible]
-        values = np.unique(inside)
-        if count > 1 and 2 * len(values) > len(inside):
-            axes.plot(inside, score[designs.feasible], ".", color=style.FAINT, markersize=4, markeredgewidth=0,
+        best = feasible[_envelope(column[feasible], score[feasible], count > 1, smallest=not many and one.smallest)]
+        if count > 1:
+            axes.plot(column[feasible], score[feasible], ".", color=style.FAINT, markersize=3, markeredgewidth=0,
                       label="designs")  # fmt: skip
-        else:
-            order = np.lexsort([-np.where(designs.feasible, designs.cpi, -np.inf), column])
-            best = order[np.searchsorted(column[order], values)]
-            axes.plot(values, score[best], color=style.INK, linewidth=2.0, label=told)
-            for k, color in zip(range(len(designs.goals)) if many else (), style.PALETTE, strict=False):
-                shown = f"{designs.goals[k].name}, normalised"
-                axes.plot(values, designs.share(k)[best], color=color, label=shown)
+        axes.plot(column[best], score[best], color=style.INK, linewidth=1.6 if count > 1 else 2.0,
+                  label="best near each value" if count > 1 else told)  # fmt: skip
+        for k, color in zip(range(len(designs.goals)) if many and count == 1 else (), style.PALETTE, strict=False):
+            axes.plot(column[best], designs.share(k)[best], color=color, label=f"{designs.goals[k].name}, normalised")
         axes.plot(column[winner], score[winner], "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
         axes.set_title(f"best: {name} = {column[winner]:.4g}", loc="right", fontsize=9, color=style.VERMILION)
         axes.set_xlabel(label(designs, name))
-        axes.set_ylabel("" if number % across else "index" if many else label(designs, told))
+        axes.set_ylabel("" if number % across else "index" if many and count == 1 else _folded(told))
         axes.margins(x=0.02)
-        if not many and _steep(score[designs.feasible]):
+        axes.locator_params(axis="x", nbins=6)
+        if steep:
             axes.set_yscale("log")
-            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            axes.yaxis.set_minor_formatter(NullFormatter())
-    among = "" if count == 1 else ": the best design for each value of a variable"
-    figure.suptitle(("Composite performance index" if many else told) + among, x=0.01, ha="left", fontsize=11)
+    among = "" if count == 1 else " over each variable"
+    better = "" if many else f", {'less' if one.smallest else 'more'} is better"
+    what = f"Composite performance index of ({', '.join(each.name for each in designs.goals)})" if many else one.name
+    figure.suptitle(f"{what}{among}{better}", x=0.01, ha="left", fontsize=11)
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
     return figure
+
+
+def _envelope(along: Floats, score: Floats, several: bool, *, smallest: bool) -> Ints:
+    """The best of the designs at each value along a variable, in order.
+
+    Of `several` variables those that are scattered have each a value of its own: the best in each of some steps.
+    """
+    values, place = np.unique(along, return_inverse=True)
+    if several and (len(values) > MAX_VALUES or 2 * len(values) > len(along) > ENVELOPE_STEPS):
+        steps = (along - values[0]) / (values[-1] - values[0]) * ENVELOPE_STEPS
+        place = np.minimum(steps.astype(np.intp), ENVELOPE_STEPS - 1)
+    order = np.lexsort([score if smallest else -score, place])
+    return np.asarray(order[np.unique(place[order], return_index=True)[1]], dtype=np.intp)
 
 
 def _steep(values: Floats) -> bool:
@@ -177,7 +227,7 @@ def goal_maps(designs: Designs) -> Figure:
 
 
 def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
-    """Filled contours over two variables whose bounds may depend on each other; dots where designs are scattered."""
+    """Contours over two variables whose bounds may depend on each other; cells of few designs, dots of scattered."""
     across, up = designs.variables
     axes.set_xlabel(label(designs, across))
     axes.set_ylabel(label(designs, up))
@@ -190,14 +240,21 @@ def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
         order = np.argsort(designs.cpi[inside] if any(each.smallest for each in designs.goals) else z)
         axes.margins(0.03)
         return axes.scatter(x[order], y[order], c=z[order], s=14, cmap=style.COLORMAP, linewidths=0)
+    levels, norm = style.levels(z.min(), z.max(), MAP_LEVELS), None
+    if _steep(z) and len(designs.goals) == 1:
+        levels, norm = np.geomspace(z.min(), z.max(), MAP_LEVELS + 1), LogNorm(z.min(), z.max())
+    if len(z) < FEWEST_OF_FIELD:
+        half = np.array([np.median(np.diff(step)) / 2 for step in steps])
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+        cells = PolyCollection(np.column_stack([x, y])[:, None] + corners, array=z, cmap=style.COLORMAP, norm=norm)
+        axes.add_collection(cells)
+        axes.margins(0.02)
+        return cells
     # In steps of the grid triangles are well shaped; those that span missing designs are left out.
     scaled = [(v - v.min()) / np.median(np.diff(step)) for v, step in zip((x, y), steps, strict=True)]
     mesh = Triangulation(*scaled)
     corners = np.stack([mesh.x[mesh.triangles], mesh.y[mesh.triangles]])
     mesh = Triangulation(x, y, mesh.triangles, mask=(np.ptp(corners, axis=2) > 2.01).any(axis=0))
-    levels, norm = style.levels(z.min(), z.max(), MAP_LEVELS), None
-    if _steep(z) and len(designs.goals) == 1:
-        levels, norm = np.geomspace(z.min(), z.max(), MAP_LEVELS + 1), LogNorm(z.min(), z.max())
     filled = axes.tricontourf(mesh, z, levels=levels, cmap=style.COLORMAP, norm=norm)
     axes.tricontour(mesh, z, levels=levels, colors="white", linewidths=0.4, alpha=0.6)
     axes.margins(0.02)
@@ -269,11 +326,14 @@ def convergence(designs: Designs) -> Figure:
         values = np.where(designs.feasible, designs.values[:, 0], np.inf if goal.smallest else -np.inf)
         so_far = (np.minimum if goal.smallest else np.maximum).accumulate(values)
         known = np.isfinite(so_far)
-        axes.step(count[known], so_far[known], where="post", color=style.BLUE)
+        axes.plot(count[designs.feasible], values[designs.feasible], ".", color=style.FAINT, markersize=3,
+                  markeredgewidth=0, label="designs")  # fmt: skip
+        axes.step(count[known], so_far[known], where="post", color=style.BLUE, label="best so far")
+        axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none")
         found = so_far[known]
         if (found > 0).all() and found.max() > 20 * found.min():
             axes.set_yscale("log")
-        axes.set_ylabel(f"best {label(designs, goal.name)} so far")
+        axes.set_ylabel(_folded(label(designs, goal.name)))
     axes.set_xlabel("designs evaluated")
     axes.set_title("Convergence of the search", loc="left")
     axes.margins(x=0.01)
@@ -289,7 +349,7 @@ def front_figure(designs: Designs, front: Table) -> Figure:
     for number, pair in enumerate(pairs):
         _front(figure.add_subplot(rows, columns, number + 1), designs, front, pair)
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=2 if len(labels) > 2 else 3)
+    figure.legend(handles, labels, loc="outside lower left", ncols=1 if len(labels) > 2 else 3)
     number = int(designs.feasible.sum())
     figure.suptitle(f"Pareto front: {len(front)} of {number} feasible designs", x=0.01, ha="left", fontsize=11)
     return figure
@@ -304,10 +364,12 @@ def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) ->
     axes.plot(along[order], up[order], "o-" if len(designs.goals) == 2 else "o", color=style.BLUE, linewidth=1.2,
               markersize=4.0 if len(front) < 200 else 2.2,
               label="front: no other is better in every goal")  # fmt: skip
-    for row in np.flatnonzero(front["knee"]):
-        words = ", ".join(f"{name} = {front[name][row]:.4g}" for name in designs.variables)
-        axes.plot(along[row], up[row], "*", color=style.VERMILION, markeredgecolor="white", markersize=15,
-                  linestyle="none", label=f"knee: {words}", zorder=5)  # fmt: skip
+    for (name, row), marker in zip(_marked(designs, front), _FRONT_MARKS, strict=False):
+        knee = name == "knee"
+        words = _listed(_variables(designs, front, row))
+        axes.plot(along[row], up[row], "*" if knee else marker, color=style.VERMILION, markeredgecolor="white",
+                  markersize=15 if knee else 9, linestyle="none", label=f"{name}, {words}", zorder=5,
+                  clip_on=False)  # fmt: skip
     across, upwards = (f"{label(designs, g.name)}, {'less' if g.smallest else 'more'} is better" for g in goals)
     axes.set_xlabel(across)
     axes.set_ylabel(upwards)

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import pose_in_words
 from mechdesign.report.figures.panels import along, plane
 from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
+from mechdesign.report.figures.reliability.densities import density_figures
 from mechdesign.report.figures.reliability.errors import MAX_LISTED, estimate_figure, map_figures, sweep_figures
 from mechdesign.report.figures.reliability.looks import Sampled, look
-from mechdesign.report.figures.reliability.samples import (
-    convergence_figure,
-    density_figures,
-    histogram_figure,
-    trend_figure,
-)
+from mechdesign.report.figures.reliability.samples import convergence_figure, histogram_figure, trend_figure
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.results import Result, Table
+from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -37,33 +31,26 @@ def figures(study: Study, result: Result) -> Gallery:
     if "reliability" in tables and (few or swept is not None):
         found.add("reliability", estimate_figure, study, tables["reliability"], poses, swept)
     found.add("of samples", _sampled, study, result, poses)
-    found.add("contributions", contributions_figure, study, tables["contributions"], poses)
+    worst = result.drawn["samples"].pose if result.drawn["samples"] is not None else 0
+    found.add("contributions", contributions_figure, study, tables["contributions"], poses, worst)
     if "allocation" in tables:
-        found.add("allocation", allocation_figure, study, tables["allocation"])
+        found.add("allocation", allocation_figure, study, tables)
     return found
 
 
 def _sampled(study: Study, result: Result, poses: Poses) -> Gallery:
     """Pictures of the tables that only methods which draw samples give."""
-    tables, moments = result.tables, result.tables["moments"]
+    tables, samples = result.tables, result.drawn["samples"]
     found = Gallery()
-    # The tables are of the first method that samples errors; the moments hold its name.
-    method = next((name for name in moments["method"].tolist() if look(name).sampled), None)
-    if method is None:
+    if samples is None:
         return found
+    # The tables are of the first method that samples errors; the moments hold its name.
+    method = next(name for name in tables["moments"]["method"].tolist() if look(name).sampled)
     makers: dict[str, Callable[[Sampled], Figure | Mapping[str, Figure]]] = {
         "density": density_figures, "histogram": histogram_figure, "convergence": convergence_figure,
         "estimate": trend_figure,
     }  # fmt: skip
     for name, make in makers.items():
         if name in tables:
-            found.add(name, make, Sampled(study, tables, method, *_pose(study, poses, tables[name])))
+            found.add(name, make, Sampled(study, tables, method, samples, poses))
     return found
-
-
-def _pose(study: Study, poses: Poses, table: Table) -> tuple[int, str]:
-    """Row and words of the pose that a table begins with."""
-    first = [table[name][0] for name in poses.names]
-    rows = [np.array_equal(row, first, equal_nan=True) for row in zip(*poses.values.values(), strict=True)]
-    pose = rows.index(True)
-    return pose, pose_in_words(study, poses, pose)

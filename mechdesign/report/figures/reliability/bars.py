@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.poses import pose_in_words
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.panels import MAX_PANELS, legend_below, title
-from mechdesign.report.figures.reliability.looks import heading
+from mechdesign.report.figures.panels import MAX_PANELS, legend_below, number, title
+from mechdesign.report.figures.reliability.looks import best_probability, heading, worst_in_words
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -18,117 +21,115 @@ from mechdesign.study.poses import Poses
 MAX_SOURCES = 16
 MAX_TOLERANCES = 20
 MAX_POSE_BARS = 4
-# Columns of bars, in words and colours.
-_SOBOL = {
-    "share": ("first-order share", style.BLUE),
-    "sobol_first": ("Sobol index, alone", style.ORANGE),
-    "sobol_total": ("Sobol index, with all interactions", style.GREEN),
-}
+# A Sobol' index that differs from the first-order share by more than this part of the variance is marked.
+_SAME_SHARE = 0.01
 # Inches.
 _SOURCE_HEIGHT = 0.24
 _TOLERANCE_HEIGHT = 0.36  # of both bars
+_FAILURE_HEIGHT = 0.75
+_FAILURE_ROOM = 1.4
 _PANEL_GAP = 0.94
+_ACROSS = 0.3
 _MIN_WIDTH = 1.9  # of a panel
 
 
-def contributions_figure(study: Study, table: Table, poses: Poses) -> Figure:
-    """A panel an output and order; a bar a pose where a few are listed, their average otherwise, or three indices."""
+def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 0) -> Figure:
+    """A panel an output and order: bars of the first-order shares, and marks where Sobol' indices differ from them.
+
+    A bar a pose where a few are listed; else the worst pose with Sobol' indices, or the average over the poses. The
+    sources are in one order, the largest of any panel first.
+    """
     pairs = list(dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), strict=True)))[:MAX_PANELS]
     names = list(dict.fromkeys(table["source"].tolist()))
-    margin = 0.3 + 0.072 * max(len(name) for name in names)
-    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, int(style.WIDTH / (margin + _MIN_WIDTH))))
-    sobol = _sobol_pose(table, poses, len(names))
+    sobol = _sobol_pose(table, poses, worst)
     each = sobol is None and poses.listed and poses.count <= MAX_POSE_BARS
-    bars = 3 if sobol is not None else poses.count if each else 1
-    tall = (0.15 + min(len(names), MAX_SOURCES)) * max(_SOURCE_HEIGHT, 0.1 * bars + 0.06)
-    bottom = 0.55 + 0.2 * (0 if bars == 1 else 1 if bars < 3 else 2)
+    blocks = [table.take(table.where(output=output, order=order)) for output, order in pairs]
+    bars = [100.0 * _shares(block["share"].reshape(poses.count, -1), sobol, each) for block in blocks]
+    largest = np.max([np.nan_to_num(bar).mean(axis=0) for bar in bars], axis=0)
+    ranked = np.argsort(-largest, kind="stable")[:MAX_SOURCES]
+    where = "" if each and poses.count > 1 else f"average over {poses.count} poses"
+    if sobol is not None or poses.count == 1:
+        section, pose = study.reliability, sobol or 0
+        assert section is not None
+        fails_most = pose == worst and bool(section.limits)
+        where = f"at {worst_in_words(study, poses, pose) if fails_most else pose_in_words(study, poses, pose)}"
+    notes = []
+    if any((bar < -1.0).any() for bar in bars):
+        notes.append("correlated sources make up for each other: negative shares, and others above 100 %")
+    elif sobol is not None:
+        notes.append(f"Sobol indices that differ by less than {100 * _SAME_SHARE:g} % are not marked")
+        if not np.isfinite(table["sobol_total"].reshape(poses.count, -1)[sobol]).all():
+            notes.append("correlated sources have none")
+    margin = 0.3 + 0.072 * max(len(names[k]) for k in ranked)
+    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, int((style.WIDTH - margin) / (_ACROSS + _MIN_WIDTH))))
+    tall = (0.15 + len(ranked)) * max(_SOURCE_HEIGHT, 0.1 * len(bars[0]) + 0.06)
     figure, grid = style.page(
-        len(pairs),
-        columns,
-        tall,
-        left=margin,
-        right=0.15,
-        top=0.75,
-        bottom=bottom,
-        across=margin + 0.1,
-        down=_PANEL_GAP,
-    )
-    for k, (axis, (output, order)) in enumerate(zip(grid, pairs, strict=True)):
-        rows = table.where(output=output, order=order)
+        len(pairs), columns, tall, left=margin, right=0.2, top=0.75 + 0.2 * bool(notes), bottom=0.95, across=_ACROSS,
+        down=_PANEL_GAP, sharey=True,
+    )  # fmt: skip
+    entries: dict[str, Any] = {}
+    for k, (axis, block, shown) in enumerate(zip(grid, blocks, bars, strict=True)):
+        for place, values in enumerate(shown[:, ranked]):
+            height = 0.8 / len(shown)
+            label = pose_in_words(study, poses, place) if len(shown) > 1 else "share, to the first order"
+            drawn = axis.barh(np.arange(len(ranked)) + (place + 0.5) * height - 0.4, values, height,
+                              color=style.PALETTE[place % len(style.PALETTE)])  # fmt: skip
+            entries[label] = drawn
+            if len(shown) == 1:
+                axis.bar_label(drawn, fmt="%.1f", padding=2, fontsize=8)
         if sobol is not None:
-            _indices(axis, table, rows, names, sobol)
-        else:
-            _shares(study, axis, table["share"][rows].reshape(poses.count, len(names)), names, poses, each)
-        axis.grid(visible=False, axis="y")
-        axis.tick_params(axis="y", length=0)
-        axis.set_title(heading(output, order), loc="left", fontsize=9.5)
+            _mark_sobol(axis, block.take(sobol * len(names) + ranked), entries)
+        _name(axis, [names[k] for k in ranked])
+        axis.set_title(heading(*pairs[k]), loc="left", fontsize=9.5)
         axis.set_xlabel("share of the variance [%]" if k + columns >= len(pairs) else "")
-    which = ""
-    if sobol is not None:
-        which = f"at {pose_in_words(study, poses, sobol)}; whiskers: 99.7 % intervals"
-        if not np.isfinite(table["sobol_first"][: len(names)]).all():
-            which += "; correlated sources have no Sobol index"
-    elif poses.count == 1:
-        which = f"at {pose_in_words(study, poses, 0)}"
-    elif not each:
-        which = f"average over {poses.count} poses"
-    title(figure, "Where the variance of the error comes from", which, left=margin)
-    handles, labels = grid[0].get_legend_handles_labels()
-    if len(labels) > 1:
-        legend_below(figure, handles, labels)
+    title(figure, "Where the variance of the error comes from", where, left=margin)
+    figure.text(margin / style.WIDTH, 1 - 0.5 / figure.get_figheight(), "; ".join(notes), va="top", fontsize=8.5)
+    legend_below(figure, list(entries.values()), list(entries))
     return figure
 
 
-def _sobol_pose(table: Table, poses: Poses, sources: int) -> int | None:
-    """The first pose with Sobol indices."""
+def _sobol_pose(table: Table, poses: Poses, worst: int) -> int | None:
+    """The worst pose where it has Sobol indices, or else the first that has."""
     if "sobol_first" not in table:
         return None
     known = np.isfinite(table["sobol_first"]).reshape(poses.count, -1).any(axis=1)
-    return int(np.argmax(known)) if known.any() else None
+    return (worst if known[worst] else int(np.argmax(known))) if known.any() else None
 
 
-def _shares(study: Study, axis: Axes, shares: Floats, names: list[str], poses: Poses, each: bool) -> None:
+def _shares(shares: Floats, pose: int | None, each: bool) -> Floats:
+    """Shares of a pose, of each pose or on the average of those that have them, shape (bars, sources)."""
+    if pose is not None or each:
+        return shares if pose is None else shares[[pose]]
     known = shares[np.isfinite(shares).all(axis=1)]
-    average = known.mean(axis=0) if len(known) else np.zeros(len(names))
-    ranked = np.argsort(-average, kind="stable")[:MAX_SOURCES]
-    shown = 100.0 * (shares[:, ranked] if each else average[None, ranked])
-    height = 0.8 / len(shown)
-    for k, values in enumerate(shown):
-        label = pose_in_words(study, poses, k) if each and len(shown) > 1 else None
-        bars = axis.barh(np.arange(len(ranked)) + (k + 0.5) * height - 0.4, values, height,
-                         color=style.PALETTE[k % len(style.PALETTE)], label=label)  # fmt: skip
-        if len(shown) == 1:
-            axis.bar_label(bars, fmt="%.1f", padding=2, fontsize=8)
-    _name(axis, [names[k] for k in ranked])
+    return known.mean(axis=0, keepdims=True) if len(known) else np.zeros((1, shares.shape[1]))
 
 
-def _indices(axis: Axes, table: Table, rows: Flags, names: list[str], pose: int) -> None:
-    """First-order share, first and total index of each source, by the total one."""
-    own = np.flatnonzero(rows)[pose * len(names) : (pose + 1) * len(names)]
-    # Correlated sources have no indices of their own: they are ranked by their share.
-    largest = np.fmax(table["sobol_total"][own], table["share"][own])
-    ranked = own[np.argsort(-np.nan_to_num(largest), kind="stable")[:MAX_SOURCES]]
-    height = 0.8 / len(_SOBOL)
-    for k, (column, (words, color)) in enumerate(_SOBOL.items()):
-        values, reach = 100.0 * table[column][ranked], None
-        if f"{column}_low" in table:
-            ends = 100.0 * np.stack([table[f"{column}_low"][ranked], table[f"{column}_high"][ranked]])
-            reach = np.abs(ends - values)
-        axis.barh(np.arange(len(ranked)) + (k + 0.5) * height - 0.4, values, height, xerr=reach, color=color,
-                  label=words, error_kw={"elinewidth": 1.0, "ecolor": style.INK})  # fmt: skip
-    _name(axis, [str(name) for name in table["source"][ranked]])
+def _mark_sobol(axis: Axes, table: Table, entries: dict[str, Any]) -> None:
+    """Marks with intervals where an index differs from the first-order share by more than its interval explains."""
+    kinds = (("first", "o", "Sobol index, alone"), ("total", "D", "Sobol index, with all interactions"))
+    for kind, marker, words in kinds:
+        value, low, high = (table[f"sobol_{kind}{end}"] for end in ("", "_low", "_high"))
+        apart = np.abs(value - table["share"]) > np.maximum(_SAME_SHARE, (high - low) / 2)
+        if apart.any():
+            reach = 100.0 * np.abs(np.stack([low, high]) - value)[:, apart]
+            entries[words] = axis.errorbar(
+                100.0 * value[apart], np.flatnonzero(apart), xerr=reach,
+                fmt=marker, color=style.INK, markersize=4.5, markerfacecolor="white", elinewidth=1.0,
+            )  # fmt: skip
 
 
 def _name(axis: Axes, names: list[str]) -> None:
+    axis.grid(visible=False, axis="y")
+    axis.tick_params(axis="y", length=0)
     axis.set_yticks(np.arange(len(names)), names)
     axis.set_ylim(len(names) - 0.42, -0.58)
-    axis.margins(x=0.18)
-    axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.get_xlim()[0] < -2.0 else 0.0)
+    axis.margins(x=0.25)
+    axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.dataLim.x0 < -1.0 else 0.0)
 
 
-def allocation_figure(study: Study, table: Table) -> Figure:
-    """Bars for each source: its tolerance, given and allocated, and its cost."""
-    section = study.reliability
+def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:
+    """Bars for each source, its tolerance, given and allocated, and its cost; below, how often either fails."""
+    section, table = study.reliability, tables["allocation"]
     assert section is not None
     assert section.allocate is not None
     total = [float(np.nansum(table[name])) for name in ("cost_given", "cost_allocated")]
@@ -136,9 +137,9 @@ def allocation_figure(study: Study, table: Table) -> Figure:
     table = table.take(np.arange(len(table))[:MAX_TOLERANCES])
     names = [f"{row['source']}" + f" ({row['kind']})" * (row["kind"] != "tolerance") for row in table]
     units = table["unit"].tolist()
-    margin = 0.35 + 0.075 * max(len(name) for name in names)
+    margin = 0.35 + 0.075 * max(10, *(len(name) for name in names))
     figure, (one, two) = style.page(
-        2, 2, _TOLERANCE_HEIGHT * len(table), left=margin, right=0.2, top=0.8, bottom=1.05,
+        2, 2, _TOLERANCE_HEIGHT * len(table), left=margin, right=0.2, top=0.8, bottom=_FAILURE_ROOM + 1.05,
         across=0.45 * (style.WIDTH - margin - 0.2) / 2.45, sharey=True,
     )  # fmt: skip
     alike, given, allocated = len(set(units)) == 1, table["given"], table["allocated"]
@@ -158,9 +159,42 @@ def allocation_figure(study: Study, table: Table) -> Figure:
         axis.grid(visible=False, axis="y")
         axis.margins(x=0.16, y=0.02)
         axis.locator_params(axis="x", nbins=5)
+    height = figure.get_figheight()
+    below = figure.add_axes(
+        (margin / style.WIDTH, 1.0 / height, 1 - (margin + 0.2) / style.WIDTH, _FAILURE_HEIGHT / height)
+    )
+    _failures(below, tables, 1.0 - section.allocate.reliability)
     title(figure, f"Cheapest tolerances for a reliability of {section.allocate.reliability:.10g}", note, left=margin)
-    legend_below(figure, *one.get_legend_handles_labels())
+    handles, labels = (
+        [*first, *second] for first, second in zip(
+            one.get_legend_handles_labels(), below.get_legend_handles_labels(), strict=True)
+    )  # fmt: skip
+    legend_below(figure, handles, labels)
     return figure
+
+
+def _failures(axis: Axes, tables: Mapping[str, Table], allowed: float) -> None:
+    """How often made mechanisms fail at the worst pose with the tolerances given and allocated, and what is allowed."""
+    before, after = tables["reliability"], tables["confirmation"]
+    before = before.take(before.where(scope="pose", method=best_probability(before)))
+    sides = [
+        [before[name] for name in ("failure", "failure_low", "failure_high")],
+        [1.0 - after[name] for name in ("simulated", "high", "low")],
+    ]
+    for place, (side, color) in enumerate(zip(sides, (style.FAINT, style.BLUE), strict=True)):
+        worst = int(np.argmax(np.nan_to_num(side[0])))
+        value, low, high = (float(part[worst]) for part in side)
+        axis.errorbar(value, place, xerr=[[value - low], [high - value]], fmt="o", color=color, capsize=3)
+        axis.annotate(f"{number(value)}", (value, place), xytext=(0, 7), textcoords="offset points", ha="center",
+                      fontsize=8)  # fmt: skip
+    axis.axvline(allowed, color=style.VERMILION, linestyle=(0, (5, 2)), label=f"allowed: {number(allowed)}")
+    axis.set_xscale("log")
+    axis.margins(x=0.1)
+    axis.set_ylim(1.6, -0.9)
+    axis.set_yticks([0, 1], ["as given", "allocated"])
+    axis.grid(visible=False, axis="y")
+    axis.tick_params(axis="y", length=0)
+    axis.set_xlabel("probability that an error leaves its limits, at the pose that fails most")
 
 
 def _pair(axis: Axes, given: Floats, allocated: Floats) -> None:

@@ -8,11 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.reliability.first_order import ORDERS
-from mechdesign.numerics.arrays import Floats
+from mechdesign.analyses.reliability.tables import Samples
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
+from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS, Method
 from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
 
@@ -25,13 +28,33 @@ def look(name: str) -> Method:
 
 
 class Sampled(NamedTuple):
-    """What the pictures of samples show: the tables of a method at a pose, its row among the poses and its words."""
+    """What the pictures of samples show: the tables of a method, and its samples at one of the poses."""
 
     study: Study
     tables: Mapping[str, Table]
     method: str
-    pose: int
-    where: str
+    samples: Samples
+    poses: Poses
+
+    @property
+    def where(self) -> str:
+        """The pose in words, and among several why it is shown."""
+        limited = self.samples.bands or self.samples.discs
+        in_words = worst_in_words if limited else pose_in_words
+        return f"at {in_words(self.study, self.poses, self.samples.pose)}"
+
+    def rows(self, table: str) -> Flags:
+        """Rows of a table that are about this pose."""
+        found = np.ones(len(self.tables[table]), dtype=bool)
+        for name, values in self.poses.values.items():
+            column, value = self.tables[table][name], values[self.samples.pose]
+            found &= (column == value) | (np.isnan(column) & np.isnan(value))
+        return found
+
+
+def worst_in_words(study: Study, poses: Poses, pose: int) -> str:
+    """The pose that fails most, in words."""
+    return "the pose that fails most, " * (poses.count > 1) + pose_in_words(study, poses, pose)
 
 
 def methods(table: Table) -> list[str]:

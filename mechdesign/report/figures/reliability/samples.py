@@ -1,100 +1,147 @@
-"""Pictures of samples at the first pose: histograms, densities of two errors [S2], mean and failure as they settle."""
+"""Pictures of samples at the pose that fails most: histograms, and how mean and failure settle."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
-from mechdesign.analyses.reliability.simulation import CELLS
+from mechdesign.analyses.reliability.tables import Samples
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import MAX_PANELS, clear_of_ticks, legend_below, number, stack, title
 from mechdesign.report.figures.reliability.looks import (
-    SUFFIXES,
     Sampled,
     apart,
     channels,
-    error_limits,
     heading,
     look,
     methods,
 )
-from mechdesign.results import Table
 
-# A limit farther out than this, in widths of the histogram or of the density, is named and not drawn.
+# A limit farther out than this, in widths of the histogram, is named and not drawn.
 _FAR_FROM_HISTOGRAM = 0.6
-_FAR_FROM_DENSITY = 0.8
+# Bins of a distance.
+_BINS = 60
 # More samples than these have a logarithmic axis, as have probabilities whose ratio is larger than this.
 _MAX_LINEAR_SAMPLES = 400_000
 _MAX_LINEAR_RATIO = 50.0
 _DASHED = (0, (5, 2))
-_LEFT = 0.88  # inches
-_LEVELS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8)  # of the peak of a density
-Bands = tuple[tuple[float, float], tuple[float, float]]
+
+
+class _Histogram(NamedTuple):
+    """One panel: bins of all samples and of those that fail, a normal density, and limits."""
+
+    name: str
+    unit: str
+    edges: Floats
+    counts: Floats
+    failed: Floats
+    normal: Floats | None
+    limits: tuple[float, float]
 
 
 def histogram_figure(given: Sampled) -> Figure:
-    """Each output's error, the normal density with its mean and deviation, and the limits."""
-    table = given.tables["histogram"]
-    shown = channels(table)[:MAX_PANELS]
-    columns = 1 if len(shown) == 1 else 2
-    lines = -(-len(shown) // columns)
+    """Each error, the distance from no error where a circle limits it, the limits, and below each its tail."""
+    shown = _histograms(given)
+    columns = min(len(shown), 2 if len(shown) == 4 else 3)
+    blocks = [shown[k : k + columns] for k in range(0, len(shown), columns)]
     figure, grid = style.page(
-        len(shown), columns, 2.6 if lines == 1 else 1.9, left=0.75, right=0.15, top=0.95, bottom=0.95, across=0.75,
-        down=0.85,
+        2 * columns * len(blocks), columns, 1.75, left=0.8, right=0.15, top=0.95, bottom=0.95, across=0.75, down=0.5,
     )  # fmt: skip
     entries: dict[str, Any] = {}
-    samples = 0
-    for axis, (output, order, unit) in zip(grid, shown, strict=True):
-        rows = table.where(output=output, order=order, unit=unit)
-        samples = max(samples, int(table["count"][rows].sum()))
-        _histogram(axis, table, rows, entries)
-        _limits(given, axis, output, order, unit, entries)
-        axis.set_title(heading(output, order), loc="left", fontsize=9.5)
-        axis.set_xlabel(style.axis_label("error", unit))
-        axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}"))
-        axis.locator_params(axis="x", nbins=6)
-        axis.locator_params(axis="y", nbins=5)
-    note = f"at {given.where}; {look(given.method).words}, {samples:,} samples"
-    title(figure, "Errors of made mechanisms", note, left=0.75)
+    for place, block in enumerate(blocks):
+        for column in range(columns):
+            pair = [grid[(2 * place + line) * columns + column] for line in (0, 1)]
+            if column >= len(block):
+                for axis in pair:
+                    axis.remove()
+                continue
+            for axis, logarithmic in zip(pair, (False, True), strict=True):
+                _histogram(axis, block[column], entries, logarithmic=logarithmic)
+            pair[0].set_title(block[column].name, loc="left", fontsize=9.5)
+            pair[1].set_xlabel(style.axis_label("error", block[column].unit))
+    kept, samples = given.samples.kept, given.samples.errors.shape[1]
+    note = f"{look(given.method).words}, {samples:,} samples"
+    note += f", {int((~kept).sum()):,} of them fail" if given.samples.bands or given.samples.discs else ""
+    title(
+        figure, f"Errors of made mechanisms {given.where}", f"{note}; below: the same on a logarithmic axis", left=0.8
+    )
     legend_below(figure, list(entries.values()), list(entries))
     return figure
 
 
-def _histogram(axis: Axes, table: Table, rows: np.ndarray, entries: dict[str, Any]) -> None:
-    low, high, density, normal = (table[name][rows] for name in ("low", "high", "density", "normal"))
-    bars = axis.bar(low, density, high - low, align="edge", color=style.SKY, edgecolor="white", linewidth=0.3)
-    (fit,) = axis.plot((low + high) / 2, normal, color=style.BLUE, linewidth=1.8)
-    axis.set_xlim(low[0], high[-1])
-    axis.set_ylim(0.0, 1.08 * max(density.max(), normal.max()))
-    entries |= {"made mechanisms": bars, "normal, same mean and deviation": fit}
+def _histograms(given: Sampled) -> list[_Histogram]:
+    """Distances that a circle limits, then the errors that vary."""
+    samples, table = given.samples, given.tables["histogram"]
+    found = []
+    for x, y, radius in samples.discs:
+        distance = np.hypot(samples.errors[x], samples.errors[y])
+        edges = np.linspace(distance.min(), distance.max(), _BINS + 1)
+        name = f"{samples.outputs[x].rpartition('.')[0]}: distance from no error"
+        found.append(_counted(samples, name, x, distance, edges, None, (-np.inf, radius)))
+    bands = {channel: (low, high) for channel, low, high in samples.bands}
+    for k, (output, order) in enumerate(zip(samples.outputs.tolist(), samples.orders.tolist(), strict=True)):
+        rows = table.where(output=output, order=order)
+        if rows.any():
+            edges, ends = np.append(table["low"][rows], table["high"][rows][-1]), bands.get(k, (-np.inf, np.inf))
+            name, normal = heading(output, order), table["normal"][rows]
+            found.append(_counted(samples, name, k, samples.errors[k], edges, normal, ends))
+    return found[:MAX_PANELS]
 
 
-def _limits(given: Sampled, axis: Axes, output: str, order: str, unit: str, entries: dict[str, Any]) -> None:
-    low, high = axis.get_xlim()
-    span = high - low
-    reach = _FAR_FROM_HISTOGRAM * span
-    near, far = apart(_at_pose(given, output, order), low - reach, high + reach)
-    for limit in near:
-        entries["limit of the error"] = axis.axvline(limit, color=style.VERMILION, linestyle=_DASHED)
-    ends = [low, high, *(limit + side for limit in near for side in (-0.03 * span, 0.03 * span))]
-    axis.set_xlim(min(ends), max(ends))
-    if far:
-        axis.set_ylim(0.0, 1.15 * axis.get_ylim()[1])
+def _counted(
+    samples: Samples, name: str, channel: int, values: Floats, edges: Floats, normal: Floats | None,
+    limits: tuple[float, float],
+) -> _Histogram:  # fmt: skip
+    counts, failed = (np.histogram(part, edges)[0] for part in (values, values[~samples.kept]))
+    return _Histogram(name, str(samples.units[channel]), edges, counts, failed, normal, limits)
+
+
+def _histogram(axis: Axes, shown: _Histogram, entries: dict[str, Any], *, logarithmic: bool) -> None:
+    edges, unit = shown.edges, shown.unit
+    width, middle = np.diff(edges), (edges[1:] + edges[:-1]) / 2
+    one = 1.0 / (shown.counts.sum() * width[0])  # density of a single sample
+    for words, counts, color in (
+        ("made mechanisms", shown.counts, style.SKY), ("of these those that fail", shown.failed, style.VERMILION),
+    ):  # fmt: skip
+        if counts.any():
+            entries[words] = axis.bar(edges[:-1], one * counts, width, align="edge", color=color, edgecolor="white",
+                                      linewidth=0.3)  # fmt: skip
+    top = one * shown.counts.max()
+    if shown.normal is not None:
+        (entries["normal, same mean and deviation"],) = axis.plot(middle, shown.normal, color=style.BLUE, linewidth=1.8)
+        top = max(top, shown.normal.max())
+    axis.set_xlim(edges[0], edges[-1])
+    far = _limits(axis, shown.limits, entries)
+    if logarithmic:
+        axis.set_yscale("log")
+        axis.set_ylim(0.5 * one, 3.0 * top)
+    else:
+        axis.set_ylim(0.0, (1.25 if far else 1.08) * top)
+        axis.locator_params(axis="y", nbins=5)
+        axis.tick_params(labelbottom=False)
+    if far and not logarithmic:
         told = ", ".join(f"{limit:+g}" for limit in far)
         axis.text(0.99, 0.98, f"limit {told} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
                   fontsize=8, color=style.VERMILION)  # fmt: skip
+    axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}" if unit else ""))
+    axis.locator_params(axis="x", nbins=4)
 
 
-def _at_pose(given: Sampled, output: str, order: str) -> tuple[float, float]:
-    """Lowest and highest error allowed at the pose."""
-    ends = error_limits(given.study, given.tables, output, order)
-    low, high = ends[:, given.pose if ends.shape[1] > 1 else 0].tolist()
-    return low, high
+def _limits(axis: Axes, limits: tuple[float, float], entries: dict[str, Any]) -> list[float]:
+    """Draw limits that are near and shade what lies beyond them; returns those that are too far to be drawn."""
+    low, high = axis.get_xlim()
+    span = high - low
+    near, far = apart(limits, low - _FAR_FROM_HISTOGRAM * span, high + _FAR_FROM_HISTOGRAM * span)
+    ends = [low, high, *(limit + side for limit in near for side in (-0.08 * span, 0.08 * span))]
+    axis.set_xlim(min(ends), max(ends))
+    for limit in near:
+        entries["limit of the error"] = axis.axvline(limit, color=style.VERMILION, linestyle=_DASHED)
+        axis.axvspan(limit, max(ends) if limit == limits[1] else min(ends), color=style.VERMILION, alpha=0.1, zorder=0)
+    return far
 
 
 def convergence_figure(given: Sampled) -> Figure:
@@ -106,7 +153,9 @@ def convergence_figure(given: Sampled) -> Figure:
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
         rows = table.where(output=output, order=order, unit=unit)
         samples, mean = table["samples"][rows], table["mean"][rows]
-        row = np.flatnonzero(moments.where(output=output, order=order, unit=unit, method=given.method))[given.pose]
+        row = np.flatnonzero(moments.where(output=output, order=order, unit=unit, method=given.method))[
+            given.samples.pose
+        ]
         band = 3.0 * moments["sigma"][row] / np.sqrt(samples)
         final = moments["mean"][row]
         axis.fill_between(samples, final - band, final + band, color=style.SKY, alpha=0.3, linewidth=0,
@@ -132,7 +181,7 @@ def trend_figure(given: Sampled) -> Figure:
     ends = [low[late:].min(), value[-1], high[late:].max()]
     lines: list[tuple[float, dict[str, Any]]] = []
     for method in known:
-        row = np.flatnonzero(reliability.where(method=method, scope="pose"))[given.pose]
+        row = np.flatnonzero(reliability.where(method=method, scope="pose"))[given.samples.pose]
         failure = float(reliability["failure"][row])
         if np.isfinite(failure):
             drawn, used = look(method), str(reliability["used"][row])
@@ -167,115 +216,3 @@ def _sample_axis(axis: Axes, samples: np.ndarray) -> None:
     else:
         axis.xaxis.set_major_formatter("{x:,.0f}")
         axis.set_xlim(0, 1.01 * samples.max())
-
-
-def density_figures(given: Sampled) -> dict[str, Figure]:
-    """Contours and surfaces of the first pose of a density table; the axes are the errors, in their units."""
-    study, table = given.study, given.tables["density"]
-    known = {
-        f"{output}{SUFFIXES[order]}_error": (output, order) for output, order, _ in channels(given.tables["moments"])
-    }
-    columns = [column for column in table.columns if column.name in known]
-    shown = [known[column.name] for column in columns]
-    table = table.take(np.arange(CELLS**2))
-    x, y = (table[column.name].reshape(CELLS, CELLS) for column in columns)
-    labels = [
-        style.axis_label(f"{output} {order} error".replace("position ", ""), column.unit)
-        for (output, order), column in zip(shown, columns, strict=True)
-    ]
-    densities = {
-        "bivariate normal, first order": table["normal"].reshape(CELLS, CELLS),
-        f"simulation ({look(given.method).words})": table["simulated"].reshape(CELLS, CELLS),
-    }
-    (output, order), section = shown[0], study.reliability
-    assert section is not None
-    circle = section.limits.get(f"{output.rpartition('.')[0]}{SUFFIXES[order]}")
-    bands = _at_pose(given, *shown[0]), _at_pose(given, *shown[1])
-    return {
-        "density_contours": _contours(x, y, densities, labels, given.where, bands, circle.radius if circle else None),
-        "density": _surfaces(x, y, densities, labels, given.where),
-    }
-
-
-def _contours(
-    x: Floats, y: Floats, densities: dict[str, Floats], labels: list[str], pose: str, bands: Bands,
-    radius: float | None,
-) -> Figure:  # fmt: skip
-    """Lines of equal density, with the limits: the radius of a circle, or a band for each error."""
-    figure = style.new_figure(4.7, layout=None)
-    figure.subplots_adjust(left=_LEFT / style.WIDTH, right=0.98, bottom=0.11, top=0.82, wspace=0.1)
-    peak = next(iter(densities.values())).max()
-    levels = [level * peak for level in _LEVELS]
-    # The same unit and about the same spread: a picture true to scale.
-    alike = labels[0].rpartition("[")[2] == labels[1].rpartition("[")[2] and 0.4 < np.ptp(x) / np.ptp(y) < 2.5
-    view = (_view(x, bands[0]), _view(y, bands[1]))
-    panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    for axes, (name, density) in zip(panels, densities.items(), strict=True):
-        axes.contourf(x, y, density, levels=[*levels, peak * 1.5], cmap=style.COLORMAP, alpha=0.35)
-        axes.contour(x, y, density, levels=levels, cmap=style.COLORMAP, linewidths=1.2)
-        _draw_limits(axes, bands, radius, view)
-        axes.set(title=name, xlabel=labels[0], xlim=view[0], ylim=view[1])
-        axes.locator_params(nbins=6)
-        if alike:
-            axes.set_aspect("equal")
-    panels[0].set_ylabel(labels[1])
-    note = f"lines at {', '.join(f'{level:g}' for level in _LEVELS)} of the normal density's peak"
-    title(figure, f"Density of two errors at {pose}", note + _limits_in_words(bands, radius, view), left=_LEFT)
-    return figure
-
-
-def _view(values: Floats, band: tuple[float, float]) -> tuple[float, float]:
-    """What is shown of an axis: all that has a density, and limits that are not too far."""
-    low, high = float(values.min()), float(values.max())
-    span = high - low
-    ends = [low, high, *apart(band, low - _FAR_FROM_DENSITY * span, high + _FAR_FROM_DENSITY * span)[0]]
-    return min(ends) - 0.05 * span, max(ends) + 0.05 * span
-
-
-def _limits_in_words(bands: Bands, radius: float | None, view: Bands) -> str:
-    """Whether limits are seen: all of them, some, or none."""
-    if radius is not None:
-        corners = np.abs(np.add.outer(np.array(view[0]), 1j * np.array(view[1])))
-        nearest = abs(complex(*(max(low, -high, 0.0) for low, high in view)))
-        seen = [bool(nearest < radius < corners.max())]
-    else:
-        seen = [low < end < high for band, (low, high) in zip(bands, view, strict=True)
-                for end in band if np.isfinite(end)]  # fmt: skip
-    if not seen:
-        return ""
-    return "; dashed: limits" + ", others lie outside" * (not all(seen)) if any(seen) else "; limits lie outside"
-
-
-def _draw_limits(axes: Axes, bands: Bands, radius: float | None, view: Bands) -> None:
-    look: dict[str, Any] = {"color": style.VERMILION, "linestyle": "--", "linewidth": 1.6}
-    if radius is not None:
-        axes.add_patch(Circle((0.0, 0.0), radius, fill=False, **look))
-        return
-    across, up = bands
-    # An open side has no line, and the others run on to the edge.
-    for end in across:
-        if np.isfinite(end):
-            axes.plot([end, end], np.clip(up, *view[1]), **look)
-    for end in up:
-        if np.isfinite(end):
-            axes.plot(np.clip(across, *view[0]), [end, end], **look)
-
-
-def _surfaces(x: Floats, y: Floats, densities: dict[str, Floats], labels: list[str], pose: str) -> Figure:
-    figure = style.new_figure(4.2, layout=None)
-    figure.subplots_adjust(left=0.0, right=0.93, bottom=0.08, top=0.86, wspace=0.12)
-    top = max(density.max() for density in densities.values())
-    panels = figure.subplots(1, 2, subplot_kw={"projection": "3d"})
-    for axes, (name, density) in zip(panels, densities.items(), strict=True):
-        axes.plot_surface(
-            x, y, density, rstride=1, cstride=1, cmap=style.COLORMAP, edgecolor=style.INK, linewidth=0.25, vmax=top
-        )
-        axes.set(title=name, zlim=(0, top))
-        axes.set_xlabel(labels[0], labelpad=6)
-        axes.set_ylabel(labels[1], labelpad=6)
-        axes.set_zlabel("density (standardised)", labelpad=4)
-        axes.tick_params(labelsize=7)
-        axes.locator_params(nbins=5)
-        axes.view_init(elev=28, azim=-60)
-    title(figure, f"Density of two errors at {pose}", left=_LEFT)
-    return figure

@@ -1,0 +1,225 @@
+"""A design that an optimisation chose: its mechanism, what was wanted of it, what it reaches, and the error."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mechdesign.mechanism import Mechanism
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
+from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
+from mechdesign.report.figures.kinematics import draw_paths, paths_figure
+from mechdesign.report.figures.panels import MAX_PANELS, abscissa, legend_below, tick_abscissa
+from mechdesign.report.figures.scene import Sweep
+from mechdesign.results import Result, Table
+from mechdesign.study import Study
+
+# Inches.
+_HEIGHT = 5.0
+_TITLE = 0.42
+_TITLE_LINE = 0.18
+_PANEL = 1.25
+_PANEL_GAP = 0.42
+_BELOW = 0.55
+_LEGEND = 0.35
+_BESIDE = 0.12
+_MAX_BESIDE = 4.0
+_SMALL_SYMBOLS = 0.7
+_LETTERS_AN_INCH = 13.5
+_CURVE_POSES = 240  # of the motion between listed poses
+# Of more poses the values are joined by a line.
+_MAX_DOTS = 15
+# Of places, by whether there are few.
+_LOOKS: dict[tuple[str, bool], dict[str, Any]] = {
+    ("wanted", True): {"linestyle": "none", "marker": "x", "markersize": 6, "markeredgewidth": 1.5, "zorder": 4.6},
+    ("reached", True): {"linestyle": "none", "marker": "o", "markersize": 2.6, "zorder": 4.5},
+    ("wanted", False): {"linestyle": (0, (5, 2)), "linewidth": 3.0, "zorder": 3.7, "snap": False},
+    ("reached", False): {"linewidth": 0.9, "zorder": 3.8, "snap": False},
+}
+
+
+class Reached(NamedTuple):
+    """An output with a target over the poses: what it is, and by how much it misses."""
+
+    output: str
+    unit: str
+    values: Floats | None
+    error: Floats
+
+    @property
+    def worst(self) -> float:
+        """The largest error."""
+        return float(np.nanmax(np.abs(self.error)))
+
+
+def reached(table: Table) -> list[Reached]:
+    """Outputs with targets of a table of motion; a path's error as the distance from it, if as nothing else."""
+    found = []
+    for column in table.columns:
+        output = column.name.removesuffix("_error")
+        if output != column.name and np.isfinite(column.values).any():
+            known = output in table
+            found.append(Reached(output, column.unit, table[output] if known else None, column.values))
+    return [each for each in found if each.values is not None] or found
+
+
+def design_figure(study: Study, own: Result, words: str) -> Figure:
+    """The mechanism along its motion or at its listed poses, the places wanted; below, curves wanted and reached."""
+    sweep = Sweep.of(own.drawn["motion"])
+    shown = reached(own.tables["motion"]) if "motion" in own.tables else []
+    title = textwrap.fill(words, int((style.WIDTH - LEFT) * _LETTERS_AN_INCH))
+    above = _TITLE + _TITLE_LINE * title.count("\n")
+    if sweep.poses.motion:
+        figure = paths_figure(sweep, above=above)
+    else:
+        worst = _worst(shown, sweep.valid)
+        title += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
+        title = textwrap.fill(title.replace("\n", " "), int((style.WIDTH - LEFT) * _LETTERS_AN_INCH))
+        above = _TITLE + _TITLE_LINE * title.count("\n")
+        figure = _posed(sweep, worst, _wanted(own, shown), above)
+    axes = figure.axes[0]
+    axes.set_title(title, loc="left", fontsize=10.5)
+    _draw_wanted(axes, own, shown)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none").set_zorder(6)
+    if shown:
+        _panels(figure, study, own, shown[: MAX_PANELS // 2])
+    return figure
+
+
+def designs_figure(parts: Sequence[tuple[str, Study, Result]]) -> Figure:
+    """Some designs side by side on one scale, each with its motion, under its words."""
+    sweeps = [Sweep.of(own.drawn["motion"]) for _, _, own in parts]
+    places = np.concatenate([sweep.extent for sweep in sweeps])
+    count = len(parts)
+    window = fit(places, (style.WIDTH - LEFT - RIGHT - _BESIDE * (count - 1)) / count, _MAX_BESIDE, 0.25)
+    titles = [
+        "\n".join(textwrap.fill(line, int(window.width * _LETTERS_AN_INCH)) for line in words.splitlines())
+        for words, _, _ in parts
+    ]
+    above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
+    figure, grid = windows(window, sweeps[0].study.units.label("length"), count, count, gap=_BESIDE, above=above,
+                           below=_BELOW + _LEGEND)  # fmt: skip
+    for axes, title, sweep, (_, _, own) in zip(grid, titles, sweeps, parts, strict=True):
+        axes.set_title(title, loc="left", fontsize=8.5)
+        axes.locator_params(nbins=5)
+        if sweep.poses.motion:
+            draw_paths(axes, sweep, width=0.8)
+        shown = reached(own.tables["motion"]) if "motion" in own.tables else []
+        _draw_wanted(axes, own, shown)
+        draw_mechanism(
+            axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=False, drives=False,
+            travel=sweep.travel, size=_SMALL_SYMBOLS,
+        )  # fmt: skip
+    handles, labels = grid[0].get_legend_handles_labels()
+    legend_below(figure, handles, labels)
+    return figure
+
+
+def _worst(shown: Sequence[Reached], valid: Ints) -> int:
+    """The valid pose with the largest error, in deviations of each output's own; the first without targets."""
+    if not shown:
+        return int(valid[0])
+    far = np.nanmax([np.abs(each.error) / (each.worst or 1.0) for each in shown], axis=0)
+    return int(valid[np.nanargmax(np.nan_to_num(far[valid], nan=-1.0))])
+
+
+def _wanted(own: Result, shown: Sequence[Reached]) -> dict[str, Complexes]:
+    """Places where points should be at the poses, by point: what they reach less the error."""
+    table, errors = own.tables.get("motion"), {each.output: each.error for each in shown}
+    found: dict[str, Complexes] = {}
+    for point in dict.fromkeys(output.removesuffix(f".{axis}") for output in errors for axis in "xy"):
+        names = [f"{point}.{axis}" for axis in "xy"]
+        if table is not None and all(name in table for name in names) and any(name in errors for name in names):
+            x, y = (table[name] - errors.get(name, 0.0) for name in names)
+            found[point] = x + 1j * y
+    return found
+
+
+def _draw_wanted(axes: Axes, own: Result, shown: Sequence[Reached]) -> None:
+    """Where points should be and where they are: crosses and dots at a few poses, lines along many."""
+    for point, wanted in _wanted(own, shown).items():
+        x, y = (own.tables["motion"][f"{point}.{axis}"] for axis in "xy")
+        few = len(wanted) <= _MAX_DOTS
+        axes.plot(wanted.real, wanted.imag, color=style.VERMILION, label=f"{point} wanted", **_LOOKS["wanted", few])
+        axes.plot(x, y, color=style.INK, label=f"{point} reached", **_LOOKS["reached", few])
+
+
+def _posed(sweep: Sweep, index: int, wanted: dict[str, Complexes], above: float) -> Figure:
+    """The mechanism in one of its listed poses, pale in the others, and the curves of its points between them."""
+    between = _between(sweep)
+    curves = {point: between[point] for point in wanted if point in between}
+    places = np.concatenate([sweep.extent, *wanted.values(), *curves.values()])
+    figure, axes = framed(places, sweep.study.units.label("length"), height=_HEIGHT, above=above)
+    for other in sweep.valid:
+        if other != index:
+            draw_ghost(axes, sweep.mechanism, sweep.configuration, int(other))
+    for point, curve in curves.items():
+        axes.plot(curve.real, curve.imag, color=style.BLUE, linewidth=1.6, zorder=2.8, label=f"path of {point}")
+    draw_mechanism(axes, sweep.mechanism, sweep.configuration, index, travel=sweep.travel)
+    return figure
+
+
+def _between(sweep: Sweep) -> dict[str, Complexes]:
+    """Paths of the points while a single drive runs through its listed values; none where it does not meet them."""
+    mechanism: Mechanism = sweep.mechanism
+    if len(mechanism.drives) != 1 or len(sweep.valid) < 2:
+        return {}
+    drive = mechanism.coordinate(*mechanism.drives)
+    values = np.asarray(sweep.configuration.value(drive))[sweep.valid]
+    moved = mechanism.forward.solve([np.linspace(values.min(), values.max(), _CURVE_POSES)], limits=False)
+    at = mechanism.forward.solve([values], limits=False)
+    found = {}
+    for point, path in sweep.places.items():
+        same = np.abs(np.asarray(at.point(point)) - path[sweep.valid]) <= 1e-6 * mechanism.size
+        if same.all():
+            found[point] = np.where(moved.valid, moved.point(point), complex(np.nan, np.nan))
+    return found
+
+
+def _panels(figure: Figure, study: Study, own: Result, shown: Sequence[Reached]) -> None:
+    """Below the drawing: scalar outputs as wanted and reached, and the error of every output, over the poses."""
+    over = abscissa(study, own.drawn["poses"])
+    rows = [(each, part) for each in shown for part in ("curve", "error")
+            if part == "error" or (each.values is not None and each.output[-2:] not in (".x", ".y"))]  # fmt: skip
+    room = len(rows) * (_PANEL + _PANEL_GAP) + _BELOW
+    before = figure.get_figheight()
+    height = before + room
+    boxes = [axes.get_position() for axes in figure.axes]
+    figure.set_figheight(height)
+    for axes, box in zip(figure.axes, boxes, strict=True):
+        axes.set_position((box.x0, (box.y0 * before + room) / height, box.width, box.height * before / height))
+    left, wide = LEFT / style.WIDTH, 1 - (LEFT + RIGHT) / style.WIDTH
+    look: dict[str, Any] = {"marker": "o", "markersize": 4.0} if len(over.values) <= _MAX_DOTS else {}
+    for k, (each, part) in enumerate(rows):
+        low = _BELOW + (len(rows) - 1 - k) * (_PANEL + _PANEL_GAP)
+        axes = figure.add_axes((left, low / height, wide, _PANEL / height))
+        if part == "curve" and each.values is not None:
+            axes.plot(over.values, each.values - each.error, color=style.VERMILION, linestyle=(0, (5, 2)),
+                      linewidth=2.4, label="wanted")  # fmt: skip
+            axes.plot(over.values, each.values, color=style.BLUE, linewidth=1.2, label="reached", **look)
+            axes.legend(loc="best", ncols=2)
+            axes.set_title(each.output, loc="left", fontsize=9.5)
+            axes.set_ylabel(style.axis_label("value", each.unit))
+        else:
+            axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
+            axes.plot(over.values, each.error, color=style.BLUE, **look)
+            unit = f" {each.unit}".rstrip()
+            axes.set_title(f"{each.output}: reached less wanted, at most {each.worst:.3g}{unit}", loc="left",
+                           fontsize=9.5)  # fmt: skip
+            axes.set_ylabel(style.axis_label("error", each.unit))
+            axes.ticklabel_format(axis="y", scilimits=(-3, 4))
+        axes.locator_params(axis="y", nbins=5)
+        tick_abscissa(axes, over)
+        axes.margins(x=0.02)
+        if k == len(rows) - 1:
+            axes.set_xlabel(over.label)
+        else:
+            axes.tick_params(labelbottom=False)

@@ -1,0 +1,60 @@
+"""What is wrong with the layout of a figure: text over text or off the page, places on unequal axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+# Texts may share so many pixels: letters seldom fill their box to its corners.
+SHARED = 2.0
+# Of a letter's height: the part of a box that letters without strokes above and below leave free.
+LOOSE = 0.15
+
+
+def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float]]:
+    """Every text that is drawn, its box in pixels and its angle; a turned text's box is that of its ends."""
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    # Tick labels beyond the limits of their axis are there, but not drawn.
+    hidden: set[Text] = set()
+    for axis in (axis for axes in figure.axes for axis in axes._axis_map.values()):
+        seen = set(axis._update_ticks()) if axis.axes.get_visible() else set()
+        ticks = (*axis.get_major_ticks(), *axis.get_minor_ticks())
+        hidden.update(label for tick in ticks if tick not in seen for label in (tick.label1, tick.label2))
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        if text in hidden or not text.get_visible() or not text.get_text().strip():
+            continue
+        box = text.get_window_extent(renderer)
+        if np.isfinite(box.extents).all():
+            spare = LOOSE * min(box.width, box.height)
+            box = Bbox.from_extents(box.x0, box.y0 + spare, box.x1, box.y1 - spare)
+            yield text.get_text(), box, text.get_rotation()
+
+
+def faults(figure: Figure) -> Iterator[str]:
+    """What is wrong with a figure that has been drawn, in words."""
+    found = list(texts(figure))
+    page = figure.bbox
+    for words, box, _ in found:
+        if box.x0 < -SHARED or box.y0 < -SHARED or box.x1 > page.width + SHARED or box.y1 > page.height + SHARED:
+            yield f"{words!r} leaves the page"
+    for (one, a, turn), (other, b, also) in combinations(found, 2):
+        across, down = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
+        if across > SHARED and down > SHARED and turn % 90 == 0 and also % 90 == 0:
+            yield f"{one!r} over {other!r}"
+    for axes in figure.axes:
+        labels = axes.get_xlabel(), axes.get_ylabel()
+        if _place(labels) and axes.get_aspect() != 1.0:
+            yield f"unequal axes of a place: {' and '.join(labels)}"
+
+
+def _place(labels: tuple[str, str]) -> bool:
+    """Whether two labels are those of a point's coordinates."""
+    (one, _, unit), (other, _, also) = (label.partition(" [") for label in labels)
+    x, y = (name == letter or name.endswith(f".{letter}") for name, letter in ((one, "x"), (other, "y")))
+    return x and y and unit == also and one[:-1] == other[:-1]
