@@ -91,12 +91,27 @@ class Study:
         """Files that the study reads: the keys of their names, the file, and what it holds."""
         folder = self.path.parent if self.path is not None else pathlib.Path()
         for keys, value in leaves(self.resolved):
-            if isinstance(value, str) and ("path" in keys[:-1] or "targets" in keys[:-1]):
+            if isinstance(value, str) and ({"path", "targets"}.intersection(keys[:-1]) or keys[-1] == "measured"):
                 try:
                     content = (folder / value).read_text(encoding="utf-8-sig")
                 except (OSError, ValueError):
                     continue
                 yield keys, folder / value, content
+
+    def unit_of(self, name: str) -> str | None:
+        """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
+
+        That of a parameter is known where numbers of the geometry, all of one quantity, change as much as it does.
+        """
+        parameters, places = self.parameters, self.mechanism.description.places
+        if name in places:
+            return self.units.label(places[name].quantity)
+        if name not in parameters.nominal:
+            return self.units.label(self.mechanism.quantity(name)) if name in self.mechanism.drives else None
+        slopes = parameters.derivatives(name).items()
+        alike = [places[place].quantity for place, slope in slopes if abs(slope) == parameters.factors[place]]
+        found = set(alike) - {"none"}
+        return self.units.label(*found) if len(found) == 1 else None
 
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text."""
@@ -227,7 +242,7 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(formulas)
-    parts = _checked(Checker(builder, parameters, parts), folder)
+    parts = _checked(Checker(builder, parameters, parts, folder))
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     assert mechanism is not None
@@ -319,13 +334,13 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
     return parts
 
 
-def _checked(checker: Checker, folder: pathlib.Path) -> dict[str, Any]:
+def _checked(checker: Checker) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
     found = dict(checker.parts)
     found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
-    found["targets"] = targets.check(checker, checker.mechanism.targets, folder)
+    found["targets"] = targets.check(checker, checker.mechanism.targets)
     return found
 
 

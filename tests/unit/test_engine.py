@@ -150,6 +150,8 @@ def test_everything_fails(dead: float) -> None:
 
 def test_form_does_not_know_what_breaks_a_limit_without_a_design_point() -> None:
     assert np.isnan(tangents(Problem(3, lambda u: np.full((1, u.shape[1]), -1.0))))
+    # Nor where another limit has one.
+    assert np.isnan(tangents(Problem(3, lambda u: np.stack([3.0 - u[0], np.full(u.shape[1], -1.0)]))))
 
 
 def test_a_band_without_width_is_always_left() -> None:

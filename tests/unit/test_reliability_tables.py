@@ -102,7 +102,7 @@ def test_no_estimate_without_limits_and_no_histogram_without_samples() -> None:
     assert "estimate" not in ask("reliability.limits={}").tables
     assert "histogram" in ask("reliability.limits={}").tables
     analytic = ask("reliability.methods=[analytic]", "reliability.poses=[{theta: 60}]").tables
-    assert analytic.keys() == {"moments", "reliability", "contributions"}
+    assert analytic.keys() == {"moments", "reliability", "capability", "contributions"}
 
 
 def test_columns_of_reliability_are_those_of_the_format() -> None:
@@ -115,3 +115,44 @@ def test_columns_of_reliability_are_those_of_the_format() -> None:
     asked += ["error", "samples", "invalid"]
     assert list(names[: len(asked)]) == asked
     assert {"evaluations", "used", "valid"} <= set(names)
+
+
+def test_sensitivities_in_the_units_of_the_study() -> None:
+    """B.x of the slider-crank by a slide's direction, its drive, lengths and a pure number; rates likewise."""
+    study = study_of(
+        """
+mechanism:
+  parameters: {ratio: 1.2, a: 100, tilt: 0}
+  links: {ground: {O: [0, 0]}, crank: [O, A, a], rod: [A, B, 200*ratio], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: O, direction: tilt}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [87, 50], B: [285, 0]}
+reliability:
+  poses: [{theta: 60}]
+  outputs: [rod.angle, B.x]
+  rates: {theta: 10}
+  dimensions: {ratio: 0.001, a: 0.1, tilt: 0.1, theta: 0.1}
+  clearances: {A: {radial: 0.02}}
+  methods: [analytic]
+"""
+    )
+    table = mechdesign.reliability(study).tables["contributions"]
+    position, turn = table["order"] == "position", np.degrees(1.0)
+    found = {
+        (output, source): (derivative, unit)
+        for output, source, derivative, unit in zip(
+            *(table[name][position] for name in ("output", "source", "derivative", "unit")), strict=True
+        )
+    }
+    cosine, sine = np.cos(np.radians(60.0)), np.sin(np.radians(60.0))
+    lean = 100 * sine / 240 / np.sqrt(1 - (100 * sine / 240) ** 2)
+    root = np.sqrt(1 - (100 * sine / 240) ** 2)
+    assert found["B.x", "theta"] == (pytest.approx((-100 * sine - lean * 100 * cosine) / turn), "mm/deg")
+    assert found["B.x", "a"] == (pytest.approx(cosine - lean * sine), "mm/mm")
+    assert found["B.x", "ratio"] == (pytest.approx(200 / root), "mm/ratio")
+    assert found["rod.angle", "theta"] == (pytest.approx(-100 * cosine / (240 * root)), "deg/deg")
+    assert found["rod.angle", "a"] == (pytest.approx(-sine / (240 * root) * turn), "deg/mm")
+    assert found["rod.angle", "tilt"][1] == "deg/deg"
+    assert found["B.x", "A"][1] == "mm/mm"
+    rates = dict(zip(table["source"], table["unit"], strict=True))
+    assert rates["theta"] == "mm/(s^2*deg)"

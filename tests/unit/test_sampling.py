@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
+from scipy.stats import beta
 
 from mechdesign.analyses.reliability.laws import (
     PIN_LAWS,
+    Beta,
     Correlation,
     Lognormal,
     Marginal,
+    Measured,
     Normal,
     Triangular,
     TruncatedNormal,
@@ -28,6 +31,7 @@ LAWS: dict[str, Marginal] = {
     "uniform": Uniform(-0.1, 0.3),
     "triangular": Triangular(-0.1, 0.3),
     "lognormal": Lognormal(-0.5, 0.7, 1.0),
+    "beta": Beta(-0.1, 0.3, 0.0, (2.0, 5.0)),
 }
 # Panels fine enough for the kink of a triangular law's density, in standard normal variables.
 EDGES = np.linspace(-12, 12, 4001)
@@ -65,6 +69,35 @@ def test_quantiles_rise_and_keep_their_digits_far_out(law: Marginal) -> None:
         assert law.at(np.array([-8.0]))[0] - law.low == pytest.approx(
             0.4 * ndtr(-8.0) if isinstance(law, Uniform) else np.sqrt(ndtr(-8.0) * 0.4 * 0.1), rel=1e-3, abs=1e-16
         )
+
+
+def test_a_beta_law_is_that_of_scipy() -> None:
+    law = Beta(-0.1, 0.3, 0.0, (2.0, 5.0))
+    true = beta(2.0, 5.0, -0.1, 0.4)
+    mean, variance, skewness, excess = true.stats("mvsk")
+    moments = (mean, variance, skewness * variance**1.5, (excess + 3.0) * variance**2)
+    assert law.moments == pytest.approx(moments, rel=1e-12)
+    u = np.linspace(-5, 5, 21)
+    assert law.at(u) == pytest.approx(true.ppf(ndtr(u)), rel=1e-9)
+
+
+def test_measured_values_have_their_mean_and_deviation_and_interpolated_quantiles() -> None:
+    values = np.random.default_rng(3).gamma(2.0, 0.1, 25)
+    law = Measured.of(values, 10.0)
+    mean, *central = law.moments
+    assert (mean, central[0]) == pytest.approx((values.mean(), values.var(ddof=1)), rel=1e-12)
+    # Quantiles are straight between the shares of the values, whose middle rule is exact to the cell's square.
+    shares = (np.arange(500_000) + 0.5) / 500_000
+    x = law.at(ndtri(shares))
+    for order, moment in zip((2, 3, 4), central, strict=True):
+        assert np.mean((x - mean) ** order) == pytest.approx(moment, rel=1e-8)
+    # The median is the middle value, stretched about the mean with all others; nothing lies beyond the ends.
+    stretch = (law.high - law.low) / np.ptp(values)
+    assert 1.0 < stretch < 1.1
+    assert law.at(np.zeros(1))[0] - mean == pytest.approx(stretch * (np.median(values) - mean), rel=1e-12)
+    assert law.at(np.array([-9.0, 9.0])) == pytest.approx([law.low, law.high])
+    drawn = law.draw(generator(1, 0, 0), SAMPLES)
+    assert np.abs(np.searchsorted(np.sort(drawn), x[::1000]) / SAMPLES - shares[::1000]).max() < 0.02 + 1.95 / 447
 
 
 def test_a_tolerance_is_three_sigma_its_ends_or_its_peak() -> None:

@@ -169,19 +169,7 @@ def _parts(result: str | Expression) -> tuple[str, str, str, Expression | None]:
 
 
 def unit_of(study: Study, text: str) -> str:
-    """Unit of an expression over parameters, known where it is a sum of multiples of parameters of one quantity.
-
-    A parameter has the quantity of the dimensions that change as much as it does.
-    """
+    """Unit of an expression over parameters, known where it is a sum of multiples of parameters of one unit."""
     expression = Expression.parse(text)
-    places, parameters = study.mechanism.description.places, study.parameters
-    kinds = {
-        frozenset(
-            places[place].quantity
-            for place, slope in parameters.derivatives(name).items()
-            if abs(slope) == parameters.factors[place] and places[place].quantity != "none"
-        )
-        for name in expression.names
-    }
-    same = kinds.pop() if len(kinds) == 1 and expression.is_linear() else frozenset[str]()
-    return study.units.label(*same) if len(same) == 1 else ""
+    units = {study.unit_of(name) for name in expression.names}
+    return (units.pop() or "") if len(units) == 1 and expression.is_linear() else ""

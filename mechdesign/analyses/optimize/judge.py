@@ -143,14 +143,11 @@ class Designs:
         return np.asarray(1 - share if self.goals[k].smallest else share)
 
     def unit_of(self, name: str) -> str:
-        """Unit of a goal or a variable; of a parameter see `mechdesign.analyses.optimize.goals.unit_of`."""
+        """Unit of a goal or a variable, where it is known."""
         for each in self.goals:
             if each.name == name:
                 return self._unit_and_meaning(each)[0]
-        if name in self.study.parameters.nominal:
-            return unit_of(self.study, name)
-        place = self.study.mechanism.description.places.get(name)
-        return self.study.units.label(place.quantity) if place is not None else ""
+        return self.study.unit_of(name) or ""
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
         """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""

@@ -32,7 +32,7 @@ _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
 TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*_OF_MOTION, "extremes", "loops"),
     "stiffness": ("stiffness", "compliance", "deflections"),
-    "reliability": ("moments", "reliability", "contributions"),
+    "reliability": ("moments", "reliability", "capability", "contributions"),
 }
 # Sections beside a command's own whose numbers it reads.
 ALSO_READ: Mapping[str, str] = {"kinematics": "workspace", "stiffness": "kinematics", "reliability": "kinematics"}

@@ -150,8 +150,14 @@ def sensitivity_table(designs: Designs, judge: Judge) -> Table:
     columns = (
         Column("optimum", np.repeat(np.arange(len(optima)) + 1, len(names)), "", "row of optimum.csv"),
         Column("variable", np.array(names * len(optima)), "", "design variable; the others are held"),
-        Column("value", optima.ravel(), "", "at the optimum"),
-        Column("step", step.ravel(), "", "the grid's, else a hundredth of the range"),
+        Column("value", optima.ravel(), "", "at the optimum, in `unit`"),
+        Column("step", step.ravel(), "", "the grid's, else a hundredth of the range, in `unit`"),
+        Column(
+            "unit",
+            np.array([designs.unit_of(name) for name in names] * len(optima)),
+            "",
+            "unit of the two columns before",
+        ),
         Column("score_down", down, "", meaning.format("down")),
         Column("score_up", up, "", meaning.format("up")),
     )

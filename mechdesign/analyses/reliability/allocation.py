@@ -158,14 +158,14 @@ def _simulated(model: ToleranceModel, scales: Floats, method: str) -> list[Estim
 
 def _shares(model: ToleranceModel, scales: Floats) -> Floats:
     """Shares of the sources in the variances of limited errors over their squared limits, shape (poses, sources)."""
-    question = model.task.question
-    linear = model.linear(scales).take([setting.pose for setting in model.task.settings])
-    weights = np.zeros(len(question.channels))
+    poses = [setting.pose for setting in model.task.settings]
+    question, linear = model.task.question.at(model.task.nominal[:, poses]), model.linear(scales).take(poses)
+    weights = np.zeros((len(question.channels), len(poses)))
     for band in question.bands:
-        weights[band.output] += 1.0 / max(min(abs(band.low), abs(band.high)), _NARROWEST) ** 2
+        weights[band.output] += 1.0 / np.maximum(np.minimum(abs(band.low), abs(band.high)), _NARROWEST) ** 2
     for disc in question.discs:
         weights[[disc.x, disc.y]] += 1.0 / max(disc.radius, _NARROWEST) ** 2
-    parts = np.nansum(linear.share() * (weights[:, None] * linear.deviation() ** 2)[:, None], axis=0).T
+    parts = np.nansum(linear.share() * (weights * linear.deviation() ** 2)[:, None], axis=0).T
     with np.errstate(invalid="ignore"):
         return np.asarray(parts / parts.sum(axis=1, keepdims=True))
 
@@ -178,7 +178,7 @@ def _allocation(last: _Round) -> Table:
     columns = (
         Column("source", np.array([tolerance.name for tolerance in found]), meaning="what varies"),
         Column("kind", np.array([tolerance.kind for tolerance in found]),
-               meaning="tolerance: half its width; sigma; clearance: its mean radial clearance"),
+               meaning="tolerance: half its width; sigma; measured: the values' sigma; clearance: its mean radial one"),
         Column("given", np.array(given), meaning="as the study gives it, in `unit`"),
         Column("allocated", np.array(sizes), meaning="the cheapest, in `unit`"),
         Column("unit", np.array([tolerance.unit for tolerance in found]), meaning="unit of the two columns before"),
@@ -248,9 +248,10 @@ def _unreachable(model: ToleranceModel, allowed: Floats, asked: float) -> str:
     # SciPy takes a quarter of a second to import, and a study without limits does not need it.
     from mechdesign.analyses.reliability.probability import failure_probability
 
-    tightest, question = model.scales(model.tightest), model.task.question
+    tightest = model.scales(model.tightest)
     failures = model.failures(tightest, range(len(allowed)))
     worst = int(np.argmax(failures / allowed))
+    question = model.task.settings[worst].question
     pose, share = model.task.settings[worst].pose, _shares(model, tightest)[worst]
     held = [
         f"{tolerance.name} ({share[k]:.0%})"
@@ -262,7 +263,10 @@ def _unreachable(model: ToleranceModel, allowed: Floats, asked: float) -> str:
         target += f" (for which the analytic model, as simulation shows, has to reach {_plain(allowed[worst])})"
     linear = model.linear(tightest).take([pose])
     centred = failure_probability(linear.covariance()[0], question.bands, question.discs)
-    if linear.shift().any() and centred <= allowed[worst]:
+    if not question.kept(np.zeros((len(question.channels), 1))).all():
+        reason = "the nominal value lies outside its limits"
+        held = []
+    elif linear.shift().any() and centred <= allowed[worst]:
         reason = "the mean errors, which the width of no tolerance changes, break the limits by themselves"
         held = []
     elif held:

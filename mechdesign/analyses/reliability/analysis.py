@@ -56,10 +56,10 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     Returns
     -------
     Result
-        Tables ``moments``, ``reliability`` (where there are limits) and ``contributions``; of methods that sample the
-        errors ``density`` (of two outputs), ``histogram``, ``convergence`` and ``estimate`` (where there are limits);
-        where tolerances are allocated ``allocation`` and ``confirmation``, and the study ``allocated.yaml`` that has
-        them.
+        Tables ``moments``, ``reliability`` and ``capability`` (where there are limits) and ``contributions``; of
+        methods that sample the errors ``density`` (of two outputs), ``histogram``, ``convergence`` and ``estimate``
+        (where there are limits); where tolerances are allocated ``allocation`` and ``confirmation``, and the study
+        ``allocated.yaml`` that has them.
 
     Raises
     ------
@@ -116,7 +116,9 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         interrupted += f"{counts.get('samples', 0)} samples, "
         interrupted += f"{counts['cycles']} whole cycles, " if cycles else ""
         interrupted += f"{', '.join(each.method for each in found)}"
-    made = [tables.moments(task, found), *([tables.success(task, found)] if task.question.limited else ())]
+    made = [tables.moments(task, found)]
+    if task.question.limited:
+        made += [tables.success(task, found), tables.capability(task, found)]
     made += [tables.contributions(task, indices)]
     # Of the first method that samples the errors.
     made += tables.of_drawn(task, next((each.sums for each in found if each.sums), {}))
@@ -146,6 +148,8 @@ def first_order_tables(
     made = [tables.moments(task, found)] if "moments" in wanted else []
     if "reliability" in wanted and task.question.limited:
         made.append(tables.success(task, found))
+    if "capability" in wanted and task.question.limited:
+        made.append(tables.capability(task, found))
     if "contributions" in wanted:
         made.append(tables.contributions(task, {}))
     return {table.name: table for table in made}, task.reason
@@ -212,8 +216,9 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                 scale = (one, two) if one[1] > 0 and two[1] > 0 else None
             settings.append(
                 Setting(
-                    task.question, row, mechanism, mechanism.forward if given else forward_plan(mechanism, pose), pose,
-                    rates.take(k), task.nominal[:, row].tolist(),
+                    task.question.at(task.nominal[:, row]), row, mechanism,
+                    mechanism.forward if given else forward_plan(mechanism, pose), pose, rates.take(k),
+                    task.nominal[:, row].tolist(),
                     None if task.elastic is None else task.elastic.take([row]), scale, row == assembled[0],
                 )
             )  # fmt: skip
@@ -223,9 +228,31 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
 def notes(found: Sequence[MethodResult], task: Task) -> list[str]:
     """All of it, in sentences."""
     return [
-        *disagreements(found, task), *_unseen(found, task), *_unreached(found, task), *_pointless(found, task),
-        *_unassembled(found), *_of_cycles(found, task),
+        *_outside(task), *disagreements(found, task), *_unseen(found, task), *_unreached(found, task),
+        *_pointless(found, task), *_unassembled(found), *_of_cycles(found, task),
     ]  # fmt: skip
+
+
+def _outside(task: Task) -> list[str]:
+    """Where a nominal value lies outside its own limits: the farthest pose of each."""
+    sentences = []
+    for limit, band in zip(task.question.bands, task.question.at(task.nominal).bands, strict=True):
+        beyond = np.where(task.assembled & limit.absolute, np.maximum(band.low, -band.high), 0.0)
+        poses = np.flatnonzero(beyond > 0)
+        if not len(poses):
+            continue
+        pose, scale, unit = int(np.argmax(beyond)), task.scale[band.output], task.labels[2][band.output]
+        value = scale * task.nominal[band.output, pose]
+        low, high = (value + scale * end[pose] for end in np.broadcast_arrays(band.low, band.high))
+        between = f"{low:.6g} to {high:.6g}"
+        if not np.isfinite(low) or not np.isfinite(high):
+            between = f"at least {low:.6g}" if np.isfinite(low) else f"at most {high:.6g}"
+        several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
+        sentences.append(
+            f"{task.question.channels[band.output].name}: the nominal value {value:.6g} at {task.where(pose)}{several} "
+            f"lies outside its limits, {between}{f' {unit}' if unit else ''}"
+        )
+    return sentences
 
 
 def disagreements(found: Sequence[MethodResult], task: Task) -> list[str]:

@@ -41,7 +41,8 @@ _LEAST_FAILURE = 1e-300
 class Tolerance:
     """The tolerance of one source, in the study's units, without a cost where it is held.
 
-    By `kind`, half the width of a ``tolerance``, a ``sigma`` or a ``clearance``, mean and radial.
+    By `kind`, half the width of a ``tolerance``, a ``sigma``, that of ``measured`` values, or a ``clearance``, mean and
+    radial.
     """
 
     name: str
@@ -74,16 +75,15 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
     found = []
     for scalar in sources.scalars:
         dimension = section.dimensions[scalar.name]
-        unit = "" if scalar.kind == "parameter" else study.units.label(scalar.moves[scalar.name][1])
         half = dimension.sigma
-        kind = "sigma"
-        if half is None:
-            assert dimension.tolerance is not None
+        if dimension.tolerance is not None:
             low, high = dimension.tolerance
-            half, kind = 0.5 * (high - low), "tolerance"
-        asked = half > 0 and (scalar.kind != "load" or scalar.name in given)
-        cost = given.get(scalar.name, Cost()) if asked else None
-        found.append(Tolerance(scalar.name, half, kind, unit, cost))
+            half = 0.5 * (high - low)
+        elif half is None:
+            half = math.sqrt(scalar.law.moments[1]) / scalar.factor
+        allocated = half > 0 and dimension.kind != "measured" and (scalar.kind != "load" or scalar.name in given)
+        cost = given.get(scalar.name, Cost()) if allocated else None
+        found.append(Tolerance(scalar.name, half, dimension.kind, scalar.unit or "", cost))
     for pin in sources.pins:
         cost = given.get(pin.name) if pin.radius > 0 else None
         found.append(Tolerance(pin.name, pin.radius, "clearance", study.units.label("length"), cost))
@@ -122,7 +122,8 @@ class ToleranceModel:
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
         from mechdesign.analyses.reliability.probability import failure_probability
 
-        linear, question = self.linear(scales).take([self.task.settings[k].pose for k in which]), self.task.question
+        poses = [self.task.settings[k].pose for k in which]
+        linear, question = self.linear(scales).take(poses), self.task.question.at(self.task.nominal[:, poses])
         return failure_probability(linear.covariance(), question.bands, question.discs, linear.shift().T)
 
     def cost(self, x: Floats) -> tuple[float, Floats]:

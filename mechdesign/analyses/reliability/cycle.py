@@ -106,7 +106,7 @@ def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk:
             drawn = sources.redraw_pins(drawn, generator(seed, chunk, place, *_STREAM))
         errors, valid = errors_of(setting, sources.made(drawn), left)
         evaluations += left
-        within &= setting.question.keeps(errors)
+        within &= setting.question.kept(errors).all(axis=0)
         if not valid.all():
             drawn, within = drawn[:, valid], within[valid]
     return np.array([count - np.count_nonzero(within), count, count - len(within), evaluations])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import ClassVar, Self
 
@@ -46,12 +46,12 @@ class Marginal(ABC):
 
     @property
     def mean(self) -> float:
-        """The middle of the tolerance; of a triangular law, which may lean, `moments` has the mean."""
+        """The middle of the tolerance; of a law that may lean `moments` has the mean."""
         return 0.5 * (self.low + self.high)
 
     @property
     def sigma(self) -> float:
-        """Standard deviation, of a truncated law before the cut; of a triangular law, where it does not lean."""
+        """Standard deviation, of a truncated law before the cut; of a law that may lean `moments` has it."""
         return 0.5 * (self.high - self.low) / self.reach
 
     @property
@@ -83,6 +83,8 @@ def marginal(spread: Dimension, nominal: float, factor: float = 1.0) -> Marginal
     low, high = spread.tolerance or (0.0, 0.0)
     if spread.sigma is not None:
         low, high = -law.reach * spread.sigma, law.reach * spread.sigma
+    if spread.shape is not None:
+        return Beta(factor * low, factor * high, nominal, spread.shape)
     return law(factor * low, factor * high, nominal)
 
 
@@ -186,12 +188,82 @@ class Lognormal(Marginal):
         return np.asarray(self.mean + size * np.expm1(s * u - 0.5 * s * s))
 
 
+@dataclass(frozen=True)
+class Beta(Marginal):
+    """Beta over the tolerance, of two shape parameters: equal ones do not lean, (1, 1) is uniform."""
+
+    shape: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        a, b = self.shape
+        n, width = a + b, self.high - self.low
+        second = width**2 * a * b / (n * n * (n + 1.0))
+        third = second**1.5 * 2.0 * (b - a) * math.sqrt((n + 1.0) / (a * b)) / (n + 2.0)
+        excess = 6.0 * ((a - b) ** 2 * (n + 1.0) - a * b * (n + 2.0)) / (a * b * (n + 2.0) * (n + 3.0))
+        return self.low + width * a / n, second, third, (3.0 + excess) * second**2
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        return self.low + (self.high - self.low) * rng.beta(*self.shape, count)
+
+    def at(self, u: Floats) -> Floats:
+        from scipy.special import betaincinv, ndtr
+
+        (a, b), width, tail = self.shape, self.high - self.low, ndtr(-np.abs(u))
+        inward = width * np.where(u < 0, betaincinv(a, b, tail), betaincinv(b, a, tail))
+        return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
+
+
+@dataclass(frozen=True)
+class Measured(Marginal):
+    """The distribution of measured deviations: the k-th of n in order has the share (k - 1/2)/n below it.
+
+    Quantiles between them are interpolated; nothing lies beyond the least and the largest. They are stretched a little
+    about their mean, so that the law has the sample's standard deviation (of n - 1).
+    """
+
+    ordered: Floats = field(default_factory=lambda: np.zeros(1), compare=False)
+
+    @staticmethod
+    def of(deviations: Floats, nominal: float) -> Measured:
+        """The law of deviations that are not all the same."""
+        ordered, mean = np.sort(deviations), float(deviations.mean())
+        ordered = mean + (ordered - mean) * deviations.std(ddof=1) / math.sqrt(_interpolated(ordered - mean, 2))
+        return Measured(float(ordered[0]), float(ordered[-1]), nominal, ordered)
+
+    @property
+    def moments(self) -> tuple[float, float, float, float]:
+        mean = float(self.ordered.mean())
+        second, third, fourth = (_interpolated(self.ordered - mean, power) for power in (2, 3, 4))
+        return mean, second, third, fourth
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        return self._quantile(rng.random(count))
+
+    def at(self, u: Floats) -> Floats:
+        from scipy.special import ndtr
+
+        return self._quantile(ndtr(u))
+
+    def _quantile(self, share: Floats) -> Floats:
+        count = len(self.ordered)
+        return np.asarray(np.interp(share, (np.arange(count) + 0.5) / count, self.ordered))
+
+
+def _interpolated(ordered: Floats, power: int) -> float:
+    """Mean power of a variable with these quantiles at the shares (k - 1/2)/n, linear between them."""
+    low, high = ordered[:-1], ordered[1:]
+    between = sum((low**k * high ** (power - k) for k in range(power + 1)), start=np.zeros(len(low))) / (power + 1)
+    return float(between.sum() + 0.5 * (ordered[0] ** power + ordered[-1] ** power)) / len(ordered)
+
+
 LAWS: dict[str, type[Marginal]] = {
     "normal": Normal,
     "truncated_normal": TruncatedNormal,
     "uniform": Uniform,
     "triangular": Triangular,
     "lognormal": Lognormal,
+    "beta": Beta,
 }
 
 

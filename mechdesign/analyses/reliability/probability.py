@@ -38,8 +38,9 @@ def failure_probability(
     covariance : ndarray, shape (..., outputs, outputs)
         May be singular.
     bands, discs
-        All limits must hold. One or two limited outputs are integrated to about 1e-14 of the result; more by a
-        randomised lattice, to about 1e-5 of it, or where they are rarely broken by sampling, to about 1e-3.
+        All limits must hold; ends of bands may be of shape (...). One or two limited outputs are integrated to about
+        1e-14 of the result; more by a randomised lattice, to about 1e-5 of it, or where they are rarely broken by
+        sampling, to about 1e-3.
     mean : ndarray, shape (..., outputs), optional
         Else zero.
     """
@@ -52,9 +53,11 @@ def failure_probability(
         low, high = (np.stack([each[k] for each in ends]) for k in (0, 1))
         return rectangle_failure(low, high, correlation(covariance[..., pair, :][..., pair]))
     found = np.full(covariance.shape[:-2], np.nan)
+    limits = [[np.broadcast_to(end, found.shape) for end in (band.low, band.high)] for band in bands]
     for place in np.ndindex(found.shape):
         if np.isfinite(covariance[place]).all() and np.isfinite(mean[place]).all():
-            found[place] = _of_several(covariance[place], bands, discs, mean[place])
+            here = [replace(b, low=low[place], high=high[place]) for b, (low, high) in zip(bands, limits, strict=True)]
+            found[place] = _of_several(covariance[place], here, discs, mean[place])
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,6 +13,7 @@ from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, radians
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
@@ -34,11 +36,15 @@ class Channel:
 
 @dataclass(frozen=True)
 class Band:
-    """Error number `output` within [low, high]; either may be infinite."""
+    """Error number `output` within [low, high]; either may be infinite, and both may be of many poses.
+
+    Where it is `absolute` they limit the value itself.
+    """
 
     output: int
-    low: float
-    high: float
+    low: Any
+    high: Any
+    absolute: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,26 @@ class ReliabilityQuestion:
         """Whether a reliability is asked."""
         return bool(self.bands or self.discs)
 
+    @property
+    def single(self) -> list[ReliabilityQuestion]:
+        """The same with one limit at a time, in the order of `kept`."""
+        alone = [replace(self, bands=(band,), discs=()) for band in self.bands]
+        return alone + [replace(self, bands=(), discs=(disc,)) for disc in self.discs]
+
+    def at(self, nominal: Sequence[Any] | Floats) -> ReliabilityQuestion:
+        """The question at poses where the channels have these values: all limits are those of errors.
+
+        Two limits of an angle are those at the turn nearest to its value.
+        """
+        bands = tuple(self._about(band, nominal[band.output]) if band.absolute else band for band in self.bands)
+        return replace(self, bands=bands)
+
+    def _about(self, band: Band, value: Any) -> Band:
+        channel, middle = self.channels[band.output], 0.5 * (band.low + band.high)
+        if channel.order == 0 and channel.coordinate.quantity == "angle" and np.isfinite(middle):
+            value = value - TURN * np.round((value - middle) / TURN)
+        return Band(band.output, band.low - value, band.high - value)
+
     @cached_property
     def limited_channels(self) -> list[int]:
         """Channels that have limits."""
@@ -83,16 +109,19 @@ class ReliabilityQuestion:
             None,
         )
 
-    def keeps(self, errors: Floats) -> Flags:
-        """Which errors, of shape (channels, n), keep every limit; what is not assembled is nan and keeps none."""
-        kept = np.ones(errors.shape[1], dtype=bool)
+    def kept(self, errors: Floats) -> Flags:
+        """Which limits (bands, then discs) errors of shape (channels, n) keep, shape (limits, n).
+
+        What is not assembled is nan and keeps none.
+        """
+        kept = np.ones((len(self.bands) + len(self.discs), errors.shape[1]), dtype=bool)
         with np.errstate(invalid="ignore"):
-            for band in self.bands:
+            for row, band in zip(kept, self.bands, strict=False):
                 error = errors[band.output]
-                kept &= (error >= band.low) & (error <= band.high)
-            for disc in self.discs:
+                row[:] = (error >= band.low) & (error <= band.high)
+            for row, disc in zip(kept[len(self.bands) :], self.discs, strict=True):
                 x, y = errors[disc.x], errors[disc.y]
-                kept &= x * x + y * y <= disc.radius * disc.radius
+                row[:] = x * x + y * y <= disc.radius * disc.radius
         return kept
 
     @property
@@ -139,9 +168,9 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
         else:
             low, high = (
                 float(radians(study, mechanism.coordinate(base), value)) if value is not None else bound
-                for value, bound in ((limit.min, -np.inf), (limit.max, np.inf))
+                for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True)
             )
-            bands.append(Band(begin + known.index(base), low, high))
+            bands.append(Band(begin + known.index(base), low, high, limit.absolute))
     pair: tuple[int, int] | None = None
     if len(bands) == 2 and not discs:
         pair = (bands[0].output, bands[1].output)

@@ -165,6 +165,8 @@ class Sums:
 
     Parameters
     ----------
+    broken : ndarray of int, shape (limits,)
+        Samples that break each limit, in the order of `ReliabilityQuestion.kept`.
     density : ndarray of int, shape (CELLS * CELLS,) or (0,)
         Samples in each cell, over `counted` samples.
     trend : ndarray, shape (steps, 3 + channels)
@@ -176,6 +178,7 @@ class Sums:
     samples: int
     valid: int
     failures: int
+    broken: Ints
     errors: Floats
     products: Floats
     density: Ints
@@ -212,6 +215,7 @@ class Sums:
             self.samples + other.samples,
             self.valid + other.valid,
             self.failures + other.failures,
+            self.broken + other.broken,
             self.errors + other.errors,
             self.products + other.products,
             self.density + other.density if len(other.density) else self.density,
@@ -246,7 +250,9 @@ def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, co
 def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
     """Sums over made mechanisms; of the first chunks also the density, the trend and the errors."""
     errors, valid = errors_of(setting, made, count)
-    within = setting.question.keeps(errors)
+    kept = setting.question.kept(errors)
+    within = np.asarray(kept.all(axis=0))
+    broken = count - np.count_nonzero(kept, axis=1)
     failures, assembled = count - int(np.count_nonzero(within)), int(np.count_nonzero(valid))
     early = setting.followed and chunk < _TREND_CHUNKS
     trend = _trend(errors, valid, within) if early else np.zeros((0, 3 + len(errors)))
@@ -261,7 +267,7 @@ def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
                     for k, (mean, sigma) in zip(setting.question.pair, setting.scale, strict=True)]  # fmt: skip
         density = _count_cells(np.stack(standard))
     return Sums(
-        count, assembled, failures, sums, errors @ errors.T, density, assembled if len(density) else 0, trend,
+        count, assembled, failures, broken, sums, errors @ errors.T, density, assembled if len(density) else 0, trend,
         errors if early else np.empty((len(errors), 0)),
     )  # fmt: skip
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.analyses.reliability.laws import PIN_LAWS, Correlation, Marginal, marginal
+from mechdesign.analyses.reliability.laws import PIN_LAWS, Correlation, Marginal, Measured, marginal
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names
@@ -28,12 +29,15 @@ class Scalar:
     """A dimension that varies: by `kind` a ``parameter`` (in its own unit), a ``place``, a ``drive`` or a ``load``.
 
     `moves` has the derivative of each place, drive or load that it changes (radians, lengths), and its quantity.
+    `factor` are radians, lengths or loads in one `unit` of the study; that of a parameter may be unknown.
     """
 
     name: str
     kind: str
     law: Marginal
     moves: Mapping[str, tuple[float, str]]
+    factor: float
+    unit: str | None
 
     @property
     def directions(self) -> list[dict[str, float]]:
@@ -247,8 +251,14 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
                 warnings += _twice(study, name, section.dimensions)
         moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
         turned = kind != "parameter" and moves[name][1] == "angle"
-        law = marginal(dimension, nominal, study.units.angle_factor if turned else 1.0)
-        scalars.append(Scalar(name, kind, law, moves))
+        factor = study.units.angle_factor if turned else 1.0
+        unit = study.units.label(LOADS[name]) if kind == "load" else study.unit_of(name)
+        if dimension.measured is not None:
+            folder = study.path.parent if study.path is not None else Path()
+            law: Marginal = Measured.of(factor * dimension.deviations(nominal / factor, folder), nominal)
+        else:
+            law = marginal(dimension, nominal, factor)
+        scalars.append(Scalar(name, kind, law, moves, factor, unit))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
     pins = tuple(_pin(point, clearance) for point, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))

@@ -10,13 +10,13 @@ import numpy as np
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.reliability import methods
-from mechdesign.analyses.reliability.engine.problem import Estimate, binomial
+from mechdesign.analyses.reliability.engine.problem import Estimate, binomial, counted
 from mechdesign.analyses.reliability.first_order import correlation
-from mechdesign.analyses.reliability.question import links_meant
+from mechdesign.analyses.reliability.question import ReliabilityQuestion, links_meant
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.task import MethodResult, Task
-from mechdesign.numerics.arrays import Ints
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table
 
 # Bins of a histogram.
@@ -25,6 +25,8 @@ _BINS = 60
 _FARTHEST = 6.0
 # Standard deviation, as a part of the size, up to which an error does not vary.
 _CONSTANT = 1e-12
+# What a sigma level is.
+_LEVEL = "quantile of the standard normal law, without a shift of 1.5 sigma,"
 # Where nothing was computed.
 _UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
 
@@ -40,9 +42,14 @@ def of_channels(task: Task, channels: Ints) -> list[Column]:
     return shared(task.study.units, output=output[channels], order=order[channels])
 
 
+def _with_moments(task: Task, found: Sequence[MethodResult]) -> Sequence[MethodResult]:
+    """Methods that have moments; where none has, the first order."""
+    return [each for each in found if each.sums or each.normal] or [methods.run("analytic", task)]
+
+
 def moments(task: Task, found: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
-    known = [each for each in found if each.sums or each.normal] or [methods.run("analytic", task)]
+    known = _with_moments(task, found)
     each_mean, each_covariance = zip(*(each.moments(task) for each in known), strict=True)
     scale, linear = task.scale[:, None], task.linear
     shape = (task.poses.count, len(known), len(scale))
@@ -105,6 +112,8 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("invalid", invalid, meaning="samples that cannot be assembled; they are failures"),
         *shared(task.study.units, evaluations=evaluations),
         Column("used", np.array(used), meaning="where the value comes from: of auto, the method it used"),
+        Column("sigma_level", _sigma_level(failure), meaning=f"{_LEVEL} of the reliability"),
+        Column("ppm", 1e6 * failure, meaning="failures in a million"),
     ]  # fmt: skip
     if task.question.pair is not None:
         pair = np.ix_(range(task.poses.count), task.question.pair, task.question.pair)
@@ -116,11 +125,93 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
     return Table("reliability", tuple(columns), "probability that the errors keep their limits")
 
 
+def _sigma_level(failure: Floats) -> Floats:
+    # SciPy takes a quarter of a second to import, and a study without limits does not need it.
+    from scipy.special import ndtri
+
+    return np.asarray(-ndtri(failure))
+
+
+def capability(task: Task, found: Sequence[MethodResult]) -> Table:
+    """Process capability of each limited output by itself, at every pose by every method that has moments [ISO 22514].
+
+    Limits of errors are those of the value about its nominal one.
+    """
+    known, question = _with_moments(task, found), task.question.at(task.nominal)
+    single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
+    shape = (task.poses.count, len(known), len(single))
+    pose, method, limit = (index.ravel() for index in np.indices(shape))
+    scale = task.scale[rows]
+    means, covariances = (np.stack(part) for part in zip(*(each.moments(task) for each in known), strict=True))
+    # nan of circles, whose limits are about a point.
+    nominal, mean, sigma, low, high = np.full((5, *shape), np.nan)
+    nominal[..., :bands] = (task.nominal[rows].T * scale)[:, None]
+    mean[..., :bands] = np.moveaxis(means[:, rows], 2, 0) * scale
+    sigma[..., :bands] = np.sqrt(np.maximum(covariances[:, :, rows, rows].swapaxes(0, 1), 0.0)) * scale
+    for k, band in enumerate(question.bands):
+        low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (band.low, band.high))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        both = np.isfinite(low) & np.isfinite(high)
+        cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
+        cpk = np.minimum(high - mean, mean - low) / (3.0 * sigma)
+    upper = np.where(np.isfinite(high), nominal + high, np.nan)
+    upper[:, :, bands:] = [disc.radius for disc in question.discs]
+    estimates = [_each_limit(task, each, single) for each in known]
+    failure, least, most = (
+        np.array([[[getattr(each.get(row, _UNKNOWN), name) for each in of] for of in estimates]
+                  for row in range(len(nominal))])
+        for name in ("failure", "low", "high")
+    )  # fmt: skip
+    output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
+    output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
+    interval = "end of its interval, 99.7 %, where samples are counted"
+    columns = [
+        *at_poses(task, pose),
+        *shared(task.study.units, method=np.array([each.method for each in known])[method]),
+        *shared(task.study.units, output=output[limit], order=order[limit]),
+        Column("lsl", np.where(np.isfinite(low), nominal + low, np.nan).ravel(),
+               meaning="lower specification limit of the value, in `unit`; nan: none"),
+        Column("usl", upper.ravel(),
+               meaning="upper specification limit of the value, of a point the radius of its error, in `unit`"),
+        Column("nominal", nominal.ravel(), meaning="value of the nominal mechanism, in `unit`; nan of a point"),
+        Column("mean", (nominal + mean).ravel(), meaning="mean over made mechanisms, in `unit`"),
+        Column("sigma", sigma.ravel(), meaning="standard deviation of the value, in `unit`"),
+        Column("cp", cp.ravel(), meaning="(USL - LSL)/(6 sigma); nan of a single limit"),
+        Column("cpk", cpk.ravel(), meaning="distance of the mean from the nearer limit over 3 sigma"),
+        Column("sigma_level", _sigma_level(failure).ravel(), meaning=f"{_LEVEL} of the share within the limits"),
+        Column("ppm", 1e6 * failure.ravel(), meaning="values in a million outside these limits"),
+        Column("ppm_low", 1e6 * least.ravel(), meaning=f"lower {interval}"),
+        Column("ppm_high", 1e6 * most.ravel(), meaning=f"upper {interval}"),
+        Column("unit", unit[limit], meaning="unit of the five columns from lsl to sigma"),
+        *shared(task.study.units, valid=task.reason[pose] == 0),
+    ]  # fmt: skip
+    return Table("capability", tuple(columns), "process capability of each limited output")
+
+
+def _each_limit(task: Task, found: MethodResult, single: Sequence[ReliabilityQuestion]) -> list[dict[int, Estimate]]:
+    """Estimates by pose for each limit by itself; of methods that count failures from their plain samples."""
+    if len(single) == 1:
+        return [found.estimates]
+    if found.normal is not None:
+        return [methods.of_normal(task, question, *found.normal) for question in single]
+    return [
+        {pose: counted(int(sums.broken[k]), sums.samples, sums.samples - sums.valid, sums.samples)
+         for pose, sums in found.sums.items()}
+        for k in range(len(single))
+    ]  # fmt: skip
+
+
 def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     """Sensitivity to each source and its share of the variance, to the first order; Sobol' indices by pose."""
     sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity, task.linear.share()))
     pose, channel, source = (index.ravel() for index in np.indices(share.shape))
     names = np.array([source.name for source in task.sources.all])
+    pins, study = len(task.sources.pins), task.study
+    factors = np.array([scalar.factor for scalar in task.sources.scalars] + [1.0] * pins)
+    # What has no known unit stands by its name.
+    below = [scalar.name if scalar.unit is None else scalar.unit for scalar in task.sources.scalars]
+    below += [study.units.label("length")] * pins
+    units = np.array([[study.units.ratio(unit, each) for each in below] for unit in task.labels[2].tolist()])
     links = np.array([links_meant(task.study, c.coordinate) for c in task.question.channels])
     columns = [
         *at_poses(task, pose),
@@ -130,6 +221,9 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
                meaning="links whose point the output is, where its pin has a clearance: the pin moves in another link"),
         Column("sensitivity", sensitivity.ravel(),
                meaning="derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)"),
+        Column("derivative", (sensitivity * task.scale[:, None] * factors).ravel(),
+               meaning="the same for one unit of the source as the study counts it, in `unit`"),
+        Column("unit", units[channel, source], meaning="unit of `derivative`: the output's over the source's"),
         Column("share", share.ravel(), meaning="share of the output's variance, to the first order"),
         *_index_columns(indices, share.shape),
     ]  # fmt: skip

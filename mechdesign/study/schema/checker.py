@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from mechdesign.mechanism.model import Quantity
@@ -21,10 +22,12 @@ NO_MOMENT = "a pin carries no moment; name the 'link' of the stiffness section t
 class Checker:
     """Looks names and units up, and notes what is wrong with them."""
 
-    def __init__(self, builder: Builder, parameters: Parameters, parts: Mapping[str, Any]) -> None:
+    def __init__(
+        self, builder: Builder, parameters: Parameters, parts: Mapping[str, Any], folder: Path
+    ) -> None:  # fmt: skip
         self.mechanism, self.places, self.reporter = builder.section, builder.places, builder.reporter
         self.parameters = parameters
-        self.parts = parts
+        self.parts, self.folder = parts, folder
         self.known, self.kind = builder.reporter.known, builder.reporter.kind
         self.report = builder.reporter.report
 

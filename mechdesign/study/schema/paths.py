@@ -6,6 +6,7 @@ length of the way to it and the direction and bend of the path there.
 
 from __future__ import annotations
 
+import csv
 import math
 import pathlib
 from dataclasses import dataclass
@@ -222,14 +223,8 @@ def read_table(file: pathlib.Path, most: int = 2) -> Floats:
     StudyError
         Where it cannot be read or holds anything else.
     """
-    try:
-        lines = [line.strip() for line in file.read_text(encoding="utf-8-sig").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'not a text file'}") from None
     rows: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
-        if not line or line.startswith("#"):
-            continue
+    for number, line in _lines(file):
         try:
             row = [float(part) for part in line.replace(";", ",").split(",")]
         except ValueError:
@@ -243,3 +238,54 @@ def read_table(file: pathlib.Path, most: int = 2) -> Floats:
     if not rows:
         raise StudyError(f"{file} holds no numbers")
     return np.array(rows)
+
+
+def read_column(file: pathlib.Path, name: str | None) -> Floats:
+    """Read the numbers of a CSV file's column of this name, or of a file with one number a line.
+
+    Raises
+    ------
+    StudyError
+        Where the file cannot be read, there is no such column, or it holds anything but finite numbers.
+    """
+    lines = _lines(file)
+    if not lines:
+        raise StudyError(f"{file} holds no numbers")
+    separator = next((mark for mark in (";", "\t") if mark in lines[0][1]), ",")
+    try:
+        rows = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator))] for _, line in lines]
+    except csv.Error as error:
+        raise StudyError(f"{file} is no CSV file: {error}") from None
+    first, place = rows[0], 0
+    if name is not None and name not in first:
+        raise StudyError(f"{file} has no column {name!r}; its first line names {', '.join(first)}")
+    if name is not None:
+        place = first.index(name)
+    elif len(first) > 1:
+        raise StudyError(f"{file} has {len(first)} columns: say by 'column' which one, by its name in the first line")
+    found = []
+    for (number, line), row in zip(lines, rows, strict=True):
+        value = _number(row[place]) if place < len(row) <= len(first) else None
+        if value is not None and math.isfinite(value):
+            found.append(value)
+        elif row is not first or (name is None and value is not None):
+            what = f" of column {name!r}" if name is not None else ""
+            hint = "; a decimal is written with a point" if "," in line and separator != "," else ""
+            raise StudyError(f"{file}:{number}: {line!r} has no finite number{what}{hint}")
+    return np.array(found)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _lines(file: pathlib.Path) -> list[tuple[int, str]]:
+    """Lines of a text with their numbers, without empty ones and comments; a StudyError where it cannot be read."""
+    try:
+        lines = [line.strip() for line in file.read_text(encoding="utf-8-sig").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'not a text file'}") from None
+    return [(number, line) for number, line in enumerate(lines, start=1) if line and not line.startswith("#")]

@@ -8,20 +8,28 @@ the pin moves in another one.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from mechdesign.errors import StudyError
 from mechdesign.mechanism.graph import Graph
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study.building.section import MechanismSection
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
 from mechdesign.study.schema.methods import METHODS
+from mechdesign.study.schema.paths import read_column
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
+BETA = "beta"
+# Least number of measured values.
+MIN_MEASURED = 10
 PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")
 DEFAULT_METHODS = ("analytic", "monte_carlo")
 # Components of a random load, and their kinds of quantity.
@@ -63,17 +71,62 @@ Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
 
 
 class Dimension(fields.Model):
-    """A dimension's variation: nominal +- tolerance, or its standard deviation.
+    """A dimension's variation: nominal +- tolerance, its standard deviation, or measured values.
 
     Of a tolerance ``normal`` makes three standard deviations, ``truncated_normal`` the same and cuts there; ``uniform``
-    fills it, ``triangular`` peaks at the nominal value, ``lognormal`` has the mean and the deviation of ``normal``.
+    fills it, ``triangular`` peaks at the nominal value, ``lognormal`` has the mean and the deviation of ``normal``,
+    ``beta`` has two shape parameters between its ends.
+
+    `measured` is a file of measured values of the dimension, in the study's units: one a line, or a `column`. What they
+    deviate from is the dimension's own nominal value (of a drive or a load 0), or `nominal`. What is sampled is drawn
+    from their interpolated distribution, beyond whose ends nothing lies.
     """
 
     bare, short = "tolerance", (fields.NUMBER_FORM, fields.PAIR_FORM)
-    one_of = ("a dimension needs either 'tolerance' or 'sigma'", "tolerance", "sigma")
+    one_of = ("a dimension needs either 'tolerance', 'sigma' or 'measured'", "tolerance", "sigma", "measured")
     tolerance: Tolerance | None = None
     sigma: fields.NonNegative | None = None
-    distribution: Annotated[str, fields.choice(DISTRIBUTIONS)] = "normal"
+    distribution: Annotated[str, fields.choice((*DISTRIBUTIONS, BETA))] = "normal"
+    shape: (
+        Annotated[tuple[fields.Positive, fields.Positive], fields.pair_of("two shape parameters such as [2, 5]")] | None
+    ) = Field(None, description="shape parameters of a beta distribution over the tolerance")
+    measured: str | None = Field(None, description="a file of measured values, one a line or a column")
+    column: str | None = Field(None, description="the column of measured values, by its name in the first line")
+    nominal: fields.Number | None = Field(None, description="what measured values deviate from; 0 of deviations")
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Self:
+        if (self.distribution == BETA) != (self.shape is not None):
+            raise failure("'distribution: beta' and its 'shape', such as [2, 5], go together")
+        if self.shape is not None and self.tolerance is None:
+            raise failure("a beta distribution lies between two ends: give 'tolerance'")
+        if self.measured is not None and "distribution" in self.model_fields_set:
+            raise failure("measured values are a distribution of their own: leave 'distribution' out")
+        if self.measured is None and (spare := self.given("column", "nominal")):
+            raise failure(f"{spare[0]!r} goes with 'measured', the name of a file")
+        return self
+
+    def deviations(self, nominal: float, folder: Path) -> Floats:
+        """Measured values less what they deviate from, in the study's units, by default `nominal`.
+
+        Raises
+        ------
+        StudyError
+            Where the file has no such numbers, too few of them, or only one and the same.
+        """
+        assert self.measured is not None
+        file = folder / self.measured
+        values = read_column(file, self.column)
+        if len(values) < MIN_MEASURED:
+            raise StudyError(f"{file}: {len(values)} measured values are too few: give {MIN_MEASURED} or more")
+        if np.ptp(values) == 0:
+            raise StudyError(f"{file}: all {len(values)} measured values are {values[0]:g}: nothing varies")
+        if self.nominal is None and np.abs(values).max() < 0.5 * abs(nominal):
+            raise StudyError(
+                f"{file}: the measured values lie between {values.min():g} and {values.max():g}, and the nominal value "
+                f"is {nominal:g}; where they are deviations, say 'nominal: 0'"
+            )
+        return np.asarray(values - (nominal if self.nominal is None else self.nominal))
 
 
 class PinModel(fields.Model):
@@ -121,16 +174,26 @@ class Clearance(fields.Model):
 
 
 class ErrorLimit(fields.Model):
-    """What an error may be: within [min, max], or (of a point) within a radius."""
+    """What an error may be: within [min, max], or (of a point) within a radius; or what the value itself may be.
 
-    short = (fields.NUMBER_FORM,)
+    `lsl` and `usl` are the lower and upper specification limit of the value, the same at all poses; an angle between
+    two of them is counted at the turn nearest to them.
+    """
+
+    short = (fields.NUMBER_FORM, fields.PAIR_FORM)
     min: fields.Number | None = None
     max: fields.Number | None = None
+    lsl: fields.Number | None = None
+    usl: fields.Number | None = None
     radius: fields.NonNegative | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _long_form(cls, raw: Any, info: ValidationInfo) -> Any:
+        if isinstance(raw, list):
+            if len(raw) != 2:
+                raise failure(f"expected a number, or the lowest and highest error such as [-1, 0.8], not {shown(raw)}")
+            return {"min": raw[0], "max": raw[1]}
         if not isinstance(raw, int | float | str) or isinstance(raw, bool):
             return raw
         size = read_number(raw, info.context or Context()).nominal
@@ -140,13 +203,28 @@ class ErrorLimit(fields.Model):
 
     @model_validator(mode="after")
     def _some(self) -> ErrorLimit:
-        if self.radius is None and self.min is None and self.max is None:
-            raise failure("a limit needs a number, 'min', 'max' or 'radius'")
-        if self.radius is not None and (self.min is not None or self.max is not None):
-            raise failure("'radius' excludes 'min' and 'max'")
-        if self.min is not None and self.max is not None and self.max < self.min:
-            raise failure(f"the maximum {self.max:g} is below the minimum {self.min:g}")
+        kinds = [given for keys in (("min", "max"), ("lsl", "usl"), ("radius",)) if (given := self.given(*keys))]
+        if not kinds:
+            raise failure("a limit needs a number, 'min', 'max', 'lsl', 'usl' or 'radius'")
+        if len(kinds) > 1:
+            raise failure(
+                f"{kinds[0][0]!r} and {kinds[1][0]!r} exclude each other: 'min' and 'max' limit the error, 'lsl' and "
+                "'usl' the value itself, 'radius' the place of a point"
+            )
+        low, high = self.ends
+        if low is not None and high is not None and high < low:
+            raise failure(f"the maximum {high:g} is below the minimum {low:g}")
         return self
+
+    @property
+    def absolute(self) -> bool:
+        """Whether it is a limit of the value itself."""
+        return self.lsl is not None or self.usl is not None
+
+    @property
+    def ends(self) -> tuple[float | None, float | None]:
+        """Lowest and highest error, or value where it is absolute."""
+        return (self.lsl, self.usl) if self.absolute else (self.min, self.max)
 
 
 class Precision(fields.Model):
@@ -334,6 +412,9 @@ def _allocate(
 ) -> None:
     assert section.allocate is not None
     for name in section.allocate.cost:
+        if name in dimensions and dimensions[name].measured is not None:
+            message = "what is measured is held as it is: its tolerance is not allocated"
+            checker.report(("reliability", "allocate", "cost", name), message, at_key=True)
         known = [*dimensions, *clearances]
         checker.known(name, known, "dimension or clearance that varies,", ("reliability", "allocate", "cost", name),
                       at_key=True)  # fmt: skip
@@ -423,10 +504,30 @@ def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath)
         nominal = checker.parameters.nominal.get(name)
         if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
             checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
+    if dimension.measured is not None:
+        _measured(checker, name, dimension, path)
     if name in checker.parameters.nominal:
         return
     kinds = {**checker.mechanism.driven_kinds, **LOADS}
     checker.kind(path, checker.places[name].quantity if name in checker.places else kinds[name])
+
+
+def _measured(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
+    parameters, optimize = checker.parameters, checker.parts.get("optimize")
+    nominal = parameters.nominal.get(name, 0.0)
+    if name in checker.places:
+        nominal = checker.places[name].nominal / parameters.factors[name]
+    try:
+        dimension.deviations(nominal, checker.folder)
+    except StudyError as error:
+        checker.report((*path, "measured"), str(error))
+    designed = optimize.variables if optimize is not None else ()
+    if dimension.nominal is None and name in parameters.moved(designed) | parameters.moved_places(designed):
+        message = (
+            f"optimize changes {name!r}: say by 'nominal' what the measured values deviate from, so that the "
+            "deviations are those of every design"
+        )
+        checker.report(path, message, at_key=True)
 
 
 def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tuple[str, list[str]]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -46,7 +45,7 @@ class Target:
         return tuple(sorted(self.expression.names)) if self.expression is not None else ()
 
 
-def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) -> dict[str, Target]:
+def check(checker: Checker, wanted: Mapping[str, Wanted]) -> dict[str, Target]:
     """Targets whose names and tables are right; the mistakes of the others are noted."""
     found: dict[str, Target] = {}
     seen: dict[str, str] = {}
@@ -61,7 +60,7 @@ def check(checker: Checker, wanted: Mapping[str, Wanted], folder: pathlib.Path) 
         seen.update(dict.fromkeys(coordinates, owner))
         quantity = "length" if point else checker.mechanism.coordinates[owner]
         if not isinstance(value, Expression):
-            table = _table(checker, owner, value, path, folder, len(coordinates), quantity)
+            table = _table(checker, owner, value, path, len(coordinates), quantity)
             if table is not None:
                 found[owner] = Target(owner, coordinates, table=table)
         elif _right(checker, owner, value, path, point):
@@ -87,12 +86,10 @@ def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, 
     return right
 
 
-def _table(
-    checker: Checker, owner: str, value: Any, path: KeyPath, folder: pathlib.Path, count: int, quantity: str
-) -> Floats | None:
+def _table(checker: Checker, owner: str, value: Any, path: KeyPath, count: int, quantity: str) -> Floats | None:
     """The target's table, where its rows have `count` numbers or one more."""
     try:
-        table = read_table(folder / value, most=3) if isinstance(value, str) else np.array(value)
+        table = read_table(checker.folder / value, most=3) if isinstance(value, str) else np.array(value)
     except StudyError as error:
         checker.report(path, str(error))
         return None

@@ -130,6 +130,16 @@ class Units:
             return above
         return f"{above or '1'}/{below[0] if len(below) == 1 else '(' + '*'.join(below) + ')'}"
 
+    @staticmethod
+    def ratio(above: str, below: str) -> str:
+        """Unit of a quantity over another, from their labels."""
+        if not below:
+            return above
+        one, _, under = above.partition("/")
+        parts = [part.removeprefix("(").removesuffix(")") for part in (under, below) if part]
+        under = "*".join(parts)
+        return f"{one or '1'}/{f'({under})' if '*' in under else under}"
+
     def convert(self, text: str, kind: str | None = None) -> float:
         """Convert a quantity of a kind (a name of `KINDS`, or any) to the study's units.
 

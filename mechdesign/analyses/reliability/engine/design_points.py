@@ -62,6 +62,8 @@ class DesignPoints:
         Directions that bring the limit nearest, as long as the probability is concentrated about them.
     seen : ndarray, shape (dimension, n)
         Failures among the samples of all spreads.
+    always : bool
+        Whether all of these samples break a limit that has no such point: it is nowhere kept.
     """
 
     u: Floats
@@ -69,6 +71,7 @@ class DesignPoints:
     normal: Floats
     pull: Floats
     seen: Floats
+    always: bool
 
     @property
     def distance(self) -> Floats:
@@ -98,6 +101,7 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
         np.concatenate([found[2], straight / np.where(length > 0, length, 1.0)], axis=1),
         np.concatenate([found[3], np.zeros((ends.shape[1], len(problem.circles), 2))]),
         u[:, failed(margins)],
+        np.flatnonzero(~(margins >= 0).any(axis=1)),
     )
 
 
@@ -161,8 +165,10 @@ def _apart(problem: Problem, u: Floats, most: int) -> Floats:
     return u[:, chosen]
 
 
-def _distinct(problem: Problem, u: Floats, limit: Ints, normal: Floats, pull: Floats, seen: Floats) -> DesignPoints:
-    """Nearest first, each place once."""
+def _distinct(
+    problem: Problem, u: Floats, limit: Ints, normal: Floats, pull: Floats, seen: Floats, lost: Ints
+) -> DesignPoints:  # fmt: skip
+    """Nearest first, each place once; `lost` are limits that no sample keeps."""
     order = np.argsort((u * normal).sum(axis=0), kind="stable")
     kept: list[int] = []
     for k in order.tolist():
@@ -170,7 +176,8 @@ def _distinct(problem: Problem, u: Floats, limit: Ints, normal: Floats, pull: Fl
             break
         if not any(_alike(problem, u[:, k], u[:, j]) and _along(normal[:, k], normal[:, j]) for j in kept):
             kept.append(k)
-    return DesignPoints(u.T[kept], limit[kept], normal.T[kept], pull[kept], seen)
+    always = bool(np.setdiff1d(lost, limit[kept]).size)
+    return DesignPoints(u.T[kept], limit[kept], normal.T[kept], pull[kept], seen, always)
 
 
 def _along(one: Floats, other: Floats) -> bool:

@@ -8,6 +8,7 @@ from importlib import import_module
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.problem import Estimate
+from mechdesign.analyses.reliability.question import ReliabilityQuestion
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Floats
@@ -29,17 +30,21 @@ def normal(name: str, task: Task, mean: Floats, covariance: Floats) -> MethodRes
 
     No interval is claimed.
     """
-    question, found = task.question, MethodResult(name, normal=(mean, covariance))
-    if question.limited:
-        # SciPy takes a quarter of a second to import, and a study without limits does not need it.
-        from mechdesign.analyses.reliability.probability import failure_probability
-
-        rows = np.flatnonzero(task.assembled)
-        values = failure_probability(covariance[rows], question.bands, question.discs, mean.T[rows])
-        found.estimates.update({
-            pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)
-        })  # fmt: skip
+    found = MethodResult(name, normal=(mean, covariance))
+    if task.question.limited:
+        found.estimates.update(of_normal(task, task.question, mean, covariance))
     return found
+
+
+def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covariance: Floats) -> dict[int, Estimate]:
+    """Estimates by pose from normal errors, as of `normal`, for the limits of a question about the task's channels."""
+    # SciPy takes a quarter of a second to import, and a study without limits does not need it.
+    from mechdesign.analyses.reliability.probability import failure_probability
+
+    rows = np.flatnonzero(task.assembled)
+    bands = question.at(task.nominal[:, rows]).bands
+    values = failure_probability(covariance[rows], bands, question.discs, mean.T[rows])
+    return {pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)}
 
 
 def pose_by_pose(name: str, task: Task, work: Callable[[Setting], MethodResult]) -> MethodResult:

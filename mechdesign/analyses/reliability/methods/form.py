@@ -59,9 +59,9 @@ def form(problem: Problem, points: DesignPoints) -> Estimate:
     """Probability that any tangent half-space is entered.
 
     Where no design point was found nothing breaks a limit within reach, and the value is 0; nan if samples fail all the
-    same, for example by limits that nothing random moves.
+    same, or all of them by one of the limits, for example by one that nothing random moves.
     """
-    if not len(points.u) and points.seen.shape[1]:
+    if points.always or (not len(points.u) and points.seen.shape[1]):
         return Estimate(math.nan, math.nan, math.nan, problem.evaluations)
     if len(points.u) and len(problem.circles):
         value = _mean(problem, points)

@@ -23,7 +23,7 @@ def prepare(study: Study) -> Evaluate:
     """
     from mechdesign.analyses.kinematics.rates import constant_rates, of_given
     from mechdesign.analyses.reliability.deflection import elasticity
-    from mechdesign.analyses.reliability.first_order import linear_errors
+    from mechdesign.analyses.reliability.first_order import linear_errors, nominal_values
     from mechdesign.analyses.reliability.probability import failure_probability
     from mechdesign.analyses.reliability.question import ask
     from mechdesign.analyses.reliability.sources import find_sources
@@ -43,7 +43,8 @@ def prepare(study: Study) -> Evaluate:
     def evaluate(configuration: Configuration) -> Floats:
         elastic = None if bent is None else bent.at(configuration, question.channels)
         linear = linear_errors(mechanism, configuration, question.channels, sources, rates, elastic)
-        return 1.0 - failure_probability(linear.covariance(), question.bands, question.discs, linear.shift().T)
+        bands = question.at(nominal_values(mechanism, configuration, question.channels, rates)).bands
+        return 1.0 - failure_probability(linear.covariance(), bands, question.discs, linear.shift().T)
 
     return of_configurations(evaluate)
 

@@ -30,7 +30,7 @@ def figures(study: Study, result: Result) -> Gallery:
     swept, over = along(study, poses), plane(study, poses)
     found = Gallery()
     if swept is not None:
-        found.add("of errors along the motion", sweep_figures, study, tables["moments"], swept)
+        found.add("of errors along the motion", sweep_figures, study, tables, swept)
     if over is not None:
         found.add("of errors over the poses", map_figures, study, result, over)
     few = poses.listed or (over is None and poses.count <= MAX_LISTED)

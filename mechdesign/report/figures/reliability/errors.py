@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,6 @@ from mechdesign.report.figures.panels import (
     title,
 )
 from mechdesign.report.figures.reliability.looks import (
-    apart,
     best_moments,
     best_probability,
     channels,
@@ -60,9 +59,9 @@ _MAX_LINEAR_RATIO = 8.0
 Legend = dict[str, Any]
 
 
-def sweep_figures(study: Study, moments: Table, swept: Along) -> dict[str, Figure]:
+def sweep_figures(study: Study, tables: Mapping[str, Table], swept: Along) -> dict[str, Figure]:
     """Bands of the errors, means, standard deviations and the methods' difference over the sweep [S3, Figs. 5 to 7]."""
-    found = {"bands": _bands(study, moments, swept)}
+    moments, found = tables["moments"], {"bands": _bands(study, tables, swept)}
     for name, column, what in (("means", "mean", "Mean"), ("deviations", "sigma", "Standard deviation")):
         found[name] = _curves(moments, swept, column, f"{what} of made mechanisms")
     reference, computed = best_moments(moments), [m for m in methods(moments) if not look(m).sampled]
@@ -71,8 +70,9 @@ def sweep_figures(study: Study, moments: Table, swept: Along) -> dict[str, Figur
     return found
 
 
-def _bands(study: Study, moments: Table, swept: Along) -> Figure:
+def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
     """Mean error and three standard deviations to both sides: computed ones as a band, simulated ones as dots."""
+    moments = tables["moments"]
     shown = channels(moments)[:MAX_PANELS]
     known = methods(moments)
     figure, axes = stack(len(shown), "Errors of made mechanisms: mean \N{PLUS-MINUS SIGN} 3 standard deviations",
@@ -95,13 +95,17 @@ def _bands(study: Study, moments: Table, swept: Along) -> Figure:
             for value in (mean - reach, mean, mean + reach):
                 (entries[drawn.words],) = axis.plot(swept.values, value, linewidth=1.2, markersize=2.8, **_line(drawn))
         reach = _FAR_FROM_ERRORS * np.abs(axis.get_ylim()).max()
-        near, far = apart(error_limits(study, output, order), -reach, reach)
-        for limit in near:
-            entries["limit of the error"] = axis.axhline(
-                limit, color=style.VERMILION, linestyle=(0, (5, 2)), linewidth=1.4
-            )
+        far = []
+        for limit in np.broadcast_to(error_limits(study, tables, output, order), (2, len(swept.values))):
+            near = np.where(np.abs(limit) < reach, limit, np.nan)
+            if np.isfinite(near).any():
+                (entries["limit of the error"],) = axis.plot(
+                    swept.values, near, color=style.VERMILION, linestyle=(0, (5, 2)), linewidth=1.4
+                )
+            elif len(beyond := limit[np.isfinite(limit)]):
+                far.append(" to ".join(dict.fromkeys(f"{end:+g}" for end in (beyond.min(), beyond.max()))))
         if far:
-            told = f"limit {', '.join(f'{limit:+g}' for limit in far)} {unit}, outside"
+            told = f"limit {', '.join(far)} {unit}, outside"
             axis.set_title(told, loc="right", fontsize=8, color=style.VERMILION)
         axis.set_ylabel(style.axis_label("error", unit))
         axis.set_title(heading(output, order), loc="left", fontsize=9.5)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.analyses.reliability.first_order import ORDERS
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -65,16 +66,24 @@ def heading(output: str, order: str) -> str:
     return output if order == "position" else f"{output} {order}"
 
 
-def error_limits(study: Study, output: str, order: str) -> tuple[float, float]:
-    """Lowest and highest error allowed (study units), of a coordinate or by the circle about its point; inf if none."""
+def error_limits(study: Study, tables: Mapping[str, Table], output: str, order: str) -> Floats:
+    """Lowest and highest error allowed (study units) of a coordinate, or by the circle about its point; inf if none.
+
+    Shape (2, poses), or (2, 1) where they are those of all poses.
+    """
     section = study.reliability
     assert section is not None
     band = section.limits.get(f"{output}{SUFFIXES[order]}")
+    if band is not None and band.absolute:
+        table = tables["capability"]
+        own = table.take(table.where(output=output, order=order, method=table["method"][0]))
+        ends = np.stack([own["lsl"], own["usl"]]) - own["nominal"]
+        return np.where(np.isnan(ends), [[-np.inf], [np.inf]], ends)
     if band is not None:
-        return (-np.inf if band.min is None else band.min, np.inf if band.max is None else band.max)
+        return np.array([[-np.inf if band.min is None else band.min], [np.inf if band.max is None else band.max]])
     circle = section.limits.get(f"{output.rpartition('.')[0]}{SUFFIXES[order]}")
     radius = np.inf if circle is None or circle.radius is None else circle.radius
-    return -radius, radius
+    return np.array([[-radius], [radius]])
 
 
 def apart(limits: tuple[float, float], low: float, high: float) -> tuple[list[float], list[float]]:

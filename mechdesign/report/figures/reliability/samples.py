@@ -24,7 +24,6 @@ from mechdesign.report.figures.reliability.looks import (
     methods,
 )
 from mechdesign.results import Table
-from mechdesign.study import Study
 
 # A limit farther out than this, in widths of the histogram or of the density, is named and not drawn.
 _FAR_FROM_HISTOGRAM = 0.6
@@ -54,7 +53,7 @@ def histogram_figure(given: Sampled) -> Figure:
         rows = table.where(output=output, order=order, unit=unit)
         samples = max(samples, int(table["count"][rows].sum()))
         _histogram(axis, table, rows, entries)
-        _limits(given.study, axis, output, order, unit, entries)
+        _limits(given, axis, output, order, unit, entries)
         axis.set_title(heading(output, order), loc="left", fontsize=9.5)
         axis.set_xlabel(style.axis_label("error", unit))
         axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}"))
@@ -75,11 +74,11 @@ def _histogram(axis: Axes, table: Table, rows: np.ndarray, entries: dict[str, An
     entries |= {"made mechanisms": bars, "normal, same mean and deviation": fit}
 
 
-def _limits(study: Study, axis: Axes, output: str, order: str, unit: str, entries: dict[str, Any]) -> None:
+def _limits(given: Sampled, axis: Axes, output: str, order: str, unit: str, entries: dict[str, Any]) -> None:
     low, high = axis.get_xlim()
     span = high - low
     reach = _FAR_FROM_HISTOGRAM * span
-    near, far = apart(error_limits(study, output, order), low - reach, high + reach)
+    near, far = apart(_at_pose(given, output, order), low - reach, high + reach)
     for limit in near:
         entries["limit of the error"] = axis.axvline(limit, color=style.VERMILION, linestyle=_DASHED)
     ends = [low, high, *(limit + side for limit in near for side in (-0.03 * span, 0.03 * span))]
@@ -89,6 +88,13 @@ def _limits(study: Study, axis: Axes, output: str, order: str, unit: str, entrie
         told = ", ".join(f"{limit:+g}" for limit in far)
         axis.text(0.99, 0.98, f"limit {told} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
                   fontsize=8, color=style.VERMILION)  # fmt: skip
+
+
+def _at_pose(given: Sampled, output: str, order: str) -> tuple[float, float]:
+    """Lowest and highest error allowed at the pose."""
+    ends = error_limits(given.study, given.tables, output, order)
+    low, high = ends[:, given.pose if ends.shape[1] > 1 else 0].tolist()
+    return low, high
 
 
 def convergence_figure(given: Sampled) -> Figure:
@@ -183,7 +189,7 @@ def density_figures(given: Sampled) -> dict[str, Figure]:
     (output, order), section = shown[0], study.reliability
     assert section is not None
     circle = section.limits.get(f"{output.rpartition('.')[0]}{SUFFIXES[order]}")
-    bands = error_limits(study, *shown[0]), error_limits(study, *shown[1])
+    bands = _at_pose(given, *shown[0]), _at_pose(given, *shown[1])
     return {
         "density_contours": _contours(x, y, densities, labels, given.where, bands, circle.radius if circle else None),
         "density": _surfaces(x, y, densities, labels, given.where),
