@@ -22,6 +22,11 @@ from mechdesign.numerics.roots import dips
 # Rays from a shape's centre to places spread along its outline, and the fewest to a side of a rectangle.
 RAYS = 120
 SIDE_RAYS = 6
+# Places of the outline that are looked at in the end, and those along the way to one; and the part of its size by which
+# the outline is drawn inwards for that.
+CHECKED = 720
+CHECKED_ALONG = 101
+TOUCHING = 1e-7
 # Contacts: the lowest local minima of the scales that rays allow, so many at most; and steps to the place of those that
 # are no more than so many times the lowest.
 CONTACTS = 6
@@ -69,19 +74,14 @@ class Shape:
         size = f"circle {self.width / 2:g}" if self.round else f"rectangle {self.width:g} x {self.height:g}"
         return size if self.centre is None else f"{size} at ({self.centre.real:g}, {self.centre.imag:g})"
 
-    @property
-    def directions(self) -> Floats:
+    def directions(self, number: int = RAYS) -> Floats:
         """Directions from the centre to places spread along the outline (radians in [0, 2 pi), ascending)."""
         if self.round:
-            return 2 * np.pi * np.arange(RAYS) / RAYS
-        sides = [
-            max(SIDE_RAYS, round(RAYS * size / (2 * (self.width + self.height)))) for size in (self.width, self.height)
-        ]
-        x, y = (
-            0.5 * size * np.linspace(-1, 1, count + 1)
-            for size, count in zip((self.width, self.height), sides, strict=True)
-        )
-        around = np.concatenate([x - 0.5j * self.height, x + 0.5j * self.height, 1j * y - x[-1], 1j * y + x[-1]])
+            return 2 * np.pi * np.arange(number) / number
+        sides, girth = np.array([self.width, self.height]), 2 * (self.width + self.height)
+        counts = np.maximum(SIDE_RAYS, np.round(number * sides / girth)).astype(int) + 1
+        x, y = (np.linspace(-side / 2, side / 2, count) for side, count in zip(sides, counts, strict=True))
+        around = np.concatenate([x + 1j * y[0], x + 1j * y[-1], x[0] + 1j * y, x[-1] + 1j * y])
         return np.unique(np.angle(around) % (2 * np.pi))
 
     @property
@@ -120,8 +120,9 @@ def fitting_scale(shape: Shape, panels: Panels) -> tuple[Floats, Complexes]:
     Both are of shape (designs,). The factor is 1 or more where the region holds the shape. Negative values say how far
     the centre lies outside: the shape, scaled so, would just touch the region. It is nan where the region is empty.
 
-    It is judged on rays from the centre through 120 places of the outline, the corners among them, and at the lowest
-    place of every margin: a notch, or one of several holes, that lies between two rays may be overlooked.
+    It is judged on rays from the centre through 120 places of the outline, at the lowest place of every margin and, in
+    the end, at 720 places of the outline. One of several holes that lies between two rays may be overlooked, and a
+    notch that ends between two of those places.
     """
     some, count = np.flatnonzero(panels.closes), len(panels.closes)
     found = np.full(count, np.nan)
@@ -129,13 +130,15 @@ def fitting_scale(shape: Shape, panels: Panels) -> tuple[Floats, Complexes]:
     if not some.size:
         return found, centres
     if shape.centre is not None:
-        found[some] = _View(shape, panels, some, centres[some]).scale
+        found[some] = _View(shape, panels, some, centres[some]).checked()
         return found, centres
     lane, centre = _beginnings(shape, panels, some)
     centre, scale = _largest(shape, panels, lane, centre)
     # Of several values of one design the last assigned is the largest.
     order = np.argsort(scale, kind="stable")
-    found[lane[order]], centres[lane[order]] = scale[order], centre[order]
+    centres[lane[order]] = centre[order]
+    some = np.unique(lane)
+    found[some] = _View(shape, panels, some, centres[some]).checked()
     return found, centres
 
 
@@ -153,7 +156,7 @@ class _View:
         self._reach = np.abs(centre - every.about) + panels.reach[design]
         _, found, inside = panels.through(design, centre)
         self._inside = np.bincount(found.ray[inside], minlength=len(design)) > 0
-        theta = shape.directions
+        theta = shape.directions()
         lanes, n = np.arange(len(design)), len(theta)
         scales = self.at(np.tile(lanes, n), np.repeat(theta, len(lanes))).reshape(n, -1)
         low = (scales <= np.roll(scales, 1, axis=0)) & (scales <= np.roll(scales, -1, axis=0)) & np.isfinite(scales)
@@ -210,6 +213,20 @@ class _View:
         more[0][:, 0, lane] = angles
         more[1][:, 0, lane] = self.at(np.tile(lane, 3), angles.ravel()).reshape(3, -1)
         return np.concatenate([theta, more[0]], axis=1), np.concatenate([scales, more[1]], axis=1)
+
+    def checked(self) -> Floats:
+        """The scale, or less where a place of the outline between two rays lies outside."""
+        theta, scale, lanes = self._shape.directions(CHECKED), self.scale.copy(), np.arange(len(self._centre))
+        outline = (1 - TOUCHING) * scale * (self._shape.radius(theta) * np.exp(1j * theta))[:, None]
+        place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
+        found = self.at(lane, theta[place])
+        # Where a ray leaves the region and comes back between two of its samples, places along it tell.
+        passed = np.flatnonzero(found >= scale[lane])
+        along = np.linspace(0, 1, CHECKED_ALONG)[:, None] * outline[place, lane][passed]
+        first = self._designs.inside(self._centre[lane[passed]] + along, lane[passed]).argmin(axis=0)
+        found[passed] = scale[lane[passed]] * np.maximum(first - 1, 0) / (CHECKED_ALONG - 1)
+        np.minimum.at(scale, lane, found)
+        return scale
 
     def at(self, lane: Ints, theta: Floats) -> Floats:
         """Scales at which the outline passes through the ends of rays; from outside, where they enter the region."""
@@ -284,8 +301,8 @@ def _beginnings(shape: Shape, panels: Panels, some: Ints) -> tuple[Ints, Complex
         z = within[:, mine].ravel()
         room = shape.scale_at(ends[:, mine].ravel() - z[:, None]).min(axis=1, initial=np.inf)
         if not is_turn(designs.scan):
-            _, end = _within_scan(designs, z[:, None], shape.directions)
-            room = np.minimum(room, (end / shape.radius(shape.directions)).min(axis=1))
+            _, end = _within_scan(designs, z[:, None], shape.directions())
+            room = np.minimum(room, (end / shape.radius(shape.directions())).min(axis=1))
         for _ in range(TRIALS if room.size else 0):
             best = int(room.argmax())
             lanes.append(k)
