@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 from matplotlib.figure import Figure
+from matplotlib.patches import StepPatch
 from matplotlib.path import Path as Outline
 
 import mechdesign
@@ -167,10 +168,15 @@ def test_velocities_have_panels_and_limits_of_their_own() -> None:
     assert set(limits[1][0].get_ydata()) == {0.3}
 
 
+def steps(axes):
+    """Heights and edges of the histograms of a panel."""
+    return [patch.get_data()[:2] for patch in axes.patches if isinstance(patch, StepPatch)]
+
+
 def test_histogram_shows_every_sample_its_failures_and_the_limits() -> None:
     found, result = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]")
     for axes in found["histogram"].axes:
-        every, failed = (np.array([bar.get_width() * bar.get_height() for bar in bars]) for bars in axes.containers)
+        every, failed = (heights * np.diff(edges) for heights, edges in steps(axes))
         assert every.sum() == pytest.approx(1.0, abs=2e-3)
         failure = result.tables["reliability"]["failure"].max()
         assert failed.sum() == pytest.approx(failure, abs=2e-3)
@@ -205,11 +211,10 @@ def test_a_circle_limits_a_distance_not_the_coordinates() -> None:
     assert [axis.get_title(loc="left") for axis in axes[:3]] == ["P: distance from no error", "P.x", "P.y"]
     limits = [[line.get_xdata()[0] for line in axis.lines if line.get_color() == style.VERMILION] for axis in axes[:3]]
     assert limits == [[0.25], [], []]
-    every, failed = axes[0].containers
-    assert all(bar.get_height() == 0 for bar in failed if bar.get_x() + bar.get_width() <= 0.25)
-    assert [bar.get_height() for bar in failed if bar.get_x() > 0.25] == [
-        bar.get_height() for bar in every if bar.get_x() > 0.25
-    ]
+    (every, edges), (failed, _) = steps(axes[0])
+    assert not failed[edges[1:] <= 0.25].any()
+    assert failed[edges[:-1] > 0.25].tolist() == every[edges[:-1] > 0.25].tolist()
+    assert failed.any()
 
 
 def test_estimate_stands_beside_the_other_methods() -> None:

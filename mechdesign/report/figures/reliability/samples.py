@@ -108,8 +108,7 @@ def _histogram(axis: Axes, shown: _Histogram, entries: dict[str, Any], *, logari
         ("made mechanisms", shown.counts, style.SKY), ("of these those that fail", shown.failed, style.VERMILION),
     ):  # fmt: skip
         if counts.any():
-            entries[words] = axis.bar(edges[:-1], one * counts, width, align="edge", color=color, edgecolor="white",
-                                      linewidth=0.3)  # fmt: skip
+            entries[words] = axis.stairs(one * counts, edges, fill=True, color=color)
     top = one * shown.counts.max()
     if shown.normal is not None:
         (entries["normal, same mean and deviation"],) = axis.plot(middle, shown.normal, color=style.BLUE, linewidth=1.8)
