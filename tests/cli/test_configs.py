@@ -9,8 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers.pages import faults
+from matplotlib.figure import Figure
 
 from mechdesign.errors import MechdesignError
+from mechdesign.report.figures import style
 from mechdesign.study import load, template_path, templates
 
 ROOT = Path(__file__).parents[2]
@@ -35,6 +38,21 @@ def fewer_designs(config: Path) -> Iterator[str]:
             yield f"optimize.variables.{name}.step={5 * variable.step}"
 
 
+@pytest.fixture
+def judged_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A picture with text over text or off the page, or with places on unequal axes, fails as it is drawn."""
+    encoded = style.encoded
+
+    def judged(figure: Figure, kind: str = "png") -> bytes:
+        data = encoded(figure, kind)
+        wrong = list(faults(figure))
+        assert not wrong, "; ".join(wrong)
+        return data
+
+    monkeypatch.setattr(style, "encoded", judged)
+
+
+@pytest.mark.usefixtures("judged_pages")
 @pytest.mark.parametrize("config", CONFIGS, ids=named)
 def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, invoke) -> None:
     fewer = [word for override in fewer_designs(config) for word in ("--set", override)]
@@ -45,7 +63,7 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
         folder = tmp_path / command
         manifest = json.loads((folder / "manifest.json").read_text())
         assert not manifest["failed"]
-        assert not any("could not be drawn" in warning for warning in manifest["warnings"])
+        assert not [warning for warning in manifest["warnings"] if "could not be drawn" in warning]
         files = {path.name for path in folder.iterdir()}
         assert files == {*manifest["files"], "manifest.json"}
         assert "mechanism.png" in files

@@ -22,14 +22,16 @@ def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float]]:
     # Tick labels beyond the limits of their axis are there, but not drawn.
     hidden: set[Text] = set()
     for axis in (axis for axes in figure.axes for axis in axes._axis_map.values()):
-        seen = set(axis._update_ticks()) if axis.axes.get_visible() else set()
+        # In space Matplotlib moves the labels of ticks as it draws them, and back.
+        seen = set(axis._update_ticks()) if axis.axes.get_visible() and axis.axes.name != "3d" else set()
         ticks = (*axis.get_major_ticks(), *axis.get_minor_ticks())
         hidden.update(label for tick in ticks if tick not in seen for label in (tick.label1, tick.label2))
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         if text in hidden or not text.get_visible() or not text.get_text().strip():
             continue
-        box = text.get_window_extent(renderer)
+        # Without the line that leads from a name to what it names.
+        box = Text.get_window_extent(text, renderer)
         if np.isfinite(box.extents).all():
             spare = LOOSE * min(box.width, box.height)
             box = Bbox.from_extents(box.x0, box.y0 + spare, box.x1, box.y1 - spare)

@@ -320,4 +320,4 @@ def simple_means(
             total[index, at] = (integrand.values(local) * weight).sum(axis=0)
     area = np.bincount(owner, sector, count)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.array([np.bincount(owner, row * sector, count) for row in total]) / area
+        return np.array([np.bincount(owner, row * sector, count) for row in total]).reshape(-1, count) / area

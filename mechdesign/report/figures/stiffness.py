@@ -37,6 +37,8 @@ _COIL_ORDER = 5.0
 _LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
 _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
 _ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
+# Points of type times letters that fill a line above the curves.
+_LONGEST_NOTE = 900.0
 _FLAT = 0.02  # part of its value by which a stiffness changes that is written, not drawn
 _TAIL = 0.04  # share of stiffnesses at either end of which ...
 _BEYOND = 10.0  # ... no more is drawn than this ratio beyond the others
@@ -237,8 +239,11 @@ def _curves(study: Study, result: Result) -> Figure | None:
         else:
             axis.set_ylim(0, 1.1 * high)
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    axes[0].set_title("Stiffness along the motion" + "; everywhere the same: " * bool(notes) + ", ".join(notes),
-                      loc="left", fontsize=10)  # fmt: skip
+    axes[0].set_title("Stiffness along the motion", loc="left", fontsize=10, pad=20 if notes else 6)
+    if notes:
+        words = f"everywhere the same: {', '.join(notes)}"
+        axes[0].annotate(words, (0, 1), (0, 6), "axes fraction", "offset points",
+                         fontsize=min(9.0, _LONGEST_NOTE / len(words)))  # fmt: skip
     axes[-1].set_xlabel(over.label)
     tick_abscissa(axes[-1], over)
     figure.align_ylabels(axes)

@@ -17,7 +17,7 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.colors import BoundaryNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from PIL import Image
 
 from mechdesign.numerics.arrays import Floats
@@ -108,6 +108,10 @@ def page(
 def color_bar(figure: Figure, drawn: ScalarMappable, label: str = "", **options: Any) -> Colorbar:
     """A bar of colours without a frame."""
     bar = figure.colorbar(drawn, **options)
+    if isinstance(bar.formatter, ScalarFormatter):
+        # Powers of ten stand above the bar: long numbers would push its name off the page.
+        bar.formatter = ScalarFormatter(useMathText=True)
+        bar.formatter.set_powerlimits((-3, 5))
     bar.set_label(label)
     bar.outline.set_visible(False)
     return bar
