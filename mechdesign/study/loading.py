@@ -157,10 +157,10 @@ def load(
         return load_bytes(text.encode() if isinstance(text, str) else text, None, overrides, seed)
     if isinstance(source, Mapping):
         data = _plain_data(source, "the study")
-        document = Document("", data, values={(): Mark("")})
-        override(document, _texts(overrides))
+        document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
+        override(document, changes)
         sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-        return load_document(document, None, b"", sha256, _texts(overrides), seed)
+        return load_document(document, None, b"", sha256, changes, seed)
     assert source is not None
     file = pathlib.Path(source)
     try:
@@ -178,10 +178,10 @@ def load_bytes(
     seed: int | None = None,
 ) -> Study:
     """Load a study from the bytes of a file; see `load`."""
-    document = read(content, str(path or _TEXT))
-    override(document, _texts(overrides))
+    document, changes = read(content, str(path or _TEXT)), _texts(overrides)
+    override(document, changes)
     sha256 = hashlib.sha256(content).hexdigest()
-    return load_document(document, path, content, sha256, _texts(overrides), seed)
+    return load_document(document, path, content, sha256, changes, seed)
 
 
 def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:

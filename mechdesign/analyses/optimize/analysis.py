@@ -285,9 +285,10 @@ def drawn_design(designs: Designs, numbers: Mapping[str, float]) -> tuple[Study,
         plain = dataclasses.replace(made, workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:
-            shapes = [each.shape for each in designs.conditions if each.shape is not None]
-            panels = answer(questions(plain, wanted=("area",))[0], {}, 1, SINGLE).panels
-            contained = [(shape, complex(fitting_scale(shape, panels)[1][0])) for shape in shapes]
+            contained = []
+            if shapes := [each.shape for each in designs.conditions if each.shape is not None]:
+                panels = answer(questions(plain, wanted=("area",))[0], {}, 1, SINGLE).panels
+                contained = [(shape, complex(fitting_scale(shape, panels)[1][0])) for shape in shapes]
             return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
     with suppress(MechdesignError):
         if any(each.command == "kinematics" for each in designs.goals):
