@@ -22,7 +22,7 @@ from mechdesign.analyses.reliability.laws import (
 )
 from mechdesign.analyses.reliability.simulation import generator
 from mechdesign.errors import StudyError
-from mechdesign.study.schema.reliability import DISTRIBUTIONS, Dimension
+from mechdesign.study.schema.variation import DISTRIBUTIONS, Dimension
 
 SAMPLES = 200_000
 LAWS: dict[str, Marginal] = {

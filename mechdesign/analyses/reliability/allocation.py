@@ -31,7 +31,8 @@ from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import Clearance, Dimension, Precision, ReliabilitySection
+from mechdesign.study.schema.reliability import Precision, ReliabilitySection
+from mechdesign.study.schema.variation import Clearance, Dimension
 from mechdesign.study.text.document import plain
 from mechdesign.study.variants import rewritten
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
-from mechdesign.study.schema.reliability import Dimension
+from mechdesign.study.schema.variation import Dimension
 
 # A tolerance is three standard deviations of a normal law, which `truncated_normal` is cut at [S2, eq. 5].
 SIGMAS = 3.0
