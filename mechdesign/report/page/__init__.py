@@ -1,0 +1,1 @@
+"""One HTML file that shows a whole study: in words, in pictures, in tables, and moving."""
