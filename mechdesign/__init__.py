@@ -17,24 +17,23 @@ from typing import TYPE_CHECKING, Any
 from mechdesign.commands import COMMANDS
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.kinematics.analysis import kinematics as kinematics
-    from mechdesign.analyses.optimize.analysis import optimize as optimize
-    from mechdesign.analyses.reliability.analysis import reliability as reliability
-    from mechdesign.analyses.stiffness.analysis import stiffness as stiffness
-    from mechdesign.analyses.workspace.analysis import workspace as workspace
+    from mechdesign.door.questions import kinematics as kinematics
+    from mechdesign.door.questions import load as load
+    from mechdesign.door.questions import optimize as optimize
+    from mechdesign.door.questions import reliability as reliability
+    from mechdesign.door.questions import stiffness as stiffness
+    from mechdesign.door.questions import workspace as workspace
     from mechdesign.errors import AssemblyError as AssemblyError
     from mechdesign.errors import MechdesignError as MechdesignError
     from mechdesign.errors import StudyError as StudyError
     from mechdesign.report.requirements import requirements as requirements
-    from mechdesign.study import load as load
 
     __version__: str
 
 _HOMES = {
     **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
-    "load": "mechdesign.study",
     "requirements": "mechdesign.report.requirements",
-    **{name: command.module for name, command in COMMANDS.items()},
+    **dict.fromkeys(("load", *COMMANDS), "mechdesign.door.questions"),
 }
 __all__ = sorted((*_HOMES, "__version__"))
 
