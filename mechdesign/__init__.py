@@ -1,10 +1,18 @@
 """Design studies of planar mechanisms: one description, four questions.
 
 >>> import mechdesign
->>> study = mechdesign.load("study.yaml", overrides={"reliability.samples": 1000})  # doctest: +SKIP
->>> result = mechdesign.reliability(study, seed=1)  # doctest: +SKIP
->>> result.tables["moments"]["sigma"]  # doctest: +SKIP
->>> mechdesign.requirements(study, result)  # doctest: +SKIP
+>>> from mechdesign.study import template_path
+>>> study = mechdesign.load(template_path("four_bar"), overrides={"mechanism.links.rocker.2": 65})
+>>> result = mechdesign.kinematics(study)
+>>> result
+<kinematics of 'four_bar': How does it move?
+  motion (73 rows), extremes (4 rows), limits (0 rows), loops (1 row), toggles (2 rows)
+  no warnings>
+>>> result.tables["extremes"]["range"].round(3)
+array([54.   , 27.547, 55.587, 62.41 ])
+
+In a notebook a study and a result show themselves; ``result.figure("paths")`` is one of its pictures, `figures` their
+names, `verdicts` what is met of what the study requires, and ``result.save("folder")`` writes what the command writes.
 
 The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics.
 """

@@ -39,7 +39,8 @@ class Column:
 class Table:
     """Columns of equal length; ``table["sigma"]`` is the NumPy array.
 
-    Iteration gives its rows as dictionaries, so that ``pandas.DataFrame(table)`` is the same table.
+    Iteration gives its rows as dictionaries, so that ``pandas.DataFrame(table)`` is the same table; `to_pandas` has its
+    units as well. Polars takes ``polars.DataFrame(table.to_dict())``.
     """
 
     name: str

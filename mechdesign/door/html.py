@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jinja2 import Environment, PackageLoader
+from numpy.typing import NDArray
 
 from mechdesign.commands import COMMANDS
 from mechdesign.mechanism.diagnosis import joints_in_words
@@ -23,6 +25,7 @@ from mechdesign.study import Study
 ROWS = 6
 COLUMNS = 8
 _DIGITS = 6  # significant digits of its numbers
+_ROUNDING = 1e-13  # of a column's largest number: what is less is no more than rounding
 _ENTRIES = 40  # of a list, such as links or warnings
 _LETTERS = 200  # of a text in it
 # Bytes of a PNG that stands in the page; a larger one is left to `Answer.figure`.
@@ -122,9 +125,18 @@ def _drive(drive: Drive) -> str:
     return f"{drive.name} ({drive.kind} of {drive.target}{reference})"
 
 
+def _rounded(values: NDArray[Any]) -> NDArray[Any]:
+    """Numbers of a column without those that would be zero but for rounding."""
+    if values.dtype.kind != "f":
+        return values
+    largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
+    return np.where(np.abs(values) <= _ROUNDING * largest, 0.0, values)
+
+
 def _beginning(table: Table) -> _Beginning:
     columns = table.columns[:COLUMNS]
-    shown = Table(table.name, columns).take(np.arange(min(ROWS, len(table))))
+    some = np.arange(min(ROWS, len(table)))
+    shown = Table(table.name, tuple(replace(column, values=_rounded(column.values)[some]) for column in columns))
     left = []
     if len(table) > ROWS:
         left.append(f"{len(table) - ROWS:,} more rows")
