@@ -13,19 +13,21 @@ from jinja2 import Environment, PackageLoader
 from numpy.typing import NDArray
 
 from mechdesign.commands import COMMANDS
+from mechdesign.errors import counted
 from mechdesign.mechanism.diagnosis import joints_in_words
 from mechdesign.mechanism.model import Drive, Link
 from mechdesign.report.figures.style import printed
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import cells
-from mechdesign.results import Result, Table
+from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
 # Of the main table, shown in a cell.
 ROWS = 6
 COLUMNS = 8
+_UNIT = "unit"  # column that says the unit of each row
 _DIGITS = 6  # significant digits of its numbers
-_ROUNDING = 1e-13  # of a column's largest number: what is less is no more than rounding
+_ROUNDING = 1e-13  # of the largest number of that unit: what is less is no more than rounding
 _ENTRIES = 40  # of a list, such as links or warnings
 _LETTERS = 200  # of a text in it
 # Bytes of a PNG that stands in the page; a larger one is left to `Answer.figure`.
@@ -55,10 +57,19 @@ def study_html(study: Study, picture: bytes | None) -> str:
     return _render("study.html.j2", name=study.name, facts=facts, warnings=warnings, picture=_inline(picture))
 
 
-def answer_html(study: Study, answer: Result, verdicts: Sequence[Verdict] | str, picture: bytes | None) -> str:
+def answer_html(
+    study: Study, answer: Result, verdicts: Sequence[Verdict] | str, figures: Sequence[str], picture: bytes | None
+) -> str:
     """An answer: what was asked, whether it will do, its first picture, how its main table begins, what else it has.
 
-    Instead of verdicts, why there are none.
+    Parameters
+    ----------
+    verdicts : sequence of Verdict, or str
+        Or why there are none.
+    figures : sequence of str
+        Names of its pictures.
+    picture : bytes
+        The first of them, a PNG.
     """
     main, *others = answer.tables.values() or (None,)
     return _render(
@@ -75,7 +86,7 @@ def answer_html(study: Study, answer: Result, verdicts: Sequence[Verdict] | str,
         table=main,
         beginning=None if main is None else _beginning(main),
         others=others,
-        files=list(answer.files),
+        also={"pictures": figures, "files": list(answer.files)},
     )
 
 
@@ -125,22 +136,31 @@ def _drive(drive: Drive) -> str:
     return f"{drive.name} ({drive.kind} of {drive.target}{reference})"
 
 
-def _rounded(values: NDArray[Any]) -> NDArray[Any]:
-    """Numbers of a column without those that would be zero but for rounding."""
-    if values.dtype.kind != "f":
-        return values
-    largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
-    return np.where(np.abs(values) <= _ROUNDING * largest, 0.0, values)
+def _largest(*columns: Column, unit: str) -> float:
+    """The largest number of those columns that have a unit."""
+    floats = [column.values for column in columns if column.unit == unit and column.values.dtype.kind == "f"]
+    return max((float(np.max(np.abs(each), initial=0.0, where=np.isfinite(each))) for each in floats), default=0.0)
+
+
+def _rounded(column: Column, largest: float, rows: NDArray[Any]) -> Column:
+    """Some rows of a column without numbers that would be zero but for rounding."""
+    values = column.values[rows]
+    if values.dtype.kind == "f" and column.unit:
+        values = np.where(np.abs(values) <= _ROUNDING * largest, 0.0, values)
+    return replace(column, values=values)
 
 
 def _beginning(table: Table) -> _Beginning:
-    columns = table.columns[:COLUMNS]
+    # The units of rows of several quantities are never left out.
+    first = [column for column in table.columns if column.name != _UNIT][: COLUMNS - (_UNIT in table)]
+    columns = [column for column in table.columns if column in first or column.name == _UNIT]
     some = np.arange(min(ROWS, len(table)))
-    shown = Table(table.name, tuple(replace(column, values=_rounded(column.values)[some]) for column in columns))
+    largest = {column.unit: _largest(*table.columns, unit=column.unit) for column in columns}
+    shown = Table(table.name, tuple(_rounded(column, largest[column.unit], some) for column in columns))
     left = []
     if len(table) > ROWS:
-        left.append(f"{len(table) - ROWS:,} more rows")
-    if len(table.columns) > COLUMNS:
-        left.append(f"{len(table.columns) - COLUMNS} more columns ({', '.join(table.names[COLUMNS:])})")
+        left.append(counted(len(table) - ROWS, "more row"))
+    if more := [column.name for column in table.columns if column not in columns]:
+        left.append(f"{counted(len(more), 'more column')} ({', '.join(more)})")
     heads = [(column.name, printed(column.unit), column.meaning, column.numeric) for column in columns]
     return _Beginning(heads, [*zip(*cells(shown, _DIGITS), strict=True)], left)

@@ -87,10 +87,10 @@ class Answer(Result):
         """
         return () if self.interrupted else requirements(self.study, self)
 
-    @cached_property
+    @property
     def figures(self) -> tuple[str, ...]:
         """Names of its pictures, in the order in which they are best read."""
-        return tuple(self._drawn())
+        return self._seen[0]
 
     def figure(self, name: str) -> Figure:
         """One of its pictures, made anew and yours to change: Matplotlib's, in inches, without pyplot.
@@ -168,10 +168,10 @@ class Answer(Result):
     def _repr_html_(self) -> str:
         from mechdesign.door.html import answer_html
 
-        return answer_html(self.study, self, self._judged(), self._repr_png_())
+        return answer_html(self.study, self, self._judged(), *self._seen)
 
     def _repr_png_(self) -> bytes | None:
-        return self._picture
+        return self._seen[1]
 
     def _judged(self) -> tuple[Verdict, ...] | str:
         """The verdicts, or why there are none: what shows a result must not fail."""
@@ -181,18 +181,18 @@ class Answer(Result):
             return str(error)
 
     @cached_property
-    def _picture(self) -> bytes | None:
-        """The first of its pictures; None where there is none."""
+    def _seen(self) -> tuple[tuple[str, ...], bytes | None]:
+        """Names of its pictures, and the first of them as a PNG; None where there is none."""
         from mechdesign.report.figures import style
 
         drawn = self._drawn()
         for name, figure in drawn.items():
             try:
                 with style.context():
-                    return style.encoded(figure)
+                    return tuple(drawn), style.encoded(figure)
             except Exception as error:
                 _undrawn(name, error)
-        return None
+        return tuple(drawn), None
 
     def _drawn(self) -> Gallery:
         """All its pictures, and last the mechanism."""
@@ -200,7 +200,7 @@ class Answer(Result):
         from mechdesign.report.figures.mechanism import mechanism_figure
 
         with style.context():
-            drawn = writer.gallery(self.study, self)
+            drawn = writer.figures(self.study, self)
             drawn.add(writer.MECHANISM, mechanism_figure, self.study, self)
         return drawn
 

@@ -125,7 +125,7 @@ def sketch(study: Study) -> bytes:
         return style.encoded(sketch_figure(study), "png")
 
 
-def gallery(study: Study, result: Result) -> Gallery:
+def figures(study: Study, result: Result) -> Gallery:
     """Figures of a result's command by their names, and why others could not be made; use inside `style.context`."""
     from mechdesign.report.figures.rendering import Gallery
 
@@ -144,14 +144,14 @@ def pictures(
     from mechdesign.report.figures.rendering import Drawing, render
 
     with style.context():
-        figures = gallery(study, result)
+        gallery = figures(study, result)
 
         def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
             figure = make()
             return {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
 
         drawings: dict[str, Drawing] = {
-            f"{name}.{formats[0]}": partial(files, name, partial(figures.__getitem__, name)) for name in figures
+            f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
         }
         drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
         if animate:
@@ -159,7 +159,7 @@ def pictures(
 
             drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}
         drawn, failed = render(drawings)
-    warnings = [_undrawn(name, why) for name, why in (figures.failed | failed).items()]
+    warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":
         del drawn[ANIMATION]
         warnings.append("no animation: it needs a sweep of one coordinate or a path")

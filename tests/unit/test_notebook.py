@@ -159,12 +159,20 @@ def test_a_result_shows_what_is_met_and_how_its_main_table_begins() -> None:
     assert {"script", "style", "link"}.isdisjoint(tag for tag, _ in page.found)
     assert len(page.all("img")) == 1
     assert [verdict.met for verdict in result.verdicts] == [True, False]
-    begins = ("[mm]", "2 more columns", "extremes, 7 rows")
+    begins = ("[mm]", "2 more columns", "extremes, 7 rows", "pictures: motion, paths")
     for words in (HOSTILE, "How does it move?", "1 of 2 met", "✗ not met", *begins):
         assert words in page.text
     assert next(head["title"] for head in page.all("th") if "title" in head) == result.main.columns[0].meaning
     assert "e-1" not in page.text  # what is zero but for rounding
     assert "1 of 2 requirements met" in repr(result)
+
+
+def test_rows_of_several_quantities_show_their_units() -> None:
+    vary = {"dimensions": {"arm.length": 0.3}, "poses": [{"arm": 0}], "methods": ["analytic"]}
+    page = Page(mechdesign.reliability(mechdesign.load(ARM | {"reliability": vary}))._repr_html_())
+    assert "nominalmeansigmaunit" in page.text
+    assert "P.xposition1001000.1mm" in page.text
+    assert "4 more columns (worst_case, worst_low, worst_high, valid)" in page.text
 
 
 def test_a_requirement_that_names_nothing_does_not_keep_a_result_from_being_shown() -> None:
