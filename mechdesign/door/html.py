@@ -71,6 +71,9 @@ def answer_html(
     picture : bytes
         The first of them, a PNG.
     """
+    judged = () if isinstance(verdicts, str) else verdicts
+    # Of very many those that are not met are never left out.
+    shown = judged if len(judged) <= _ENTRIES else sorted(judged, key=lambda verdict: verdict.met)[:_ENTRIES]
     main, *others = answer.tables.values() or (None,)
     return _render(
         "answer.html.j2",
@@ -79,7 +82,9 @@ def answer_html(
         question=COMMANDS[answer.command].question,
         counts=[f"{what}: {count:,}" for what, count in answer.counts.items()],
         wrong=[text for text in (answer.interrupted, answer.failed) if text],
-        verdicts=() if isinstance(verdicts, str) else verdicts,
+        verdicts=shown,
+        met=sum(verdict.met for verdict in judged),
+        required=len(judged),
         unjudged=verdicts if isinstance(verdicts, str) else "",
         warnings=answer.warnings,
         picture=_inline(picture),
@@ -136,7 +141,7 @@ def _drive(drive: Drive) -> str:
     return f"{drive.name} ({drive.kind} of {drive.target}{reference})"
 
 
-def _largest(*columns: Column, unit: str) -> float:
+def _largest(columns: Sequence[Column], unit: str) -> float:
     """The largest number of those columns that have a unit."""
     floats = [column.values for column in columns if column.unit == unit and column.values.dtype.kind == "f"]
     return max((float(np.max(np.abs(each), initial=0.0, where=np.isfinite(each))) for each in floats), default=0.0)
@@ -155,7 +160,7 @@ def _beginning(table: Table) -> _Beginning:
     first = [column for column in table.columns if column.name != _UNIT][: COLUMNS - (_UNIT in table)]
     columns = [column for column in table.columns if column in first or column.name == _UNIT]
     some = np.arange(min(ROWS, len(table)))
-    largest = {column.unit: _largest(*table.columns, unit=column.unit) for column in columns}
+    largest = {column.unit: _largest(table.columns, column.unit) for column in columns}
     shown = Table(table.name, tuple(_rounded(column, largest[column.unit], some) for column in columns))
     left = []
     if len(table) > ROWS:

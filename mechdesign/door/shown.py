@@ -57,7 +57,7 @@ class ShownStudy(Study):
         try:
             return writer.sketch(self)
         except Exception as error:
-            _undrawn(writer.MECHANISM, error)
+            _undrawn(writer.MECHANISM, explain(error)[1])
             return None
 
 
@@ -155,12 +155,12 @@ class Answer(Result):
     def __repr__(self) -> str:
         lines = [f"<{self.command} of {shown(self.study.name)}: {COMMANDS[self.command].question}"]
         lines.append(", ".join(f"{name} ({counted(len(table), 'row')})" for name, table in self.tables.items()))
-        with_verdicts = self._judged()
-        if isinstance(with_verdicts, str):
-            lines.append(f"requirements: {with_verdicts}")
-        elif with_verdicts:
-            met = sum(verdict.met for verdict in with_verdicts)
-            lines.append(f"{met} of {counted(len(with_verdicts), 'requirement')} met")
+        judged = self._judged()
+        if isinstance(judged, str):
+            lines.append(f"requirements: {judged}")
+        elif judged:
+            met = sum(verdict.met for verdict in judged)
+            lines.append(f"{met} of {counted(len(judged), 'requirement')} met")
         lines += [text for text in (self.interrupted, self.failed) if text]
         lines.append(counted(len(self.warnings), "warning") if self.warnings else "no warnings")
         return "\n  ".join(lines) + ">"
@@ -186,25 +186,30 @@ class Answer(Result):
         from mechdesign.report.figures import style
 
         drawn = self._drawn()
+        for name, why in drawn.failed.items():
+            _undrawn(name, why)
         for name, figure in drawn.items():
             try:
                 with style.context():
                     return tuple(drawn), style.encoded(figure)
             except Exception as error:
-                _undrawn(name, error)
+                _undrawn(name, explain(error)[1])
         return tuple(drawn), None
 
     def _drawn(self) -> Gallery:
-        """All its pictures, and last the mechanism."""
+        """All its pictures, and last the mechanism; none of an interrupted computation."""
         from mechdesign.report.figures import style
         from mechdesign.report.figures.mechanism import mechanism_figure
+        from mechdesign.report.figures.rendering import Gallery
 
+        if self.interrupted:
+            return Gallery()
         with style.context():
             drawn = writer.figures(self.study, self)
             drawn.add(writer.MECHANISM, mechanism_figure, self.study, self)
         return drawn
 
 
-def _undrawn(name: str, error: Exception) -> None:
+def _undrawn(name: str, why: str) -> None:
     """Say that a picture could not be drawn."""
-    warnings.warn(f"picture {name} could not be drawn: {explain(error)[1]}", stacklevel=2)
+    warnings.warn(f"picture {name} could not be drawn: {why}", stacklevel=2)

@@ -167,6 +167,25 @@ def test_a_result_shows_what_is_met_and_how_its_main_table_begins() -> None:
     assert "1 of 2 requirements met" in repr(result)
 
 
+def test_of_many_requirements_those_that_are_not_met_are_shown() -> None:
+    asked = [{"result": "kinematics.B.x", "at_least": limit} for limit in [*range(60), 99]]
+    page = Page(mechdesign.kinematics(mechdesign.load(DATA | {"requirements": asked}))._repr_html_())
+    assert "at least 99" in page.text
+    assert "21 more requirements" in page.text
+
+
+def test_a_picture_that_fails_is_told_and_costs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*given):
+        raise ValueError("no ink")
+
+    monkeypatch.setattr("mechdesign.report.figures.kinematics.curves_figure", fail)
+    result = mechdesign.kinematics(mechdesign.load(DATA))
+    with pytest.warns(UserWarning, match=r"picture motion could not be drawn: .*no ink"):
+        assert result.figures == ("paths", "mechanism")
+    with pytest.raises(mechdesign.MechdesignError, match="no ink"):
+        result.figure("motion")
+
+
 def test_rows_of_several_quantities_show_their_units() -> None:
     vary = {"dimensions": {"arm.length": 0.3}, "poses": [{"arm": 0}], "methods": ["analytic"]}
     page = Page(mechdesign.reliability(mechdesign.load(ARM | {"reliability": vary}))._repr_html_())
@@ -254,6 +273,7 @@ def test_what_an_interrupted_question_found_is_an_answer(monkeypatch: pytest.Mon
     assert isinstance(found, Answer)
     assert (found.study.seed, found.verdicts) == (3, ())
     assert "3 of 5 poses" in Page(found._repr_html_()).text
+    assert found.figures == ()
     assert not list(found.save(tmp_path / "part").glob("*.png"))
 
 
