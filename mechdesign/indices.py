@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
@@ -12,8 +12,11 @@ FOLDER = "mechdesign.analyses.workspace.indices"
 USUAL = ("inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max")
 
 
-class _Names(Collection[str]):
-    """Names of the folder's files when they are asked for, the usual ones first; nothing is imported for them."""
+class _Names(Mapping[str, Any]):
+    """The folder's indices by name, the usual ones first; one is imported when it is asked for, none for its name."""
+
+    def __getitem__(self, name: str) -> Any:
+        return index(name)
 
     def __iter__(self) -> Iterator[str]:
         files = sorted(module.name for module in iter_modules(import_module(FOLDER).__path__))
