@@ -127,6 +127,11 @@ def _through(raw: Any) -> Any:
     return raw
 
 
+Line = Annotated[
+    tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort({**fields.NAME_FORM, "title": "point"})
+]
+
+
 class Joint(fields.Model):
     """A joint that is not a pin: exactly one of ``prismatic``, ``slot`` and ``fixed``."""
 
@@ -139,9 +144,7 @@ class Joint(fields.Model):
     """Link with a straight slot in which ``point`` of another link slides and turns. Example: yoke"""
     fixed: TwoLinks | None = None
     """Links [a, b] clamped to each other at a point that both have. Example: [leg_1, platform]"""
-    through: (
-        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort(fields.NAME_FORM)] | None
-    ) = None
+    through: Line | None = None
     """Point of the first link that the line goes through, where the slide is 0; two points [P, R] give the direction as
     well. Left out: the origin of the link's frame. Example: G Example: [P, R]
     """
@@ -191,7 +194,7 @@ class Drive(fields.Model):
 class Measure(fields.Model):
     """A named quantity: exactly one of ``angle``, ``distance`` and ``expression``; a text alone is an expression."""
 
-    bare, short = "expression", (fields.NAME_FORM,)
+    bare, short = "expression", ({**fields.NAME_FORM, "title": "expression"},)
     one_of = (
         "a measure is one of {angle: [a, b]}, {distance: [P, Q]} or an expression over coordinates and parameters",
         "angle",
@@ -256,7 +259,7 @@ def _target(raw: Any, context: Context) -> Wanted:
 
 
 TargetValue = Annotated[
-    Wanted, fields.Read(_target, {"type": ["number", "string", "array", "object"], "description": TARGET_FORMS})
+    Wanted, fields.Read(_target, {"type": ["number", "string", "array", "object"], "title": TARGET_FORMS})
 ]
 
 
@@ -277,7 +280,7 @@ class MechanismSection(fields.Model):
     slider], through: G}}
     """
     drives: Annotated[
-        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
+        dict[fields.DriveName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
     """Driven coordinates by name, as many as the mobility. A list names links (their angle), telescopic links (their
     length) or joints (their slide). Example: [crank] Example: {theta: {angle: crank}}
@@ -382,7 +385,7 @@ def _unit_of(kind: str) -> fields.Read:
             raise failure(str(error)) from None
         return raw
 
-    return fields.Read(read, fields.NAME_FORM)
+    return fields.Read(read, {**fields.NAME_FORM, "title": f"unit of {kind}"})
 
 
 class UnitsSection(fields.Model):

@@ -11,18 +11,13 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression, ExpressionError
-from mechdesign.indices import INDEX_NAMES, needed_section
+from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
 from mechdesign.study.text.units import QUANTITY
 
-# Results of a workspace that a goal or condition may name without its command.
-INDICES = ("GII", "GRI", "SUI", "area", "box_area")
-# Those of a local index follow its name.
-_STATISTICS = ("mean", "min", "max", "std")
-_RESULT = "a result, such as GII or kinematics.C.y"
 # Commands whose section no default can replace.
 _UNASSUMED = ("reliability", "stiffness")
 
@@ -57,7 +52,7 @@ class Variable(fields.Model):
 
 def _known() -> tuple[str, ...]:
     """Results of a workspace that need no command's name."""
-    return (*INDICES, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in _STATISTICS))
+    return (*REGIONAL, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in STATISTICS))
 
 
 def _result(raw: Any, context: Context) -> str | Expression:
@@ -92,10 +87,10 @@ class Judged(fields.Model):
     """A result, and the rows of it that count; or an expression over parameters."""
 
     bare = "result"
-    short: ClassVar[tuple[fields.Form, ...]] = (fields.NAME_FORM,)
+    short: ClassVar[tuple[fields.Form, ...]] = ({**fields.NAME_FORM, "title": "result"},)
     result: Annotated[
         str | Expression,
-        fields.Read(_result, {**fields.NAME_FORM, "description": f"{_RESULT}, or an expression over parameters"}),
+        fields.Read(_result, {**fields.NAME_FORM, "title": "result, or expression over parameters"}),
     ]
     """A number of the workspace (GII, area, sigma_min_mean), COMMAND.COLUMN or COMMAND.TABLE.COLUMN, whose worst row
     counts, or an expression over parameters. Example: kinematics.extremes.C.x.range
@@ -140,7 +135,7 @@ class Condition(Judged):
 class Requirement(Condition):
     """A condition on the result of a command."""
 
-    result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "description": _RESULT})]
+    result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "title": "result"})]
     """COMMAND.COLUMN or COMMAND.TABLE.COLUMN, with a row's word between where it needs one; the worst row counts, and
     nan is not met. Example: kinematics.mu Example: kinematics.extremes.C.x.range
     """
@@ -232,7 +227,7 @@ class OptimizeSection(fields.Model):
 
     method: Annotated[str, fields.choice(_METHODS, "method of optimization")] = "grid"
     """How the best designs are looked for."""
-    variables: dict[fields.CoordinateName, Variable]
+    variables: dict[fields.PlaceName, Variable]
     """Ranges of parameters or of single dimensions (rod.length). Example: {l_min: {from: 1, to: 5, step: 0.5}, l_a:
     {from: l_min, to: 2*l_min, number: 9}}
     """
@@ -351,7 +346,7 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
         checker.known(command, COMMANDS, "command", path)
     elif required or name not in known:
         names = known if required else (*known, *checker.parameters.nominal)
-        hint = suggestion(name, names) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+        hint = suggestion(name, names) or f"; a result is one of {', '.join(REGIONAL)} or <command>.<column>"
         checker.report(path, f"there is no result {name!r}{hint}")
     if not required:
         column = name.rpartition(".")[2]

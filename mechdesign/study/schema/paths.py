@@ -26,7 +26,7 @@ CIRCLE_POSES = 72
 LINE_POSES = 51
 # Pieces of a spline between two of its points whose lengths are added up.
 SPLINE_PIECES = 64
-_ROWS = {"type": ["array", "string", "number"]}
+_ROWS = {"type": ["array", "string", "number"], "title": "[[x, y], ...] or [number, ...] or file or number"}
 
 Speed = Annotated[float, fields.number("velocity", 0.0, exclusive=True)]
 Point = Annotated[tuple[fields.Length, fields.Length], fields.pair_of("[x, y]")]
@@ -36,7 +36,7 @@ def _radians(raw: Any, context: Context) -> float:
     return read_number(raw, context, "angle").nominal * context.units.angle_factor
 
 
-Radians = Annotated[float, fields.Read(_radians, fields.NUMBER_READ, "angle")]
+Radians = Annotated[float, fields.Read(_radians, fields.NUMBER_FORM, "angle")]
 
 
 class Circle(fields.Model):
@@ -45,7 +45,7 @@ class Circle(fields.Model):
     center: Point
     """Centre [x, y]. Example: [0, 220]"""
     radius: fields.PositiveLength
-    """Radius. Example: 40"""
+    """Radius of the circle. Example: 40"""
     from_: Radians = Field(0.0, alias="from")
     """Angle of the first place about the centre, from the x axis. Example: 90"""
     clockwise: bool = False
@@ -63,7 +63,7 @@ class Arc(fields.Model):
     center: Point
     """Centre [x, y]. Example: [0, 220]"""
     radius: fields.PositiveLength
-    """Radius. Example: 40"""
+    """Radius of the circle. Example: 40"""
     from_: Radians = Field(alias="from")
     """Angle of the first place about the centre, from the x axis. Example: 0"""
     to: Radians

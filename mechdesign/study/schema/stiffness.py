@@ -102,10 +102,7 @@ def _series(raw: Any, context: Context) -> float:
     return 1.0 / sum(1.0 / part for part in parts)
 
 
-_SERIES = {
-    "anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}],
-    "description": "a stiffness, or those of what is in series",
-}
+_SERIES = {"anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}]}
 
 
 class StiffnessSection(PoseSection):
@@ -125,11 +122,11 @@ class StiffnessSection(PoseSection):
     points brackets, rigid from their foot on it; a link of points alone is beams along them as listed; a telescopic one
     a cantilever from ``from``. Example: {leg_1: beam, leg_2: beam}
     """
-    actuators: dict[fields.AnyName, Annotated[float, fields.Read(_series, _SERIES)]] = Field(default_factory=dict)
+    actuators: dict[fields.DriveName, Annotated[float, fields.Read(_series, _SERIES)]] = Field(default_factory=dict)
     """Stiffness of each drive that gives, or a list of those in series; other drives are rigid. A bare one of an angle
     is moment per radian. Example: {l1: 5e7, theta1: 1e5 N*m/rad} Example: {theta: [3e4 N*m/rad, 1.5e4 N*m/rad]}
     """
-    bearings: dict[fields.AnyName, Bearing] = Field(default_factory=dict)
+    bearings: dict[fields.BearingName, Bearing] = Field(default_factory=dict)
     """Stiffness of pins (by their point) and slides (by their joint or telescopic link); others are rigid. Example: {B:
     1e5 N/mm, guide: {radial: 2e5 N/mm, moment: 1e6 N*m/rad}}
     """

@@ -15,6 +15,7 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, read
+from mechdesign.study.text.forms import Generator, name_forms
 from mechdesign.study.text.reporter import LIST_FORM, schema_fields
 
 
@@ -41,7 +42,8 @@ class StudyFile(fields.Model):
 
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of a study file, with which editors complete and check."""
-    found = StudyFile.model_json_schema(by_alias=True, mode="validation")
+    found = StudyFile.model_json_schema(by_alias=True, schema_generator=Generator, mode="validation")
+    name_forms(found)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "mechdesign study"}
     return head | {key: value for key, value in found.items() if key not in head}
 

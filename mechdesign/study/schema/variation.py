@@ -103,12 +103,9 @@ def _tolerance(raw: Any, context: Context) -> tuple[float, float]:
     return low, high
 
 
-_TOLERANCE = {
-    "anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM],
-    "description": "a half-width, or the lowest and highest deviation",
-}
+_TOLERANCE = {"anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM]}
 Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
-_CLASSED = {**_TOLERANCE, "description": "a half-width, the lowest and highest deviation, or a class: js9, ISO 2768-m"}
+_CLASSED = {"anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM, {**fields.NAME_FORM, "title": "tolerance class"}]}
 
 
 class Fit(NamedTuple):
@@ -139,7 +136,7 @@ def _fit(raw: Any, context: Context) -> Fit:
     return Fit(raw, 0.5 * (least + most) * millimetre, *halves)
 
 
-_FIT = {**fields.NAME_FORM, "description": "such as 20 H7/g6"}
+_FIT = {**fields.NAME_FORM, "title": "fit"}
 
 
 class Dimension(fields.Model):
@@ -217,7 +214,7 @@ class Dimension(fields.Model):
 class PinModel(fields.Model):
     """How a pin lies in its hole, for each kind of method; a word alone is for both."""
 
-    short = ({"enum": list(PIN_MODELS)},)
+    short = ({"enum": list(PIN_MODELS), "title": "pin model"},)
     analytic: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
     """Model of the methods that compute: analytic, second_order."""
     monte_carlo: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"

@@ -28,10 +28,10 @@ from mechdesign.study.text.document import read
 from mechdesign.study.text.units import QUANTITY, QuantityError, Units
 
 Form = dict[str, Any]
-"""JSON Schema of a part of the study."""
-NAME_FORM: Form = {"type": "string"}
+"""JSON Schema of a part of the study; a title says in words what is accepted."""
+NAME_FORM: Form = {"type": "string", "title": "name"}
 NAMES_FORM: Form = {"type": "array", "items": NAME_FORM}
-NUMBER_FORM: Form = {"type": ["number", "string"]}
+NUMBER_FORM: Form = {"type": ["number", "string"], "title": "number"}
 PAIR_FORM: Form = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
 
 NAME = re.compile(r"[^\W\d]\w*")
@@ -214,9 +214,6 @@ class Read:
         return self.accepted() if callable(self.accepted) else dict(self.accepted)
 
 
-NUMBER_READ: Form = {**NUMBER_FORM, "description": "a number, a quantity or an expression"}
-
-
 def number(
     kind: str | None = None, minimum: float | None = None, *, exclusive: bool = False, value: bool = False
 ) -> Read:
@@ -236,7 +233,7 @@ def number(
             raise failure(f"must be {what}, not {size:g}")
         return found if value else size
 
-    return Read(read, NUMBER_READ, kind or "")
+    return Read(read, NUMBER_FORM, kind or "")
 
 
 def whole(minimum: int = 0, maximum: int | None = None) -> Read:
@@ -258,7 +255,7 @@ def whole(minimum: int = 0, maximum: int | None = None) -> Read:
             raise failure(f"must be at most {maximum}, not {shown(found)}")
         return found
 
-    form = {"type": ["integer", "number", "string"], "minimum": minimum, "description": "a whole number"}
+    form = {"type": ["integer", "number", "string"], "minimum": minimum, "title": "whole number"}
     return Read(read, form, "none")
 
 
@@ -271,7 +268,7 @@ def name_of(what: str, pattern: re.Pattern[str] = NAME) -> Read:
         rule = "; a name is letters, digits and underscores, with a letter first" if isinstance(raw, str) else ""
         raise failure(f"expected the name of {what}, not {shown(raw)}{rule}")
 
-    return Read(read, {**NAME_FORM, "description": f"the name of {what}"})
+    return Read(read, {**NAME_FORM, "title": what.partition(" ")[2].partition(" (")[0]})
 
 
 def choice(words: Mapping[str, Any], what: str) -> Read:
@@ -284,7 +281,7 @@ def choice(words: Mapping[str, Any], what: str) -> Read:
         raise failure(f"expected one of {', '.join(words)}, not {shown(raw)}{hint}")
 
     def form() -> Form:
-        return {"enum": list(words), "enumDescriptions": [meaning(words[word]) for word in words]}
+        return {"title": what, "enum": list(words), "enumDescriptions": [meaning(words[word]) for word in words]}
 
     return Read(read, form, words=words, what=what)
 
@@ -326,10 +323,8 @@ def _texts(module: str) -> Mapping[tuple[str, str], KeyText]:
     They are read where a reference or a JSON Schema is asked for only: pydantic would read them at every start.
     """
     found = {}
-    classes = (
-        each for each in ast.parse(inspect.getsource(sys.modules[module])).body if isinstance(each, ast.ClassDef)
-    )
-    for holder in classes:
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    for holder in (each for each in tree.body if isinstance(each, ast.ClassDef)):
         for key, below in pairwise(holder.body):
             if not isinstance(key, ast.AnnAssign) or not isinstance(key.target, ast.Name):
                 continue
@@ -427,14 +422,15 @@ LengthValue = Annotated[StudyNumber, number("length", value=True)]
 PositiveLengthValue = Annotated[StudyNumber, number("length", 0.0, exclusive=True, value=True)]
 AngleValue = Annotated[StudyNumber, number("angle", value=True)]
 AnyValue = Annotated[StudyNumber, number(value=True)]
-Bound = Annotated[Expression, Read(read_expression, NUMBER_READ)]
+Bound = Annotated[Expression, Read(read_expression, NUMBER_FORM)]
 
 LinkName = Annotated[str, name_of("a link")]
 PointName = Annotated[str, name_of("a point")]
 JointName = Annotated[str, name_of("a joint")]
 DriveName = Annotated[str, name_of("a drive")]
 MeasureName = Annotated[str, name_of("a measure")]
-AnyName = Annotated[str, name_of("a link, leg or joint")]
+BearingName = Annotated[str, name_of("a point, joint or leg")]
 CoordinateName = Annotated[str, name_of("a coordinate (such as C.x or rod.angle)", COORDINATE)]
+PlaceName = Annotated[str, name_of("a parameter or dimension", COORDINATE)]
 CoordinateNames = Annotated[tuple[CoordinateName, ...], BeforeValidator(as_list), OrShort()]
 Numbers = Annotated[tuple[Number, ...], BeforeValidator(as_list), OrShort()]
