@@ -16,6 +16,16 @@ if TYPE_CHECKING:
     from mechdesign.results import Result
 
 
+EXIT_CODES = {
+    0: "done, every requirement met",
+    1: "done, a requirement not met",
+    2: "the command or the study file is wrong; nothing was computed",
+    3: "the study is right, but the mechanism cannot do it: a pose that cannot be assembled, no feasible design",
+    4: "a numerical failure, or results that could not be written",
+    130: "interrupted; what was finished is whole",
+}
+
+
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name that resembles this one most, None where none does."""
     folded = {candidate.casefold(): candidate for candidate in known}

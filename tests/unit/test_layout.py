@@ -25,6 +25,7 @@ ORDER = (
     ("mechdesign.analyses.optimize",),
     ("mechdesign.report",),
     ("mechdesign.door",),
+    ("mechdesign.reference",),
     ("mechdesign.cli",),
     ("mechdesign.__init__", "mechdesign.__main__"),
 )
