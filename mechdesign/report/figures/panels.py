@@ -137,6 +137,15 @@ def number(value: float) -> str:
     return f"{value:.3g}" if value == 0 or value >= 1e-3 else style.in_powers(value)
 
 
+def quantity(value: float, unit: str) -> str:
+    """A value with three digits and its unit, ``3.74e+07 N/m`` as 3.74·10⁷ N/m; an infinite stiffness in a word."""
+    if np.isinf(value):
+        return "rigid"
+    if 1e-2 <= value < 1e5:
+        return f"{value:.3g} {style.printed(unit)}" if value < 1e3 else f"{value:.0f} {style.printed(unit)}"
+    return f"{style.in_powers(value)} {style.printed(unit)}"
+
+
 def fitting(labels: Sequence[str]) -> int:
     """Columns of a legend that the width of a figure holds."""
     return max(1, min(len(labels), 118 // (8 + max(len(label) for label in labels))))
