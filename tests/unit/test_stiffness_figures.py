@@ -12,8 +12,8 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import mechanism_figure
-from mechdesign.report.figures.panels import quantity
-from mechdesign.report.figures.stiffness import Coil, figures, round_down
+from mechdesign.report.figures.panels import quantity, round_down
+from mechdesign.report.figures.stiffness import Coil, figures
 from mechdesign.results import Result
 
 

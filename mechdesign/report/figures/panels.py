@@ -146,6 +146,12 @@ def quantity(value: float, unit: str) -> str:
     return f"{style.in_powers(value)} {style.printed(unit)}"
 
 
+def round_down(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
+
+
 def fitting(labels: Sequence[str]) -> int:
     """Columns of a legend that the width of a figure holds."""
     return max(1, min(len(labels), 118 // (8 + max(len(label) for label in labels))))

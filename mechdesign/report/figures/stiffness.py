@@ -23,7 +23,7 @@ from mechdesign.report.figures.drawing import ARC, Pen, draw_mechanism, point_la
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, TITLE, fit, framed, windows
 from mechdesign.report.figures.joint_forces import joint_force_figures, load_in_words
 from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.panels import Plane, along, map_sheet, plane, quantity, tick_abscissa
+from mechdesign.report.figures.panels import Plane, along, map_sheet, plane, quantity, round_down, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
@@ -471,9 +471,3 @@ def free_motion(study: Study, result: Result, drawn: Drawn) -> Figure | None:
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
     return figure
-
-
-def round_down(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))

@@ -34,6 +34,7 @@ from mechdesign.report.figures.panels import (
     tick_abscissa,
 )
 from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.workspace.ellipses import ellipses_figure
 from mechdesign.report.figures.workspace.regions import (
     MAX_REGIONS,
     PALE,
@@ -89,6 +90,7 @@ def figures(study: Study, result: Result) -> Mapping[str, Figure]:
     drawn.add("of indices", map_figures, study, found)
     if len(found) == 1:
         drawn.add("workspace", workspace_figure, study, result, found[0])
+        drawn.add("ellipses", ellipses_figure, study, found[0], result.drawn["ellipses"])
     else:
         drawn.add("workspace", _side_by_side, study, found)
     drawn.add("inscribed", inscribed_figure, study, result, found)

@@ -219,8 +219,14 @@ class Sheet:
         style.color_bar(self.figure, drawn, label, cax=self.bar, **options)
 
 
-def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD) -> Sheet:
-    """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all."""
+def sheet(
+    study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD,
+    below: float = 0.0,
+) -> Sheet:  # fmt: skip
+    """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all.
+
+    So many inches more than a legend of what ends the region needs are left `below`.
+    """
     number = len(titles)
     columns = number if number < 4 else 2 if number == 4 else 3
     rows = -(-number // columns)
@@ -233,7 +239,7 @@ def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *,
         above, down = _PANEL_TITLE, _PANEL_TITLE + _ROW_GAP
     figure, panels = windows(
         window, study.units.label("length"), number, columns, gap=(room - LEFT) / columns - window.width, above=down,
-        top=_TITLE + above - down, below=BELOW + _LEGEND,
+        top=_TITLE + above - down, below=BELOW + _LEGEND + below,
     )  # fmt: skip
     outer = figure.get_figheight()
     for axes, name in zip(panels, titles, strict=True):
@@ -244,6 +250,6 @@ def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *,
     if bar:
         edge = (LEFT + window.width if number == 1 else room) + 0.15
         every = rows * window.height + (rows - 1) * down
-        long, middle_up = min(every, 4.0), BELOW + _LEGEND + every / 2
+        long, middle_up = min(every, 4.0), BELOW + _LEGEND + below + every / 2
         colors = figure.add_axes((edge / style.WIDTH, (middle_up - long / 2) / outer, 0.16 / style.WIDTH, long / outer))
     return Sheet(figure, tuple(panels), colors)
