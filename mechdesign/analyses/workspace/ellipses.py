@@ -49,7 +49,7 @@ def ellipses(question: Question, found: Sequence[Patch]) -> Ellipses | None:
     ])  # fmt: skip
     low, high = complex(edge.real.min(), edge.imag.min()), complex(edge.real.max(), edge.imag.max())
     size = high - low
-    around: Complexes = CLEAR * np.append(0.0, np.exp(0.25j * np.pi * np.arange(8)))
+    around = CLEAR * np.append(0.0, np.exp(0.25j * np.pi * np.arange(8)))
     places, spacing = np.zeros(0, dtype=complex), 0.0
     for number in LATTICES:
         spacing = float(np.sqrt(size.real * size.imag / number))
