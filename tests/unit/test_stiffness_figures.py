@@ -12,7 +12,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import mechanism_figure
-from mechdesign.report.figures.panels import quantity, round_down
+from mechdesign.report.figures.panels import plane, quantity, round_down
 from mechdesign.report.figures.stiffness import Coil, figures
 from mechdesign.results import Result
 
@@ -177,3 +177,32 @@ def test_forces_that_grow_without_bounds_end_at_the_axis() -> None:
     assert forces.get_ylim()[1] < most / 2
     assert "beyond the axis" in forces.get_title(loc="left")
     assert forces.lines[-1].get_ydata()[0] == forces.get_ylim()[1]
+
+
+HAND = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, A, 40], lower: [A, B, 30], hand: [B, T, 10]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}, q3: {angle: hand, from: lower}}
+  sketch: {A: [20, 35], B: [48, 28], T: [48, 18]}
+workspace: {point: T, at: {hand.angle: [-90, 0]}, scan: {about: [0, 0]}, characteristic_length: 10}
+stiffness: {at: T, actuators: {q1: 1e5, q2: 1e5, q3: 1e5}, poses: workspace}
+"""
+
+
+def test_held_values_have_a_map_each_up_to_their_boundary() -> None:
+    """With its hand held the arm's tip reaches the ring of its wrist, from 10 to 70, moved by the hand."""
+    study = study_of(HAND)
+    result = mechdesign.stiffness(study)
+    with style.context():
+        panels = [axes for axes in figures(study, result)["stiffness"].axes if axes.get_xlabel()]
+    words = [f"hand.angle = {angle} deg, {name} [N/mm]" for angle in (-90, 0) for name in ("k_min", "k_max")]
+    assert [axes.get_title(loc="left") for axes in panels] == words
+    over = plane(study, result.drawn["poses"])
+    assert over is not None
+    for (_, sectors), hand in zip(over.maps, (-10j, 10), strict=True):
+        for curve in sectors.outline:
+            assert np.abs(np.abs(curve - hand)[:, None] - (10, 70)).min(axis=1) == pytest.approx(0, abs=1e-6)
+        ends = np.concatenate([patch.nodes[:, [0, -1]].ravel() for patch in sectors.patches])
+        assert np.abs(np.abs(ends - hand)[:, None] - (10, 70)).min(axis=1) == pytest.approx(0, abs=1e-3)
+        # Finer than the poses are.
+        assert len(ends) > 2 * sum(patch.rays.stop - patch.rays.start for patch in sectors.patches)
