@@ -47,6 +47,7 @@ ROOM = 0.07
 _BAR = 0.95  # of a bar of colours with its numbers
 _LEGEND = 0.24
 _PANEL_TITLE = 0.34
+_TITLE_LINE = 0.17  # more of it
 _TITLE = 0.4
 _ROW_GAP = 0.28
 _MAX_HEIGHT = 6.5
@@ -225,6 +226,7 @@ def sheet(
 ) -> Sheet:  # fmt: skip
     """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all.
 
+    Titles of panels may have several lines.
     So many inches more than a legend of what ends the region needs are left `below`.
     """
     number = len(titles)
@@ -236,7 +238,8 @@ def sheet(
     scale = min((room - LEFT * columns) / columns / wide, (_MAX_HEIGHT if rows == 1 else 7.5 / rows) / tall)
     window, above, down = Window(middle, scale, scale * wide, scale * tall), 0.0, _ROW_GAP
     if number > 1:
-        above, down = _PANEL_TITLE, _PANEL_TITLE + _ROW_GAP
+        above = _PANEL_TITLE + _TITLE_LINE * max(name.count("\n") for name in titles)
+        down = above + _ROW_GAP
     figure, panels = windows(
         window, study.units.label("length"), number, columns, gap=(room - LEFT) / columns - window.width, above=down,
         top=_TITLE + above - down, below=BELOW + _LEGEND + below,
