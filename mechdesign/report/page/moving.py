@@ -2,12 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import tostring
 
-from mechdesign.results import Result
+import numpy as np
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from mechdesign.analyses.kinematics.rates import drive_rates
+from mechdesign.analyses.poses import Shown, SolvedPoses, expand_outputs
+from mechdesign.mechanism import Configuration, Reason
+from mechdesign.mechanism.derivatives import STALLED, regularity
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.outputs import first
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import link_colors
+from mechdesign.report.figures.kinematics import PATH_LOOKS, curves_figure
+from mechdesign.report.figures.panels import abscissa
+from mechdesign.report.figures.scene import Sweep, link_points, pose, ranks
+from mechdesign.report.page.linkage import Sheet, Sketcher, rounded
+from mechdesign.report.page.vector import described, inline
+from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
+
+# Of more poses some are left out, evenly.
+MAX_POSES = 721
+# Integers in a unit of a drawing, in a degree, and in a point of the curves.
+PLACES = 20
+TURNS = 100
+CURVES = 10
+# Steps of a number that can be told apart in most of its range, at least.
+_STEPS = 2000
+_COMMON = 0.9  # part of the values whose range that is
+_ROUNDING = 1e-11  # of a number that should be zero, and its part of others of its unit
+_POWERS = (-3, 5)  # of ten, beyond which numbers are written with a power of their own
+_NAMED_POSES = 12  # in which names keep off the links
+# Seconds that a motion takes on the screen where it has no time of its own, and where its own is too short or long.
+_SECONDS = 5.0
+_SHORTEST, _LONGEST = 2.0, 12.0
+_ASTRAY = 0.05  # part of a step by which the rates may lead elsewhere
+_TIMES = 10_000  # integers in the time of a motion
+_ARROW = 70.0  # length of the arrow of a usual velocity
+_RATES = ("velocity", "acceleration")
+
+
+class Cell(NamedTuple):
+    """A number of the pose drawn, which of the numbers it is, and its unit."""
+
+    number: int
+    text: str
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -15,10 +63,273 @@ class Moving:
     """A mechanism that moves in a page."""
 
     drawing: str  # inline SVG in one pose: what is seen without script and in print
-    beside: str  # inline SVG that shows where it is: motion curves, or the map that the pointer moves over
+    beside: str  # inline SVG that shows where it is: motion curves, or nothing where the drawing has the map
     data: Mapping[str, Any]  # what the script moves it by, as JSON
+    words: str  # the pose drawn
+    headings: Sequence[str]  # of the columns of numbers
+    rows: Sequence[tuple[str, Sequence[Cell | None]]]  # numbers of the pose drawn, by what they are of
 
 
 def moving(study: Study, result: Result) -> Moving | None:
     """The mechanism of a result that has poses to move through: a sweep, a path, the grid of a workspace."""
+    with style.context():
+        if result.command == "kinematics" and result.drawn["poses"].motion:
+            return _motion(study, result)
     return None
+
+
+class Numbers:
+    """Columns as integers of their last decimal shown, and the text of each in the pose drawn."""
+
+    def __init__(self, table: Table, rows: Ints, begin: int) -> None:
+        self.rows, self.begin = rows, begin
+        self.sizes: dict[str, float] = {}
+        for column in table.columns:
+            if column.values.dtype.kind == "f":
+                self.sizes[column.unit] = max(self.sizes.get(column.unit, 0.0), _size(column.values[rows]))
+        self.tracks: list[list[Any]] = []
+        self.found: dict[str, tuple[int, int, int]] = {}
+        self.units: dict[str, str] = {}
+
+    def add(self, column: Column) -> int:
+        """Take over a column; returns which of the numbers it is."""
+        if column.name in self.found:
+            return self.found[column.name][0]
+        values = column.values[self.rows]
+        size = _size(values)
+        if size <= max(_ROUNDING, _ROUNDING * self.sizes.get(column.unit, 0.0)):
+            # What stands still but for rounding has the digits of what moves.
+            size = self.sizes.get(column.unit, 0.0) if self.sizes.get(column.unit, 0.0) > _ROUNDING else 1.0
+        power = math.floor(math.log10(size))
+        power = 0 if _POWERS[0] < power < _POWERS[1] else 3 * (power // 3)
+        decimals = max(0, math.ceil(math.log10(_STEPS * 10.0**power / size)))
+        self.tracks.append([decimals, deltas(values, 10.0 ** (decimals - power))])
+        self.found[column.name] = len(self.tracks) - 1, decimals, power
+        factor = f"\N{MULTIPLICATION SIGN}10{style.raised(power)} " if power else ""
+        self.units[column.name] = f"{factor}{style.printed(column.unit)}".rstrip()
+        return len(self.tracks) - 1
+
+    def cell(self, column: Column) -> Cell:
+        """The column's number in the pose drawn."""
+        which = self.add(column)
+        _, decimals, power = self.found[column.name]
+        value = float(column.values[self.rows[self.begin]])
+        text = f"{value / 10.0**power:.{decimals}f}" if math.isfinite(value) else "\N{EN DASH}"
+        return Cell(which, text, self.units[column.name])
+
+
+def _size(values: Floats) -> float:
+    """How large the numbers of a column usually are; rates may be endless at a dead centre."""
+    known = np.abs(values[np.isfinite(values)])
+    return float(np.quantile(known, _COMMON) or known.max()) if len(known) else 0.0
+
+
+def deltas(values: Floats, factor: float) -> list[int | None]:
+    """Values times a factor as integers: the first, then the step from the last known one; None where there is none.
+
+    Steps of zero at the end are left out.
+    """
+    found: list[int | None] = []
+    last = 0
+    for value in (values * factor).tolist():
+        whole = round(value) if math.isfinite(value) else None
+        found.append(None if whole is None else whole - last)
+        last = last if whole is None else whole
+    while found and found[-1] == 0:
+        found.pop()
+    return found
+
+
+def _motion(study: Study, result: Result) -> Moving | None:
+    """The mechanism along its sweep or path, with the curves of its outputs."""
+    whole = Sweep.of(result.drawn["motion"])
+    some = np.unique(np.linspace(0, len(whole.rows) - 1, min(len(whole.rows), MAX_POSES)).round().astype(int))
+    shown = Shown(study, whole.poses, whole.rows[some], whole.configuration.take(some))
+    sweep = Sweep.of(shown)
+    if not len(sweep.valid):
+        return None
+    table, begin = result.tables["motion"], int(sweep.valid[0])
+    sheet = Sheet.around(whole.extent)
+    numbers = Numbers(table, sweep.rows, begin)
+    headings, rows = _rows(table, numbers)
+    data = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns, **_places(sheet, sweep)}
+    data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
+    data["given"] = [
+        [name, numbers.cell(table.column(name)).unit, numbers.add(table.column(name))]
+        for name in sweep.poses.values if name in table
+    ]  # fmt: skip
+    figure, beside = curves_figure(study, result), ""
+    if figure is not None:
+        beside = inline(figure, f"{result.command}-curves", described(figure))
+        data["curves"] = _curves(study, sweep, figure, table, numbers)
+    data["numbers"] = numbers.tracks
+    drawing = _drawing(study, sweep, whole, sheet, begin)
+    return Moving(drawing, beside, data, sweep.words(begin), headings, rows)
+
+
+def _drawing(study: Study, sweep: Sweep, whole: Sweep, sheet: Sheet, begin: int) -> str:
+    """The first valid pose, with the paths of its points."""
+    scene = pose(sweep.mechanism, sweep.configuration, begin)
+    assert scene is not None
+    root = sheet.root(f"the mechanism at {sweep.words(begin)}")
+    sketcher = Sketcher(root, sheet, sweep.mechanism, scene)
+    ranked, colors = ranks(study), link_colors(sweep.mechanism)
+    lift = 2 - max(ranked.values(), default=2)
+    owners: dict[str, str] = {}
+    for name in sweep.mechanism.description.links:
+        for point in scene.link_points(name) if name != GROUND else ():
+            owners.setdefault(point, name)
+    for point, places in sorted(whole.traces.items(), key=lambda item: ranked[item[0]]):
+        sketcher.trace(places, colors[owners[point]], *PATH_LOOKS[min(ranked[point] + lift, 2)])
+    sketcher.draw(whole.travel)
+    some = sweep.valid[np.unique(np.linspace(0, len(sweep.valid) - 1, _NAMED_POSES).round().astype(int))]
+    scenes = [pose(sweep.mechanism, sweep.configuration, int(index)) for index in some]
+    sketcher.names([scene, *filter(None, scenes)])
+    sketcher.ruler(study.units.label("length"))
+    return tostring(root, encoding="unicode")
+
+
+def _places(sheet: Sheet, sweep: Sweep) -> dict[str, Any]:
+    """Places of the moving points and directions of the links, as the drawing has them."""
+    return places(sheet, sweep.configuration, sweep.configuration.valid, sweep.mechanism.description.links)
+
+
+def places(sheet: Sheet, configuration: Configuration, valid: Any, links: Mapping[str, Any]) -> dict[str, Any]:
+    """Places of the points and directions of the links in every pose, in the drawing's units and degrees."""
+    found: dict[str, Any] = {"corner": [sheet.corner.real, sheet.corner.imag], "scale": sheet.scale,
+                             "x": {}, "y": {}, "turn": {}}  # fmt: skip
+    for point in dict.fromkeys(point for link in links.values() for point in link_points(link)):
+        at = sheet.all(np.where(valid, configuration.point(point), complex(np.nan, np.nan)))
+        found["x"][point], found["y"][point] = deltas(at.real, PLACES), deltas(at.imag, PLACES)
+    for name in links:
+        if name != GROUND:
+            angles = np.full(len(valid), np.nan)
+            angles[valid] = np.unwrap(-np.angle(configuration.rotation(name)[valid]))
+            found["turn"][name] = deltas(np.degrees(angles), TURNS)
+    return found
+
+
+def _gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
+    """Runs of poses that are not valid: the first, the last, why."""
+    reason = sweep.configuration.reason
+    ends = np.flatnonzero(np.diff(reason)) + 1
+    runs = zip(np.append(0, ends).tolist(), np.append(ends, len(reason)).tolist(), strict=True)
+    return [(begin, end - 1, Reason(int(reason[begin])).text) for begin, end in runs if reason[begin]]
+
+
+def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, list[Cell | None]]]]:
+    """Numbers of a table: a row each output, with its rates beside it, and the speed of points."""
+    columns = {column.name: column for column in table.columns if column.values.dtype.kind == "f"}
+    columns.pop("conditioning", None)
+    kinds = ["", *(rate for rate in _RATES if any(name.endswith(f"_{rate}") for name in columns))]
+    names = [name for name in columns if not any(name.endswith(f"_{rate}") for rate in kinds[1:])]
+    for point in [name[:-2] for name in names if name.endswith(".x")]:
+        for rate in kinds[1:]:
+            parts = [columns.get(f"{point}.{axis}_{rate}") for axis in "xy"]
+            if parts[0] is not None and parts[1] is not None:
+                values = np.hypot(parts[0].values, parts[1].values)
+                columns[f"{point}_{rate}"] = Column(f"{point}_{rate}", values, parts[0].unit)
+                names.append(point)
+    rows = []
+    for name in dict.fromkeys(names):
+        found = [columns.get("_".join(filter(None, (name, kind)))) for kind in kinds]
+        rows.append((name, [None if column is None else numbers.cell(column) for column in found]))
+    return ["value", *kinds[1:]], rows
+
+
+def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, Any]:
+    """When each pose is passed, from the rates of the study where these lead along the motion; else evenly."""
+    section, unit = study.kinematics, study.units.label("time")
+    steps, own = _steps(sweep, table, section.rates if section else {}), None
+    times = np.linspace(0, 1, len(sweep.rows)) if steps is None else np.append(0.0, np.cumsum(np.abs(steps)))
+    if sweep.poses.closed:
+        times = np.append(times, times[-1] + np.diff(times).mean())
+    seconds, note = _SECONDS, ""
+    if steps is not None:
+        own = float(times[-1])
+        seconds = own if unit == "s" and _SHORTEST <= own <= _LONGEST else _SECONDS
+        note = ", as at the study's rates" if seconds == own else f"; at the study's rates {own:.3g} {unit}".rstrip()
+    pace = f"1\N{MULTIPLICATION SIGN}: {seconds:.3g} s {'a round' if returns else 'from end to end'}{note}"
+    return {"times": deltas(times / times[-1], _TIMES), "seconds": round(seconds, 3), "pace": pace,
+            "backwards": steps is not None and bool(steps[0] < 0)}  # fmt: skip
+
+
+def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | None:
+    """Time from each pose to the next, where the rates lead from one to the other; negative where they lead back."""
+    along, square, length = (np.zeros(len(sweep.rows) - 1) for _ in range(3))
+    told = [name for name in table.names if f"{name}_velocity" in table or name in rates]
+    # What is given moves evenly more often than what follows from it.
+    for name in [name for name in told if name in sweep.poses.values] or told:
+        if f"{name}_velocity" in table:
+            rate = table[f"{name}_velocity"][sweep.rows]
+        else:
+            rate = np.full(len(sweep.rows), rates[name])
+        values = table[name][sweep.rows]
+        size = float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else 0.0
+        if not size > 0:
+            continue
+        step, mean = np.diff(values) / size, (rate[1:] + rate[:-1]) / 2 / size
+        known = np.isfinite(step) & np.isfinite(mean)
+        along += np.where(known, step * mean, 0.0)
+        square += np.where(known, mean**2, 0.0)
+        length += np.where(known, step**2, 0.0)
+    known = square > 0
+    if not known.any():
+        return None
+    found = np.where(known, along / np.where(known, square, 1.0), np.nan)
+    # What is left of a step where the rates have had their time.
+    astray = length - 2 * found * along + found**2 * square
+    if np.any(known & ((found * found[known][0] <= 0) | (astray > _ASTRAY * length))):
+        return None
+    return np.where(known, found, np.nanmedian(found))
+
+
+def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
+    """Velocities of the moving points as arrows of the drawing, and how long a round one is; nothing without rates."""
+    section, configuration = study.kinematics, sweep.configuration
+    if section is None or not (section.rates or section.speed):
+        return {}
+    linear = sweep.mechanism.linearize(configuration)
+    solved = SolvedPoses(sweep.rows, sweep.poses.groups[0].names, configuration)
+    velocity = linear.velocity(drive_rates(study, section, sweep.poses, solved, linear).velocities)
+    known = configuration.valid & (regularity(linear) >= STALLED)
+    found = {}
+    for point in sweep.places:
+        x, y = (first(configuration, each, velocity) for each in expand_outputs(study, (point,)))
+        found[point] = np.where(known, x + 1j * y, np.nan)
+    speeds = np.abs(np.concatenate(list(found.values())))
+    speeds = speeds[np.isfinite(speeds)]
+    if not speeds.any():
+        return {}
+    # Near a dead centre some may grow without bounds: their arrows leave the drawing.
+    usual = float(np.quantile(speeds, _COMMON)) or float(speeds.max())
+    scale, length = _ARROW / usual, rounded(usual)
+    unit = style.printed(study.units.label("velocity"))
+    arrows = {point: [deltas(each.real * scale, PLACES), deltas(-each.imag * scale, PLACES)]
+              for point, each in found.items()}  # fmt: skip
+    return {"arrows": arrows, "arrow": [round(length * scale, 1), f"{length:g} {unit}".rstrip()]}
+
+
+def _curves(study: Study, sweep: Sweep, figure: Figure, table: Table, numbers: Numbers) -> dict[str, Any]:
+    """Where the pose is in each panel of the curves: places of the cursor, and of a dot on each curve."""
+    wide, tall = (72 * inches for inches in figure.get_size_inches())
+    over = abscissa(study, sweep.poses).values[sweep.rows]
+    boxes = [axes.get_position() for axes in figure.axes]
+    low, high = figure.axes[0].get_xlim()
+    x = wide * (boxes[0].x0 + boxes[0].width * (over - low) / (high - low))
+    dots = []
+    for axes, box in zip(figure.axes, boxes, strict=True):
+        bottom, top = axes.get_ylim()
+        for line in axes.get_lines():
+            drawn = np.asarray(line.get_ydata(), dtype=float)
+            column = next((each for each in table.columns if each.values.dtype.kind == "f"
+                           and np.array_equal(each.values, drawn, equal_nan=True)), None)  # fmt: skip
+            if column is None or axes.get_yscale() != "linear":
+                continue
+            which = numbers.add(column)
+            slope = -tall * box.height / (top - bottom) * 10.0 ** numbers.found[column.name][2]
+            start = tall * (1 - box.y0) + tall * box.height * bottom / (top - bottom)
+            dots.append([which, slope, round(start, 2), round(tall * (1 - box.y1), 1), round(tall * (1 - box.y0), 1),
+                         to_hex(line.get_color())])  # fmt: skip
+    ends = [round(tall * (1 - max(box.y1 for box in boxes)), 1), round(tall * (1 - min(box.y0 for box in boxes)), 1)]
+    return {"x": deltas(x, CURVES), "ends": ends, "dots": dots}
