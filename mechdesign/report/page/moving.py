@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 from xml.etree.ElementTree import tostring
 
 import numpy as np
@@ -14,32 +12,26 @@ from matplotlib.figure import Figure
 
 from mechdesign.analyses.kinematics.rates import drive_rates
 from mechdesign.analyses.poses import Shown, SolvedPoses, expand_outputs
-from mechdesign.mechanism import Configuration, Reason
+from mechdesign.mechanism import Reason
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import first
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import link_colors
 from mechdesign.report.figures.kinematics import PATH_LOOKS, curves_figure
 from mechdesign.report.figures.panels import abscissa
-from mechdesign.report.figures.scene import Sweep, link_points, pose, ranks
+from mechdesign.report.figures.scene import Sweep, pose, ranks
 from mechdesign.report.page.linkage import Sheet, Sketcher, rounded
+from mechdesign.report.page.roaming import roaming
+from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
 # Of more poses some are left out, evenly.
 MAX_POSES = 721
-# Integers in a unit of a drawing, in a degree, and in a point of the curves.
-PLACES = 20
-TURNS = 100
-CURVES = 10
-# Steps of a number that can be told apart in most of its range, at least.
-_STEPS = 2000
-_COMMON = 0.9  # part of the values whose range that is
-_ROUNDING = 1e-11  # of a number that should be zero, and its part of others of its unit
-_POWERS = (-3, 5)  # of ten, beyond which numbers are written with a power of their own
+_COMMON = 0.9  # part of the velocities that are smaller than the one whose arrow has the usual length
 _NAMED_POSES = 12  # in which names keep off the links
 # Seconds that a motion takes on the screen where it has no time of its own, and where its own is too short or long.
 _SECONDS = 5.0
@@ -50,97 +42,22 @@ _ARROW = 70.0  # length of the arrow of a usual velocity
 _RATES = ("velocity", "acceleration")
 
 
-class Cell(NamedTuple):
-    """A number of the pose drawn, which of the numbers it is, and its unit."""
-
-    number: int
-    text: str
-    unit: str
-
-
-@dataclass(frozen=True)
-class Moving:
-    """A mechanism that moves in a page."""
-
-    drawing: str  # inline SVG in one pose: what is seen without script and in print
-    beside: str  # inline SVG that shows where it is: motion curves, or nothing where the drawing has the map
-    data: Mapping[str, Any]  # what the script moves it by, as JSON
-    words: str  # the pose drawn
-    headings: Sequence[str]  # of the columns of numbers
-    rows: Sequence[tuple[str, Sequence[Cell | None]]]  # numbers of the pose drawn, by what they are of
-
-
 def moving(study: Study, result: Result) -> Moving | None:
-    """The mechanism of a result that has poses to move through: a sweep, a path, the grid of a workspace."""
-    with style.context():
-        if result.command == "kinematics" and result.drawn["poses"].motion:
-            return _motion(study, result)
-    return None
+    """The mechanism of a result that has poses to move through: a sweep, a path, the grid of a workspace.
 
-
-class Numbers:
-    """Columns as integers of their last decimal shown, and the text of each in the pose drawn."""
-
-    def __init__(self, table: Table, rows: Ints, begin: int) -> None:
-        self.rows, self.begin = rows, begin
-        self.sizes: dict[str, float] = {}
-        for column in table.columns:
-            if column.values.dtype.kind == "f":
-                self.sizes[column.unit] = max(self.sizes.get(column.unit, 0.0), _size(column.values[rows]))
-        self.tracks: list[list[Any]] = []
-        self.found: dict[str, tuple[int, int, int]] = {}
-        self.units: dict[str, str] = {}
-
-    def add(self, column: Column) -> int:
-        """Take over a column; returns which of the numbers it is."""
-        if column.name in self.found:
-            return self.found[column.name][0]
-        values = column.values[self.rows]
-        size = _size(values)
-        if size <= max(_ROUNDING, _ROUNDING * self.sizes.get(column.unit, 0.0)):
-            # What stands still but for rounding has the digits of what moves.
-            size = self.sizes.get(column.unit, 0.0) if self.sizes.get(column.unit, 0.0) > _ROUNDING else 1.0
-        power = math.floor(math.log10(size))
-        power = 0 if _POWERS[0] < power < _POWERS[1] else 3 * (power // 3)
-        decimals = max(0, math.ceil(math.log10(_STEPS * 10.0**power / size)))
-        self.tracks.append([decimals, deltas(values, 10.0 ** (decimals - power))])
-        self.found[column.name] = len(self.tracks) - 1, decimals, power
-        factor = f"\N{MULTIPLICATION SIGN}10{style.raised(power)} " if power else ""
-        self.units[column.name] = f"{factor}{style.printed(column.unit)}".rstrip()
-        return len(self.tracks) - 1
-
-    def cell(self, column: Column) -> Cell:
-        """The column's number in the pose drawn."""
-        which = self.add(column)
-        _, decimals, power = self.found[column.name]
-        value = float(column.values[self.rows[self.begin]])
-        text = f"{value / 10.0**power:.{decimals}f}" if math.isfinite(value) else "\N{EN DASH}"
-        return Cell(which, text, self.units[column.name])
-
-
-def _size(values: Floats) -> float:
-    """How large the numbers of a column usually are; rates may be endless at a dead centre."""
-    known = np.abs(values[np.isfinite(values)])
-    return float(np.quantile(known, _COMMON) or known.max()) if len(known) else 0.0
-
-
-def deltas(values: Floats, factor: float) -> list[int | None]:
-    """Values times a factor as integers: the first, then the step from the last known one; None where there is none.
-
-    Steps of zero at the end are left out.
+    Of an optimisation it is that of the best design.
     """
-    found: list[int | None] = []
-    last = 0
-    for value in (values * factor).tolist():
-        whole = round(value) if math.isfinite(value) else None
-        found.append(None if whole is None else whole - last)
-        last = last if whole is None else whole
-    while found and found[-1] == 0:
-        found.pop()
-    return found
+    name = f"{result.command}-curves"
+    if result.command == "optimize":
+        designs = result.drawn["designs"]
+        study, result = result.drawn["design"](designs.numbers(designs.best))
+    with style.context():
+        if "motion" in result.tables and result.drawn["poses"].motion:
+            return _motion(study, result, name)
+        return roaming(study, result) if "local" in result.tables else None
 
 
-def _motion(study: Study, result: Result) -> Moving | None:
+def _motion(study: Study, result: Result, name: str) -> Moving | None:
     """The mechanism along its sweep or path, with the curves of its outputs."""
     whole = Sweep.of(result.drawn["motion"])
     some = np.unique(np.linspace(0, len(whole.rows) - 1, min(len(whole.rows), MAX_POSES)).round().astype(int))
@@ -152,15 +69,20 @@ def _motion(study: Study, result: Result) -> Moving | None:
     sheet = Sheet.around(whole.extent)
     numbers = Numbers(table, sweep.rows, begin)
     headings, rows = _rows(table, numbers)
-    data = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns, **_places(sheet, sweep)}
+    data = {
+        "poses": len(sweep.rows),
+        "first": begin,
+        "returns": whole.returns,
+        **places(sheet, sweep.configuration, sweep.configuration.valid, links),
+    }
     data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = [
-        [name, numbers.cell(table.column(name)).unit, numbers.add(table.column(name))]
-        for name in sweep.poses.values if name in table
+        [given, numbers.cell(table.column(given)).unit, numbers.add(table.column(given))]
+        for given in sweep.poses.values if given in table
     ]  # fmt: skip
     figure, beside = curves_figure(study, result), ""
     if figure is not None:
-        beside = inline(figure, f"{result.command}-curves", described(figure))
+        beside = inline(figure, name, described(figure))
         data["curves"] = _curves(study, sweep, figure, table, numbers)
     data["numbers"] = numbers.tracks
     drawing = _drawing(study, sweep, whole, sheet, begin)
@@ -179,34 +101,14 @@ def _drawing(study: Study, sweep: Sweep, whole: Sweep, sheet: Sheet, begin: int)
     for name in sweep.mechanism.description.links:
         for point in scene.link_points(name) if name != GROUND else ():
             owners.setdefault(point, name)
-    for point, places in sorted(whole.traces.items(), key=lambda item: ranked[item[0]]):
-        sketcher.trace(places, colors[owners[point]], *PATH_LOOKS[min(ranked[point] + lift, 2)])
+    for point, path in sorted(whole.traces.items(), key=lambda item: ranked[item[0]]):
+        sketcher.trace(path, colors[owners[point]], *PATH_LOOKS[min(ranked[point] + lift, 2)])
     sketcher.draw(whole.travel)
     some = sweep.valid[np.unique(np.linspace(0, len(sweep.valid) - 1, _NAMED_POSES).round().astype(int))]
     scenes = [pose(sweep.mechanism, sweep.configuration, int(index)) for index in some]
     sketcher.names([scene, *filter(None, scenes)])
     sketcher.ruler(study.units.label("length"))
     return tostring(root, encoding="unicode")
-
-
-def _places(sheet: Sheet, sweep: Sweep) -> dict[str, Any]:
-    """Places of the moving points and directions of the links, as the drawing has them."""
-    return places(sheet, sweep.configuration, sweep.configuration.valid, sweep.mechanism.description.links)
-
-
-def places(sheet: Sheet, configuration: Configuration, valid: Any, links: Mapping[str, Any]) -> dict[str, Any]:
-    """Places of the points and directions of the links in every pose, in the drawing's units and degrees."""
-    found: dict[str, Any] = {"corner": [sheet.corner.real, sheet.corner.imag], "scale": sheet.scale,
-                             "x": {}, "y": {}, "turn": {}}  # fmt: skip
-    for point in dict.fromkeys(point for link in links.values() for point in link_points(link)):
-        at = sheet.all(np.where(valid, configuration.point(point), complex(np.nan, np.nan)))
-        found["x"][point], found["y"][point] = deltas(at.real, PLACES), deltas(at.imag, PLACES)
-    for name in links:
-        if name != GROUND:
-            angles = np.full(len(valid), np.nan)
-            angles[valid] = np.unwrap(-np.angle(configuration.rotation(name)[valid]))
-            found["turn"][name] = deltas(np.degrees(angles), TURNS)
-    return found
 
 
 def _gaps(sweep: Sweep) -> list[tuple[int, int, str]]:

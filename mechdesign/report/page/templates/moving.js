@@ -258,10 +258,70 @@
     show(data.first);
   }
 
+  // A workspace: the mechanism follows the pointer, or the arrow keys, from pose to pose.
+  function workspace(figure, data) {
+    const drawing = figure.querySelector("svg"), words = figure.querySelector(".moving-words");
+    const layers = [...drawing.querySelectorAll(".moving-region")];
+    const choices = data.choices.map(each => ({...each, moved: linkage(drawing, each), told: numbers(figure, each)}));
+    const controls = figure.querySelector(".moving-controls");
+    let chosen = choices[0], at = chosen.first;
+
+    function show(pose) {
+      at = pose;
+      chosen.moved.show(at);
+      chosen.told.show(at);
+      words.textContent = [chosen.title, ...["x", "y"].map((axis, k) =>
+        `${data.point}.${axis} = ${chosen.told.text(k, at)} ${data.unit}`.trim())].filter(Boolean).join(", ");
+    }
+
+    // The nearest pose to a place; with a direction the nearest on that side.
+    function nearest(x, y, toward) {
+      const {x: xs, y: ys} = chosen.moved, px = xs[data.point], py = ys[data.point];
+      let best = -1, least = Infinity;
+      px.forEach((value, k) => {
+        if (toward && toward[0] * (value - px[at]) + toward[1] * (py[k] - py[at]) <= 1) return;
+        const far = Math.hypot(value - x, py[k] - y);
+        if (far < least) { least = far; best = k; }
+      });
+      return best < 0 ? at : best;
+    }
+
+    follow(drawing, true, (x, y) => { words.removeAttribute("aria-live"); show(nearest(x, y)); });
+    drawing.classList.add("moving-map");
+    drawing.setAttribute("tabindex", "0");
+    drawing.setAttribute("role", "application");
+    drawing.setAttribute("aria-label", `${drawing.getAttribute("aria-label")}; arrow keys move it`);
+    drawing.addEventListener("pointerdown", () => drawing.focus({preventScroll: true}));
+    const keys = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
+    drawing.addEventListener("keydown", event => {
+      const toward = keys[event.key], step = chosen.step * (event.shiftKey ? 5 : 1);
+      if (event.key === "Home") show(chosen.first);
+      else if (toward) {
+        const {x, y} = chosen.moved;
+        show(nearest(x[data.point][at] + step * toward[0], y[data.point][at] + step * toward[1], toward));
+      } else return;
+      words.setAttribute("aria-live", "polite");
+      event.preventDefault();
+    });
+    if (choices.length > 1) {
+      const select = html("select", {}, ...choices.map((each, k) => html("option", {value: k, textContent: each.title})));
+      select.addEventListener("change", () => {
+        const {x, y} = chosen.moved, place = [x[data.point][at], y[data.point][at]];
+        chosen = choices[select.value];
+        layers.forEach((layer, k) => layer.classList.toggle("moving-off", k !== Number(select.value)));
+        show(nearest(...place));
+      });
+      controls.append(html("label", {}, "At", select));
+    }
+    controls.append(html("span", {className: "moving-pace", textContent: "Move over the region, or use the arrow keys."}));
+    controls.hidden = false;
+    show(at);
+  }
+
   function start() {
     for (const figure of document.querySelectorAll("figure.moving")) {
       const data = JSON.parse(figure.querySelector("script").textContent);
-      motion(figure, data);
+      if (data.choices) workspace(figure, data); else motion(figure, data);
     }
   }
 
