@@ -69,12 +69,8 @@ def _motion(study: Study, result: Result, name: str) -> Moving | None:
     sheet = Sheet.around(whole.extent)
     numbers = Numbers(table, sweep.rows, begin)
     headings, rows = _rows(table, numbers)
-    data = {
-        "poses": len(sweep.rows),
-        "first": begin,
-        "returns": whole.returns,
-        **places(sheet, sweep.configuration, sweep.configuration.valid, links),
-    }
+    data = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
+    data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
     data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = [
         [given, numbers.cell(table.column(given)).unit, numbers.add(table.column(given))]
