@@ -52,7 +52,7 @@ def moving(study: Study, result: Result) -> Moving | None:
         designs = result.drawn["designs"]
         study, result = result.drawn["design"](designs.numbers(designs.best))
     with style.context():
-        if "motion" in result.tables and result.drawn["poses"].motion:
+        if "motion" in result.drawn and result.drawn["poses"].motion:
             return _motion(study, result, name)
         return roaming(study, result) if "local" in result.tables else None
 
@@ -69,7 +69,7 @@ def _motion(study: Study, result: Result, name: str) -> Moving | None:
     sheet = Sheet.around(whole.extent)
     numbers = Numbers(table, sweep.rows, begin)
     headings, rows = _rows(table, numbers)
-    data = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
+    data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
     data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = [
