@@ -86,7 +86,8 @@ for _name, _asked in COMMANDS.items():
 _add(
     "run",
     (
-        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST, given.RESUME,
+        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
+        given.RESUME,
     ),
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",

@@ -13,7 +13,15 @@ import numpy as np
 
 from mechdesign.cli import terminal
 from mechdesign.cli.execution import (
-    OUTCOMES, Outcome, answer, claim, folder, interrupted, load_study, tell, write_report,
+    OUTCOMES,
+    Outcome,
+    answer,
+    claim,
+    folder,
+    interrupted,
+    load_study,
+    tell,
+    write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
@@ -46,7 +54,7 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
     summary and the JUnit file then show what was finished.
     """
     answers: list[Outcome] = []
-    asked = paths or [None]
+    asked: Sequence[Path | None] = paths or [None]
     book = Book(options, several=len(asked) > 1)
     try:
         with closing(_answers(asked, options, book)) as found:

@@ -144,8 +144,9 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     content = manifest.is_current(directory, study, command, asked)
     if content is None:
         return None
+    numbers = {"worst": math.nan, "margin": math.nan}
     verdicts = [
-        Verdict(**{key: math.nan if value is None else value for key, value in entry.items()})
+        Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
         for entry in content["requirements"]
     ]
     if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):

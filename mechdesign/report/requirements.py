@@ -158,7 +158,7 @@ def _words(requirement: Requirement) -> str:
 
 
 def place_of(table: Table, row: int, judged: str, freedom: int) -> str:
-    """The row in words: its leading columns, which are the pose and words such as the method; nothing of an only row."""
+    """The row in words: its leading columns, which are the pose and words such as the method; an only row has none."""
     if len(table) == 1:
         return ""
     parts: list[str] = []

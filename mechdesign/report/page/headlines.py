@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mechdesign.report.requirements import place_of, unit_of
+from mechdesign.report.figures.style import printed
+from mechdesign.report.requirements import unit_of
 from mechdesign.results import Column, Result, Table
 
 # Most numbers of a question.
@@ -18,6 +19,7 @@ _DIGITS = 4
 _SMALL, _LARGE = 1e-3, 1e7
 _RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
 _MINUS = "\N{MINUS SIGN}"
+_TOGETHER = "\N{NO-BREAK SPACE}"
 _NARROW = "\N{NARROW NO-BREAK SPACE}"
 
 
@@ -128,7 +130,7 @@ def _of(rule: _Rule, table: Table, column: Column, freedom: int) -> Iterator[Hea
         best: dict[tuple[Any, ...], int] = {}
         for row in sorted(finite, key=lambda row: -sign * values[row]):
             best.setdefault(groups[row], row)
-        rows = sorted(best.values())
+        rows = [best[group] for group in dict.fromkeys(groups) if group in best]
     for row in rows:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
         unit = unit_of(table, column.name, row)
@@ -138,9 +140,19 @@ def _of(rule: _Rule, table: Table, column: Column, freedom: int) -> Iterator[Hea
         if rule.table == "extremes" and low == high:
             # Of a motion of one pose.
             yield Headline(words["output"], shown(low), unit)
-        elif low < high:
-            yield Headline(label, shown(values[row]), unit, rule.interval.format(low=shown(low), high=shown(high)))
         else:
-            several = len(table) > 1 and rule.row not in ("first", "each")
-            place = f"at {place_of(table, row, column.name, freedom)}" if several else ""
-            yield Headline(label, shown(values[row]), unit, place)
+            notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
+            if len(table) > 1 and rule.row not in ("first", "each"):
+                notes.append(f"at {_pose(table, row, column.name, freedom)}")
+            yield Headline(label, shown(values[row]), unit, "; ".join(notes))
+
+
+def _pose(table: Table, row: int, judged: str, freedom: int) -> str:
+    """The pose of a row: the numbers that its table begins with, at most `freedom`, or its own number."""
+    leading = [column for column in table.columns if column.numeric][:freedom]
+    values = [
+        f"{column.name} = {shown(column.values[row])} {printed(column.unit)}".strip().replace(" ", _TOGETHER)
+        for column in leading
+        if column.name != judged
+    ]
+    return ", ".join(values) or f"row {row + 1}"

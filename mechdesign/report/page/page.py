@@ -158,23 +158,23 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
     """The requirements of the questions that were asked, in the order of the study, each with its verdict."""
     by_command = {each.command: each for each in answers}
     verdicts = {command: iter(each.verdicts) for command, each in by_command.items()}
-    rows = []
+    rows: list[dict[str, Any]] = []
     for requirement in study.requirements:
         command = command_of(requirement)
         if command in by_command:
             verdict = next(verdicts[command], None)
-            rows.append({"command": command, "verdict": verdict, "met": verdict is not None and verdict.met}
-                        | _in_words(requirement))  # fmt: skip
+            met = verdict is not None and verdict.met
+            rows.append({"command": command, "verdict": verdict, "met": met, **_in_words(requirement)})
     return rows
 
 
 def _in_words(requirement: Requirement) -> dict[str, str]:
     path = requirement.result.partition(".")[2]
-    bounds = ("at least", requirement.at_least), ("at most", requirement.at_most)
+    bounds = ("\N{GREATER-THAN OR EQUAL TO}", requirement.at_least), ("\N{LESS-THAN OR EQUAL TO}", requirement.at_most)
     return {
         "what": f"|{path}|" if requirement.abs else path,
         "where": ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items()),
-        "limit": " and ".join(f"{words} {shown(bound)}" for words, bound in bounds if bound is not None),
+        "limit": ", ".join(f"{sign} {shown(bound)}" for sign, bound in bounds if bound is not None),
     }
 
 

@@ -6,14 +6,13 @@ import base64
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import cast
 from xml.etree import ElementTree
 
 import matplotlib
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont
 from matplotlib.ft2font import FT2Font
-from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
 from mechdesign.report.figures import style
@@ -44,7 +43,7 @@ def described(figure: Figure) -> str:
     parts: dict[str, None] = {}
     for axes in figure.axes:
         labels = axes.get_xlabel(), axes.get_ylabel()
-        titles = [axes.get_title(loc) for loc in ("left", "center", "right")]  # type: ignore[arg-type]
+        titles = [axes.get_title(loc) for loc in ("left", "center", "right")]
         words = [title for title in titles if title]
         words += [f"{labels[1]} over {labels[0]}" if all(labels) else "".join(labels)] if any(labels) else []
         parts.setdefault(": ".join(words), None)
@@ -68,7 +67,7 @@ def picture(figure: Figure, name: str, alt: str, png: bytes | None = None) -> st
         return drawn
     width, height = (round(inches * style.DPI) for inches in figure.get_size_inches())
     image = Element("img", alt=alt, width=f"{width}", height=f"{height}", src=f"data:image/png;base64,{pixels}")
-    return ElementTree.tostring(image, encoding="unicode", method="html")
+    return ElementTree.tostring(image, encoding="unicode")
 
 
 def inline(figure: Figure, name: str, alt: str) -> str:
@@ -83,7 +82,9 @@ def inline(figure: Figure, name: str, alt: str) -> str:
     with matplotlib.rc_context({"svg.fonttype": "none"}):
         root = ElementTree.fromstring(style.encoded(figure, "svg"))
     _clean(root, "")
-    used = {match for element in root.iter() for value in element.attrib.values() for match in _REFERENCE.findall(value)}
+    used = {
+        match for element in root.iter() for value in element.attrib.values() for match in _REFERENCE.findall(value)
+    }
     names = {old: f"{name}-{count}" for count, old in enumerate(dict.fromkeys(_ids(root, used)))}
     _rename(root, names)
     _unwrap(root)
@@ -94,7 +95,7 @@ def inline(figure: Figure, name: str, alt: str) -> str:
 
 
 def _halo(text: Text) -> float | None:
-    effects = cast(list[AbstractPathEffect], text.get_path_effects())
+    effects = text.get_path_effects()
     widths = [float(effect._gc["linewidth"]) for effect in effects if isinstance(effect, withStroke)]  # type: ignore[attr-defined]
     return widths[0] if len(widths) == len(effects) == 1 else None
 
