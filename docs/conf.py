@@ -1,4 +1,4 @@
-"""The site: Sphinx with Furo, Markdown by MyST, formulas by MathJax from a package; nothing is fetched from anywhere."""
+"""The site: Sphinx with Furo, Markdown by MyST, formulas by MathJax from a package; nothing is fetched."""
 
 import sys
 from pathlib import Path
@@ -21,7 +21,7 @@ extensions = [
     "sphinxcontrib.typer",
     "pages",
 ]
-exclude_patterns = ["README.md"]
+exclude_patterns = ["_run", "_build"]
 nitpicky = True
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3

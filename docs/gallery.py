@@ -34,11 +34,15 @@ def studies() -> dict[str, Path]:
     return {path.stem: path for path in sorted(CONFIGS.rglob("*.yaml"))}
 
 
+def _opening(text: str) -> list[str]:
+    """The lines of the comment that a study opens with."""
+    lines = text.splitlines()
+    return lines[: next(number for number, line in enumerate(lines) if not line.startswith("#"))]
+
+
 def comment(text: str) -> str:
     """The opening comment of a study as Markdown: paragraphs, and indented lines as they stand."""
-    opening = re.match(r"(?:#.*\n)*", text)
-    assert opening is not None
-    lines = [line[1:].removeprefix(" ") for line in opening.group().splitlines()]
+    lines = [line[1:].removeprefix(" ") for line in _opening(text)]
     return re.sub(r"(?m)(?:^ {2,}\S.*\n?)+", _block, "\n".join(lines) + "\n")
 
 
@@ -63,7 +67,9 @@ def page(path: Path) -> str:
     parts = [f"# {title}", comment(text)]
     if shown is not None:
         parts.append(f"![{title}](../../{shown.relative_to(ROOT).as_posix()})")
-    parts += [f"```sh\nmechdesign run {place}\n```", f"`{place}`:", f"```{{literalinclude}} ../../{place}\n:language: yaml\n```"]
+    begin = len(_opening(text)) + 1
+    parts.append(f"```sh\nmechdesign run {place}\n```\n\n`{place}`:")
+    parts.append(f"```{{literalinclude}} ../../{place}\n:language: yaml\n:lines: {begin}-\n```")
     return "\n\n".join(parts) + "\n"
 
 
