@@ -183,6 +183,10 @@ class ReliabilitySection(MotionSection):
     precision: Precision | None = None
     sobol: Annotated[int, fields.whole(0, 10**9)] | None = None
     allocate: Allocate | None = None
+    shown: Annotated[
+        Annotated[int, fields.whole(1, 10**9)] | None,
+        Field(description="Number of the pose, from 1, whose samples are shown; left out, the one that fails most."),
+    ] = None
 
     def checked(self, checker: Checker) -> Self:
         """Check what varies and what is limited as well; wildcards and the clearances' links are filled in."""
@@ -215,6 +219,9 @@ class ReliabilitySection(MotionSection):
                     "change gradually; ask for monte_carlo or quasi_monte_carlo, or another pin model"
                 )
                 checker.report(("reliability", "methods", index), message)
+        if self.shown is not None and not any(METHODS[method].sampled for method in self.methods):
+            message = "no method draws samples that could be shown; ask for monte_carlo, say, or leave it out"
+            checker.report(("reliability", "shown"), message, at_key=True)
         if self.allocate is not None:
             _allocate(checker, self, dimensions, clearances)
         load = _load(checker, self, dimensions)
