@@ -43,7 +43,7 @@ from mechdesign.analyses.workspace.tables import (
     where,
 )
 from mechdesign.errors import AssemblyError
-from mechdesign.indices import index
+from mechdesign.indices import REGIONAL, STATISTICS, index
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
@@ -215,18 +215,15 @@ def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluati
 def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str]]:
     """Unit and meaning of each column of the answer."""
     found = {
-        "GII": ("", "mean of the inverse condition number over the region"),
-        "GRI": (index("resistivity").unit(study, question.field), "mean of 1/abs(det J) over the region"),
+        "GII": ("", REGIONAL["GII"].meaning),
+        "GRI": (index("resistivity").unit(study, question.field), REGIONAL["GRI"].meaning),
     }
     found |= {name: (study.units.label(SHARED[name][0]), SHARED[name][1]) for name in ("SUI", "area", "box_area")}
     for name in (name for name in question.wanted if name not in COLUMNS):
         declared, kind = index(split(name)[0]), split(name)[1]
         unit = declared.unit(study, question.field)
-        found[name] = (unit, f"{_STATISTICS[kind]} over the region: {declared.meaning}")
+        found[name] = (unit, f"{STATISTICS[kind]} over the region: {declared.meaning}")
     return found
-
-
-_STATISTICS = {"mean": "mean", "min": "infimum", "max": "supremum", "std": "standard deviation"}
 
 
 def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
