@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mechdesign.analyses.kinematics.analysis import kinematics
-from mechdesign.errors import AssemblyError
+from mechdesign.errors import AssemblyError, Interrupted
 
 from .conftest import SLIDER, answer
 
@@ -70,8 +70,8 @@ def check(page):
     """What holds of every page, whatever is in it."""
     assert not page.wrong
     assert not page.open
-    # Nothing is asked of anybody: no address, and a policy that names by their hashes what may style and run.
-    assert "http" not in page.text.replace("http-equiv", "")
+    # Nothing is asked of anybody: no address but the name of SVG, and a policy that names by their hashes what may style and run.
+    assert "http" not in page.text.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")
     policy = next(each["content"] for each in page.all("meta") if each.get("http-equiv"))
     assert "default-src 'none'" in policy
     scripts = [
@@ -183,8 +183,8 @@ def test_an_index_tells_of_every_study(asks, analysis, invoke):
     assert "wrong study" in rows[0]
     assert "mechanism.links.crank" in rows[0]
     assert "stiffness: ✗ cannot be assembled" in rows[1]
-    assert "✗ 0 of 2" in rows[1]
-    assert "kinematics: ✓ done none asked" in rows[2]
+    assert "✗ 0 of 2 met" in rows[1]
+    assert "kinematics: ✓ done no requirements no warnings" in rows[2]
     assert [each["href"] for each in page.all("a")] == ["both/report.html", "slider/report.html"]
     assert len(page.all("img")) == 2
     failed = Page("results/both/report.html")
@@ -206,6 +206,20 @@ def test_an_interrupted_run_leaves_a_page_of_what_was_finished(asks, analysis, i
     assert "✗ interrupted" in " ".join(page.said("p"))
     assert "motion.csv" in page.text
     assert not Path("results/slider").exists()
+
+
+def test_the_finished_part_of_an_interrupted_question_is_in_its_page(folder, analysis, invoke):
+    def interrupt(study, **options):
+        raise Interrupted(answer(interrupted="2 of 3 poses"))
+
+    analysis(interrupt)
+    for command in (["kinematics"], ["run"]):
+        done = invoke(*command, "slider.yaml", "--report", "--out", "out")
+        assert done.exit_code == 130
+        page = Page("out/report.html")
+        check(page)
+        assert "✗ interrupted: 2 of 3 poses" in page.said("p")
+        assert "all 3 rows" in page.said("caption")
 
 
 def test_questions_after_a_failure_stand_as_not_asked(asks, analysis, invoke):

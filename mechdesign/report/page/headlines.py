@@ -142,17 +142,15 @@ def _of(rule: _Rule, table: Table, column: Column, freedom: int) -> Iterator[Hea
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
-            if len(table) > 1 and rule.row not in ("first", "each"):
-                notes.append(f"at {_pose(table, row, column.name, freedom)}")
+            if rule.row not in ("first", "each") and (place := _pose(table, row, column.name, freedom)):
+                notes.append(f"at {place}")
             yield Headline(label, shown(values[row]), unit, "; ".join(notes))
 
 
 def _pose(table: Table, row: int, judged: str, freedom: int) -> str:
-    """The pose of a row: the numbers that its table begins with, at most `freedom`, or its own number."""
-    leading = [column for column in table.columns if column.numeric][:freedom]
-    values = [
-        f"{column.name} = {shown(column.values[row])} {printed(column.unit)}".strip().replace(" ", _TOGETHER)
-        for column in leading
-        if column.name != judged
-    ]
-    return ", ".join(values) or f"row {row + 1}"
+    """The pose of a row: the numbers that its table begins with, at most `freedom`; nothing where all rows have it."""
+    leading = [column for column in table.columns if column.numeric and column.name != judged][:freedom]
+    if all(len(np.unique(column.values)) == 1 for column in leading):
+        return ""
+    values = (f"{column.name} = {shown(column.values[row])} {printed(column.unit)}" for column in leading)
+    return ", ".join(value.strip().replace(" ", _TOGETHER) for value in values)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Callable, Iterator
-from functools import cache
 from xml.etree import ElementTree
 
 import matplotlib
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties, findfont
-from matplotlib.ft2font import FT2Font
+from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
@@ -141,14 +139,11 @@ def _rounded(number: str) -> str:
     return (text if abs(float(number)) >= 0.1 or float(number) == 0 else f"{float(number):.4g}").replace("-0.", "-.")
 
 
-@cache
-def _font(weight: str) -> FT2Font:
-    return FT2Font(findfont(FontProperties(family="DejaVu Sans", weight=weight)))
-
-
 def _length(text: str, look: dict[str, str]) -> float:
     """How long a text was when the figure was laid out; it keeps this length where another font is taken."""
-    font = _font("bold" if look.get("font-weight") in ("bold", "700") else "normal")
+    weight = "bold" if look.get("font-weight") in ("bold", "700") else "normal"
+    # Matplotlib's own fonts, which it opens anew in a forked process: two that read one file at once find no letters.
+    font = get_font(findfont(FontProperties(family="DejaVu Sans", weight=weight)))
     font.set_size(100.0, 72)
     font.set_text(text)
     return float(font.get_width_height()[0]) / 64 * float(look.get("font-size", 10.0)) / 100
