@@ -155,11 +155,13 @@ def test_in_a_workspace_every_pose_keeps_the_links_and_has_its_numbers_from_the_
             assert np.ptp(lengths) < 3 / PLACES
     local, cells = result.tables["local"], dict(part.rows)
     found = in_study(data, places(data, "C"))
-    which = [int(np.argmin(np.abs(local["x"] + 1j * local["y"] - z))) for z in found]
+    # At the tips of a region several nodes lie within a step of the places.
+    far = np.abs((local["x"] + 1j * local["y"])[:, None] - found)
     for name in ("inverse_condition", "sigma_min"):
         decimals, steps = data["numbers"][cells[name][0].number]
         values = decoded(steps, data["poses"], 10**decimals)
-        assert values == pytest.approx(local[name][which], abs=0.51 * 10**-decimals)
+        off = np.where(far < 1 / PLACES / data["scale"], np.abs(local[name][:, None] - values), np.inf).min(axis=0)
+        assert off.max() <= 0.51 * 10**-decimals
 
 
 def test_listed_poses_do_not_move():
