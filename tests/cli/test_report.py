@@ -70,7 +70,7 @@ def check(page):
     """What holds of every page, whatever is in it."""
     assert not page.wrong
     assert not page.open
-    # Nothing is asked of anybody: no address but the name of SVG, and a policy that names by their hashes what may style and run.
+    # Nothing is asked of anybody: no address but the name of SVG, and a policy that names what may style and run.
     assert "http" not in page.text.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")
     policy = next(each["content"] for each in page.all("meta") if each.get("http-equiv"))
     assert "default-src 'none'" in policy

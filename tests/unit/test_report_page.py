@@ -98,7 +98,7 @@ def test_headlines_name_the_extreme_row_with_its_unit_and_pose() -> None:
     result = Result("stiffness", {"stiffness": table(
         "stiffness", theta=([0.0, 5.0, 10.0], "deg", "given"), k_min=([7.0, 4.0, nothing], "N/mm", "softest"),
     )})  # fmt: skip
-    (found,) = headlines(result, 1)
+    (found,) = headlines(result)
     assert (found.label, found.value, found.unit) == ("smallest stiffness", "4", "N/mm")
     assert found.note.replace("\N{NO-BREAK SPACE}", " ") == "at theta = 5 deg"
 
@@ -112,7 +112,7 @@ def test_headlines_of_every_method_with_the_interval_of_the_worst_pose() -> None
         failure_low=([0.01, 0.03, 0.015, 0.01], "", ""),
         failure_high=([0.01, 0.03, 0.025, 0.01], "", ""),
     )})  # fmt: skip
-    one, other = headlines(result, 1)
+    one, other = headlines(result)
     assert (one.label, one.value) == ("failure probability, analytic", "0.03")
     assert (other.label, other.value) == ("failure probability, auto", "0.02")
     assert other.note.startswith("99.7 % between 0.015 and 0.025; at theta")

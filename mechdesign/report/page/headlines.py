@@ -15,6 +15,8 @@ from mechdesign.results import Column, Result, Table
 
 # Most numbers of a question.
 MOST = 8
+# Meanings of the columns that make a pose.
+_POSE = ("drive", "given", "held coordinate")
 _DIGITS = 4
 _SMALL, _LARGE = 1e-3, 1e7
 _RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
@@ -92,8 +94,8 @@ def shown(value: float) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def headlines(result: Result, freedom: int) -> list[Headline]:
-    """The first numbers of a result, at most `MOST`, each of a name once; `freedom` is how many numbers make a pose."""
+def headlines(result: Result) -> list[Headline]:
+    """The first numbers of a result, at most `MOST`, each of a name once."""
     found: dict[str, Headline] = {}
     for rule in _RULES[result.command]:
         table = result.tables.get(rule.table)
@@ -103,7 +105,7 @@ def headlines(result: Result, freedom: int) -> list[Headline]:
             if column.numeric and fnmatchcase(column.name, rule.column) and fnmatchcase(column.meaning, rule.meaning):
                 if not _asked(result, rule, column):
                     continue
-                for each in _of(rule, table, column, freedom):
+                for each in _of(rule, table, column):
                     found.setdefault(each.label, each)
     return list(found.values())[:MOST]
 
@@ -117,7 +119,7 @@ def _asked(result: Result, rule: _Rule, column: Column) -> bool:
     return True
 
 
-def _of(rule: _Rule, table: Table, column: Column, freedom: int) -> Iterator[Headline]:
+def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
     values = np.asarray(column.values, dtype=float)
     if rule.row == "size":
         values = np.abs(values)
@@ -142,14 +144,14 @@ def _of(rule: _Rule, table: Table, column: Column, freedom: int) -> Iterator[Hea
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
-            if rule.row not in ("first", "each") and (place := _pose(table, row, column.name, freedom)):
+            if rule.row not in ("first", "each") and (place := _pose(table, row)):
                 notes.append(f"at {place}")
             yield Headline(label, shown(values[row]), unit, "; ".join(notes))
 
 
-def _pose(table: Table, row: int, judged: str, freedom: int) -> str:
-    """The pose of a row: the numbers that its table begins with, at most `freedom`; nothing where all rows have it."""
-    leading = [column for column in table.columns if column.numeric and column.name != judged][:freedom]
+def _pose(table: Table, row: int) -> str:
+    """The pose of a row, or what is held in it; nothing where all rows have the same."""
+    leading = [column for column in table.columns if column.meaning in _POSE]
     if all(len(np.unique(column.values)) == 1 for column in leading):
         return ""
     values = (f"{column.name} = {shown(column.values[row])} {printed(column.unit)}" for column in leading)

@@ -52,7 +52,7 @@ def section(
     shown = {name: html for name, html in pictures.items() if part is None or name != CURVES}
     return {
         "command": result.command,
-        "headlines": [dataclasses.asdict(each) for each in headlines(result, study.mechanism.mobility)],
+        "headlines": [dataclasses.asdict(each) for each in headlines(result)],
         "mechanism": mechanism,
         "pictures": [{"name": name, "html": html} for name, html in shown.items()],
         "moving": None if part is None else dataclasses.asdict(part),
