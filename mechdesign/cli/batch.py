@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechdesign.cli import terminal
+from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     OUTCOMES,
     Outcome,
@@ -25,7 +26,7 @@ from mechdesign.cli.execution import (
 )  # fmt: skip
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Interrupted, StudyError, explain
+from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
 from mechdesign.report.page import pages
@@ -93,7 +94,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 directory = folder(study, "check", options, several=len(asked) > 1)
                 terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
         except Exception as error:
-            code, message = explain(error)
+            code, message = explained(error)
             terminal.say(message)
             worst = max(worst, code)
     return worst
@@ -158,7 +159,7 @@ class Book:
             if self.several:
                 self._entries.append(self._entry(study, told))
         except Exception as error:
-            self._fail(f"{study.label}: report: {explain(error)[1]}", error)
+            self._fail(f"{study.label}: report: {explained(error)[1]}", error)
 
     def missing(self, given: Outcome) -> Outcome:
         """Note a study that could not be read in the index; gives it back."""
@@ -179,7 +180,7 @@ class Book:
             write_file(path, index(self._entries))
             terminal.say(f"index of the reports in {path}", quiet=self.options.quiet)
         except Exception as error:
-            self._fail(explain(error)[1], error)
+            self._fail(explained(error)[1], error)
 
     def _entry(self, study: Study, told: Sequence[Outcome]) -> Entry:
         from mechdesign.report.page.page import Entry, thumbnail
@@ -198,11 +199,11 @@ class Book:
 
     def _fail(self, message: str, error: Exception) -> None:
         terminal.say(message)
-        self.exit_code = max(self.exit_code, explain(error)[0])
+        self.exit_code = max(self.exit_code, explained(error)[0])
 
 
 def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
-    code, message = explain(error)
+    code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     return Outcome(label, command, directory, code, 0, failed=message)
 
