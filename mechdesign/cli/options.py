@@ -10,11 +10,10 @@ from typing import Annotated, Any
 import typer
 
 from mechdesign.errors import StudyError
+from mechdesign.files import formats_of
 
 # Template of the study that is taken where there is none.
 BUILT_IN = "two_link_arm"
-# Of pictures.
-FORMATS = ("png", "svg", "pdf")
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
@@ -67,6 +66,10 @@ QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wro
 NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
 FORMAT = _text("formats", str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.")
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
+REPORT = _flag("report", "--report", "Also write report.html: one page with all of it, which moves.")
+REPORTS = _flag(
+    "report", "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
+)
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
 FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
@@ -101,6 +104,7 @@ class Options:
     quiet: bool = False
     no_plots: bool = False
     formats: str | None = None
+    report: bool = False
     animate: bool = False
     all_modes: bool = False
     junit: Path | None = None
@@ -112,11 +116,9 @@ class Options:
             raise StudyError("--animate and --no-plots contradict each other")
         if self.formats is not None and self.no_plots:
             raise StudyError("--format and --no-plots contradict each other")
-        for kind in self.kinds.split(","):
-            if kind not in FORMATS:
-                raise StudyError(f"--format takes {', '.join(FORMATS)} or several with commas between, not {kind!r}")
+        formats_of(self.formats, "--format")
 
     @property
     def kinds(self) -> str:
         """Formats of the pictures, with commas between them."""
-        return ",".join(dict.fromkeys((self.formats or FORMATS[0]).replace(" ", "").lower().split(",")))
+        return formats_of(self.formats, "--format")
