@@ -22,6 +22,7 @@ from mechdesign.analyses.kinematics.motion import (
     move,
 )
 from mechdesign.analyses.kinematics.peaks import extremes, needed
+from mechdesign.analyses.kinematics.special_poses import special_poses
 from mechdesign.analyses.poses import Keeper, Shown, judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
@@ -114,6 +115,7 @@ def kinematics(
         warnings += _without_centre(motion)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(motion.reason))}
     drawn: dict[str, Any] = {"poses": poses, "motion": keeper.shown}
+    drawn["special"] = special_poses(motion, keeper.shown, swept, ends, tables.get("toggles"))
     if all_modes:
         tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
         warnings += told
