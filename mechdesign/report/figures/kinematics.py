@@ -77,18 +77,20 @@ _DPI = 60
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """``motion`` (curves of a sweep or path), ``paths`` (poses and point paths) and ``modes`` (every assembly).
+    """``motion``, ``paths``, ``poses``, ``transmission`` and ``modes``.
 
-    Lists and grids of poses have neither curves nor paths.
+    They are curves of a sweep or path, poses and point paths, limits or listed poses one by one, how force is passed
+    on, and every assembly. Lists of poses have neither curves nor paths, grids have no pictures but their assemblies.
     """
     found = Gallery()
     if result.drawn["poses"].motion:
         found.add("motion", curves_figure, study, result)
         sweep = Sweep.of(result.drawn["motion"])
         if len(sweep.valid):
-            found.add("transmission", transmission_figure, study, result)
             found.add("paths", paths_figure, sweep, centres=result.tables.get("instant_centres"))
     found.add("poses", poses_figure, study, result)
+    if result.drawn["poses"].motion:
+        found.add("transmission", transmission_figure, study, result)
     if "modes" in result.tables:
         found.add("modes", modes_figure, study, result)
     return found

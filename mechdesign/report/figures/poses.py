@@ -20,6 +20,7 @@ from mechdesign.analyses.kinematics.special_poses import LIMIT, SpecialPose, Spe
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, extent, fit, windows
+from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.scene import Sweep, pose, ranks
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -47,7 +48,6 @@ _KEY_ARROW = 0.9  # inches, an arrow of the key at most
 _HEAD = 8.5  # points, a head's length, and of its arrow at most
 _HEAD_SHARE = 0.6
 _NEAR = 1.1  # larger sides of the mechanism from its middle up to which instant centres are drawn
-_ROUND = np.outer(10.0 ** np.arange(-30, 31), (1, 2, 5)).ravel()
 _TICK_EDGE = 0.07  # of a panel's width, at both ends, without the number of a tick
 _ORDER = 5.2  # above links and pins
 _SHAPES = ("o", "s", "D", "^", "v", "p")
@@ -260,11 +260,11 @@ def _draw_key(
     for kind, scale in zip(_KINDS, scales, strict=True):
         if scale:
             most = min(_LONGEST * side, _KEY_ARROW / inches)
-            value = float(_ROUND[np.searchsorted(_ROUND, most / scale, "right") - 1])
+            value = round_down(most / scale)
             length = value * scale * inches
             key = arrow(complex(x, line), length, kind, 1.0, transform=figure.dpi_scale_trans, label=kind.name)
             figure.add_artist(key)
-            x = write(x + length + 0.1, f"{kind.name} {value:g} {style.printed(study.units.label(kind.name))}")
+            x = write(x + length + 0.1, f"{kind.name} {quantity(value, study.units.label(kind.name))}")
     for row in rows:
         line, x = line - _KEY, LEFT
         for words, shape in row:
