@@ -223,6 +223,21 @@ def test_a_limit_of_motion_is_a_special_pose_without_rates():
     assert [each.place for each in poses.shown] == sorted(each.place for each in poses.shown)
 
 
+def test_a_stretched_arm_is_a_special_pose():
+    arm = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 50], lower: [E, P, 30]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
+  sketch: {E: [30, 30], P: [10, 50]}
+kinematics: {sweep: {q1: 30, q2: {from: -97, to: 200, step: 11}}, rates: {q2: 10}, outputs: [P]}
+"""
+    study = study_of(arm)
+    poses = mechdesign.kinematics(study).drawn["special"]
+    singular = [each for each in poses.shown if each.what == "singular: det_J is 0"]
+    assert [each.place for each in singular] == pytest.approx([0, 180], abs=1e-8)
+    assert drawn(study)["poses"].texts[0].get_text() == "singular poses, poses between"
+
+
 def test_special_poses_of_one_configuration_are_shown_once():
     """The outer dead centre of an engine at 0 and 360 deg is one pose."""
     slider = FOUR_BAR.replace("rocker: [D, B, 60]", "rocker: {B: [0, 0]}").replace(

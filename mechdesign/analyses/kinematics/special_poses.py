@@ -16,8 +16,9 @@ from mechdesign.analyses.kinematics.rates import drive_rates
 from mechdesign.analyses.poses import Shown, SolvedPoses, in_study_units, pose_in_words, solve_poses
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
-from mechdesign.mechanism.derivatives import STALLED, regularity
+from mechdesign.mechanism.derivatives import STALLED, Jacobian, regularity
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.results import Table
 from mechdesign.study.poses import PoseGroup, Poses
 
@@ -29,6 +30,9 @@ FEW = 4
 SAME = 1e-6
 DIGITS = 4
 LIMIT = "limit of motion"
+SINGULAR = "singular: det_J is 0"
+# Of the place of a singularity, as a part of a step.
+ROOT_PRECISION = 1e-12
 CHANGE_POINT = "change point: all links in line"
 
 
@@ -132,6 +136,7 @@ def _events(motion: Motion, swept: str, ends: Sequence[Boundary], toggles: Table
         state = row["state"].replace("perpendicular", "perpendicular to the slide")
         whole = row["effect"] == "change point"
         found.append(Event(row[swept], (CHANGE_POINT if whole else f"{pair} {state}: {row['effect']}",)))
+    found += [Event(place, (SINGULAR,)) for place in _singular(motion, swept)]
     found.sort(key=lambda event: (event.place - values[0]) * (values[-1] - values[0]))
     merged: list[Event] = []
     for event in found:
@@ -143,22 +148,53 @@ def _events(motion: Motion, swept: str, ends: Sequence[Boundary], toggles: Table
     return merged
 
 
-def _at_events(motion: Motion, swept: str, events: Sequence[Event]) -> list[SpecialPose]:
-    """The poses of events; those that cannot be assembled (at infinity) are left out."""
-    study, whole = motion.question.study, motion.question.poses
-    (group,), count = whole.groups, len(events)
-    places = np.array([event.place for event in events])
+def _singular(motion: Motion, swept: str) -> list[float]:
+    """Where the determinant of a Jacobian of several outputs changes its sign along a sweep, in the study's units.
+
+    Of one output and one drive that is where the output turns back.
+    """
+    question = motion.question
+    if not question.square or len(question.drives) < 2:
+        return []
+    study, values, det = question.study, question.poses.groups[0].values[swept], motion.arrays["det_J"]
+    known = motion.valid & np.isfinite(det)
+    rows = np.flatnonzero(known[:-1] & known[1:] & ((det[:-1] > 0) != (det[1:] > 0)))
+
+    def determinant(_: Ints, places: Floats) -> Floats:
+        (solved,) = solve_poses(study, _poses_at(motion, swept, places))
+        linear = study.mechanism.linearize(solved.configuration)
+        value = np.where(solved.configuration.valid, Jacobian.of(linear, question.listed).determinant, np.nan)
+        return np.broadcast_to(value, places.shape)
+
+    low, high, none = values[rows], values[rows + 1], np.full(len(rows), np.nan)
+    tolerance = ROOT_PRECISION * np.abs(high - low)
+    roots = bracketed_roots(determinant, low, det[rows], high, det[rows + 1], none, none, tolerance)
+    # A determinant that jumps through infinity has no root.
+    size = np.nanmax(np.abs(det[known]), initial=0.0)
+    return roots[np.abs(determinant(rows, roots)) <= SAME * size].tolist() if len(rows) else []
+
+
+def _poses_at(motion: Motion, swept: str, places: Floats) -> Poses:
+    """Places on a sweep as poses that stand for themselves."""
+    whole, count = motion.question.poses, len(places)
+    (group,) = whole.groups
     along = np.argsort(group.values[swept], kind="stable")
 
     def there(values: Floats) -> Floats:
         return np.asarray(np.interp(places, group.values[swept][along], values[along]))
 
     values = {name: places if name == swept else there(group.values[name]) for name in group.names}
-    poses = Poses(
+    return Poses(
         (PoseGroup(group.names, values, np.arange(count)),), count, True, (count,),
         slopes={name: there(each) for name, each in whole.slopes.items()},
         bends={name: there(each) for name, each in whole.bends.items()},
     )  # fmt: skip
+
+
+def _at_events(motion: Motion, swept: str, events: Sequence[Event]) -> list[SpecialPose]:
+    """The poses of events; those that cannot be assembled (at infinity) are left out."""
+    study, count = motion.question.study, len(events)
+    poses = _poses_at(motion, swept, np.array([event.place for event in events]))
     (solved,) = solve_poses(study, poses) if count else (None,)
     found = []
     for k, event in enumerate(events):

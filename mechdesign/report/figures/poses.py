@@ -16,7 +16,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
 from mechdesign.analyses.kinematics.instant_centres import Centre
-from mechdesign.analyses.kinematics.special_poses import LIMIT, SpecialPose, SpecialPoses
+from mechdesign.analyses.kinematics.special_poses import LIMIT, SINGULAR, SpecialPose, SpecialPoses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, extent, fit, windows
@@ -180,7 +180,9 @@ def _heading(found: SpecialPoses, result: Result) -> str:
     heading = "poses asked for" if result.drawn["poses"].listed else "poses spread evenly over the motion"
     if found.special:
         ends = [each.what.startswith(LIMIT) for each in found.shown if each.what]
-        parts = ["limits of the motion"] * any(ends) + ["links that come into line"] * (not all(ends))
+        singular = [each.what.startswith(SINGULAR) for each in found.shown if each.what]
+        parts = ["limits of the motion"] * any(ends) + ["singular poses"] * any(singular)
+        parts += ["links that come into line"] * (sum(ends) + sum(singular) < len(ends))
         parts += ["poses between"] * any(not each.what for each in found.shown)
         heading = ", ".join(parts)
     return heading + (f"; the first {len(found.shown)}, and {found.left_out} more" if found.left_out else "")
