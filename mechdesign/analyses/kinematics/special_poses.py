@@ -33,6 +33,7 @@ LIMIT = "limit of motion"
 SINGULAR = "singular: det_J is 0"
 # Of the place of a singularity, as a part of a step.
 ROOT_PRECISION = 1e-12
+AT_ZERO = 1e-10  # part of the sweep's range: a place as near to zero is zero
 CHANGE_POINT = "change point: all links in line"
 
 
@@ -171,6 +172,7 @@ def _singular(motion: Motion, swept: str) -> list[float]:
     roots = bracketed_roots(determinant, low, det[rows], high, det[rows + 1], none, none, tolerance)
     # A determinant that jumps through infinity has no root.
     size = np.nanmax(np.abs(det[known]), initial=0.0)
+    roots = np.where(np.abs(roots) <= AT_ZERO * np.ptp(values), 0.0, roots)
     return roots[np.abs(determinant(rows, roots)) <= SAME * size].tolist() if len(rows) else []
 
 
