@@ -47,6 +47,7 @@ class _Rule:
     by: tuple[str, ...] = ()  # columns of words of which each value counts by itself
     bounds: tuple[str, str] | None = None  # columns of the ends between which it lies
     interval: str = "from {low} to {high}"
+    several: str = ""  # what the rows are, where the smallest of several is told beside the largest
 
 
 _RULES: dict[str, tuple[_Rule, ...]] = {
@@ -57,10 +58,10 @@ _RULES: dict[str, tuple[_Rule, ...]] = {
         _Rule("motion", "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
     ),
     "workspace": (
-        _Rule("indices", "area", "area of the region", "largest"),
-        _Rule("indices", "SUI", "area over that of the rectangle around it", "largest"),
-        _Rule("indices", "circle_radius", "radius of the largest circle inside", "largest"),
-        _Rule("indices", "*_mean", "mean {name}", "largest", "mean over *"),
+        _Rule("indices", "area", "area of the region", "largest", several="regions"),
+        _Rule("indices", "SUI", "area over that of the rectangle around it", "largest", several="regions"),
+        _Rule("indices", "circle_radius", "radius of the largest circle inside", "largest", several="regions"),
+        _Rule("indices", "*_mean", "mean {name}", "largest", "mean over *", several="regions"),
     ),
     "optimize": (
         _Rule("optimum", "*", "best {name}", "first", "design variable"),
@@ -146,6 +147,10 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
             if rule.row not in ("first", "each") and (place := _pose(table, row)):
                 notes.append(f"at {place}")
+            if rule.several and len(finite) > 1:
+                notes.append(
+                    f"the largest of {len(finite)} {rule.several}, the smallest is {shown(values[finite].min())}"
+                )
             yield Headline(label, shown(values[row]), unit, "; ".join(notes))
 
 
