@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechdesign.cli import terminal
+from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     OUTCOMES,
     Outcome,
@@ -93,7 +94,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 directory = folder(study, "check", options, several=len(asked) > 1)
                 terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
         except Exception as error:
-            code, message = explain(error)
+            code, message = explained(error)
             terminal.say(message)
             worst = max(worst, code)
     return worst
@@ -202,7 +203,7 @@ class Book:
 
 
 def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
-    code, message = explain(error)
+    code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     return Outcome(label, command, directory, code, 0, failed=message)
 
