@@ -125,20 +125,21 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
     if rule.row == "size":
         values = np.abs(values)
     groups = list(zip(*(table[name].tolist() for name in rule.by), strict=True)) or [()] * len(table)
-    finite = np.flatnonzero(np.isfinite(values)).tolist()
+    valid = table["valid"].astype(bool) if "valid" in table else np.ones(len(table), dtype=bool)
+    finite = np.flatnonzero(np.isfinite(values) & valid)
     if rule.row in ("first", "each"):
-        rows = finite[: 1 if rule.row == "first" else None]
+        rows = finite[: 1 if rule.row == "first" else None].tolist()
     else:
-        sign = -1.0 if rule.row == "smallest" else 1.0
+        sign = 1.0 if rule.row == "smallest" else -1.0
         best: dict[tuple[Any, ...], int] = {}
-        for row in sorted(finite, key=lambda row: -sign * values[row]):
+        for row in finite[np.argsort(sign * values[finite], kind="stable")].tolist():
             best.setdefault(groups[row], row)
         rows = [best[group] for group in dict.fromkeys(groups) if group in best]
     for row in rows:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
         unit = unit_of(table, column.name, row)
         name = column.name.removesuffix("_effort").removesuffix("_mean")
-        label = rule.label.format(**words, name=name, meaning=column.meaning)
+        label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
         low, high = (float(table[each][row]) for each in rule.bounds or (column.name, column.name))
         if rule.table == "extremes" and low == high:
             # Of a motion of one pose.
@@ -148,9 +149,8 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
             if rule.row not in ("first", "each") and (place := _pose(table, row)):
                 notes.append(f"at {place}")
             if rule.several and len(finite) > 1:
-                notes.append(
-                    f"the largest of {len(finite)} {rule.several}, the smallest is {shown(values[finite].min())}"
-                )
+                least = shown(values[finite].min())
+                notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
             yield Headline(label, shown(values[row]), unit, "; ".join(notes))
 
 
