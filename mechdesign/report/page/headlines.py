@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.report.figures.style import printed
 from mechdesign.report.requirements import unit_of
@@ -17,6 +18,8 @@ from mechdesign.results import Column, Result, Table
 MOST = 8
 # Meanings of the columns that make a pose.
 _POSE = ("drive", "given", "held coordinate")
+# Part of the numbers beside it below which one differs from zero by rounding alone.
+_NOISE = 1e-12
 _DIGITS = 4
 _SMALL, _LARGE = 1e-3, 1e7
 _RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
@@ -127,6 +130,8 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
     groups = list(zip(*(table[name].tolist() for name in rule.by), strict=True)) or [()] * len(table)
     valid = table["valid"].astype(bool) if "valid" in table else np.ones(len(table), dtype=bool)
     finite = np.flatnonzero(np.isfinite(values) & valid)
+    if rule.row == "size" and values[finite].max(initial=0.0) <= _NOISE * _scale(table, column.unit, finite):
+        return
     if rule.row in ("first", "each"):
         rows = finite[: 1 if rule.row == "first" else None].tolist()
     else:
@@ -152,6 +157,13 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
                 least = shown(values[finite].min())
                 notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
             yield Headline(label, shown(values[row]), unit, "; ".join(notes))
+
+
+def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
+    """The largest size of a table's numbers of a unit."""
+    alike = (each.values for each in table.columns if each.numeric and each.unit == unit)
+    sizes = (np.abs(np.asarray(values, dtype=float)[rows]) for values in alike)
+    return max(float(size.max(initial=0.0, where=np.isfinite(size))) for size in sizes)
 
 
 def _pose(table: Table, row: int) -> str:
