@@ -62,7 +62,6 @@ def section(
         "counts": plain(dict(result.counts)),
         "warnings": [*result.warnings, *warnings],
         "interrupted": result.interrupted,
-        "plots": plots,
     }, warnings
 
 
