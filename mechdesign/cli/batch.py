@@ -159,7 +159,7 @@ class Book:
             if self.several:
                 self._entries.append(self._entry(study, told))
         except Exception as error:
-            self._fail(f"{study.label}: report: {explain(error)[1]}", error)
+            self._fail(f"{study.label}: report: {explained(error)[1]}", error)
 
     def missing(self, given: Outcome) -> Outcome:
         """Note a study that could not be read in the index; gives it back."""
@@ -180,7 +180,7 @@ class Book:
             write_file(path, index(self._entries))
             terminal.say(f"index of the reports in {path}", quiet=self.options.quiet)
         except Exception as error:
-            self._fail(explain(error)[1], error)
+            self._fail(explained(error)[1], error)
 
     def _entry(self, study: Study, told: Sequence[Outcome]) -> Entry:
         from mechdesign.report.page.page import Entry, thumbnail
@@ -199,7 +199,7 @@ class Book:
 
     def _fail(self, message: str, error: Exception) -> None:
         terminal.say(message)
-        self.exit_code = max(self.exit_code, explain(error)[0])
+        self.exit_code = max(self.exit_code, explained(error)[0])
 
 
 def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:

@@ -88,6 +88,10 @@ def rows_of(answers, name):
     return list(answers[name][1].tables["motion"])
 
 
+def words(page):
+    return page.locator(".moving-words").inner_text().replace("\N{NO-BREAK SPACE}", " ")
+
+
 def place(page, point):
     """Where the joint of a point stands in the drawing, in the study's units."""
     transform = page.locator(f".moving [data-at={point}]:has(circle)").get_attribute("transform")
@@ -105,7 +109,7 @@ def test_slider_and_keys_bring_the_pin_to_where_the_table_has_it(opened, answers
         x, _, error = place(page, "B")
         assert x == pytest.approx(rows[row]["B.x"], abs=error)
         assert slider.input_value() == str(row)
-        assert f"crank = {rows[row]['crank']:.1f} deg" in page.locator(".moving-words").inner_text()
+        assert f"crank = {rows[row]['crank']:.1f} deg" in words(page)
         assert float(page.locator("tr:has(th:text-is('B.x')) td span").first.inner_text()) == pytest.approx(
             rows[row]["B.x"], abs=1e-3)  # fmt: skip
 
@@ -159,7 +163,7 @@ def test_poses_that_cannot_be_assembled_are_said_and_not_drawn(opened, answers):
     page, rows = opened("rrr_platform"), rows_of(answers, "rrr_platform")
     bad = next(k for k, row in enumerate(rows) if not row["valid"])
     page.get_by_role("slider").fill(str(bad))
-    assert "cannot be assembled here" in page.locator(".moving-words").inner_text()
+    assert "cannot be assembled here" in words(page)
     assert page.locator(".moving [data-at=P]:has(circle)").is_hidden()
     page.get_by_role("slider").fill(str(bad - 1))
     assert page.locator(".moving [data-at=P]:has(circle)").is_visible()
@@ -178,7 +182,7 @@ def test_in_a_workspace_the_mechanism_follows_pointer_and_keys(opened):
     drawing.press("ArrowLeft")
     after = place(page, "C")
     assert after[0] < before[0]
-    assert f"C.x = {after[0]:.1f}"[:-2] in page.locator(".moving-words").inner_text()
+    assert f"C.x = {after[0]:.1f}"[:-2] in words(page)
 
 
 @pytest.mark.parametrize("width", [400, 1400])

@@ -132,7 +132,7 @@ def test_time_goes_as_the_rates_have_it():
 def test_poses_that_cannot_be_assembled_are_said():
     part, result = shown("rrr_platform")
     bad = np.flatnonzero(result.tables["motion"]["valid"] == 0)
-    assert part.data["gaps"] == [(bad[0], bad[-1], "cannot be assembled")]
+    assert part.data["gaps"] == [(bad[0], bad[-1], "cannot be assembled here")]
 
 
 def test_a_motion_of_361_poses_is_small_and_the_same_again():

@@ -48,6 +48,7 @@ _LETTER = 0.6  # width of a letter in sizes
 _DIRECTIONS = 8  # in which names may stand
 _NET = np.linspace(0, 1, 9)  # places along a bar that names should not cover
 _FOOT = np.array([-10, -5, 0, 5, 10]) + 8j  # places that the symbol of a pivot covers
+_ROUND = ("stroke-linecap", "stroke-linejoin")
 _RULER = 0.3  # part of the width that the bar of the scale is long at most
 _LETTERS = {int(Path.MOVETO): "M", int(Path.LINETO): "L"}
 
@@ -86,7 +87,9 @@ class Sheet:
     def root(self, alt: str) -> Element:
         """The drawing, empty but for its white card."""
         looks = {"viewBox": f"0 0 {self.width:g} {self.height:.1f}", "role": "img", "aria-label": alt, "fill": "none"}
-        root = Element("svg", looks | {"stroke-linecap": "round", "stroke-linejoin": "round"})
+        root = Element(
+            "svg", looks | {"class": "moving-drawing", "stroke-linecap": "round", "stroke-linejoin": "round"}
+        )
         add(root, "rect", width="100%", height="100%", fill="white")
         return root
 

@@ -39,6 +39,12 @@ _SHORTEST, _LONGEST = 2.0, 12.0
 _ASTRAY = 0.05  # part of a step by which the rates may lead elsewhere
 _TIMES = 10_000  # integers in the time of a motion
 _ARROW = 70.0  # length of the arrow of a usual velocity
+_WHY = {
+    Reason.NOT_CLOSED: "cannot be assembled here",
+    Reason.OTHER_ASSEMBLY: "in another assembly only",
+    Reason.LIMIT: "beyond a limit",
+    Reason.NOT_HELD: "does not hold its load here",
+}
 _RATES = ("velocity", "acceleration")
 
 
@@ -109,11 +115,11 @@ def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], 
 
 
 def _gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
-    """Runs of poses that are not valid: the first, the last, why."""
+    """Runs of poses that are not valid: the first, the last, why in words."""
     reason = sweep.configuration.reason
     ends = np.flatnonzero(np.diff(reason)) + 1
     runs = zip(np.append(0, ends).tolist(), np.append(ends, len(reason)).tolist(), strict=True)
-    return [(begin, end - 1, Reason(int(reason[begin])).text) for begin, end in runs if reason[begin]]
+    return [(begin, end - 1, _WHY[Reason(int(reason[begin]))]) for begin, end in runs if reason[begin]]
 
 
 def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, list[Cell | None]]]]:

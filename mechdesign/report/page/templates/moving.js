@@ -38,6 +38,9 @@
     return element;
   }
 
+  // A number in words that are not broken into lines.
+  const said = (name, text, unit) => `${name} = ${text} ${unit}`.trim().replaceAll(" ", "\u00a0");
+
   // A place of the pointer in the units of a drawing.
   function within(drawing, event) {
     const box = drawing.getBoundingClientRect(), size = drawing.viewBox.baseVal;
@@ -207,8 +210,8 @@
       at = pose;
       const near = Math.round(pose) % data.poses, broken = gap(near);
       moved.show(pose); told.show(near); rates.show(pose); point(Math.min(pose, last));
-      const text = data.given.map(([name, unit, which]) => `${name} = ${told.text(which, near)} ${unit}`.trim()).join(", ") +
-        (broken ? `: ${broken[2]} here` : "");
+      const text = data.given.map(([name, unit, which]) => said(name, told.text(which, near), unit)).join(", ") +
+        (broken ? `: ${broken[2]}` : "");
       words.textContent = text;
       slider.value = near;
       slider.setAttribute("aria-valuetext", text);
@@ -283,7 +286,7 @@
       chosen.moved.show(at);
       chosen.told.show(at);
       words.textContent = [chosen.title, ...["x", "y"].map((axis, k) =>
-        `${data.point}.${axis} = ${chosen.told.text(k, at)} ${data.unit}`.trim())].filter(Boolean).join(", ");
+        said(`${data.point}.${axis}`, chosen.told.text(k, at), data.unit))].filter(Boolean).join(", ");
     }
 
     // The nearest pose to a place; with a direction the nearest on that side.
