@@ -129,8 +129,8 @@
       [moved.x[point], moved.y[point], ...parts.map(part => decode(part, data.poses, PLACES)), make("path", {}, layer)]);
     if (found.length) {
       const size = drawing.viewBox.baseVal, [length, words] = data.arrow;
-      make("path", {d: `M${size.width - 14 - length} ${size.height - 12}h${length}m-8 -4l8 4l-8 4`}, layer);
-      const text = make("text", {x: size.width - 14, y: size.height - 20, "text-anchor": "end", "font-size": 10,
+      make("path", {d: `M${size.width - 14 - length} ${size.height - 10}h${length}m-8 -4l8 4l-8 4`}, layer);
+      const text = make("text", {x: size.width - 14, y: size.height - 18, "text-anchor": "end", "font-size": 10,
         fill: "#D55E00", stroke: "none"}, layer);
       text.textContent = words;
     }
