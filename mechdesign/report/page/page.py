@@ -141,6 +141,7 @@ def _page(template: str, *, moving: bool, **content: Any) -> bytes:
         loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
     styles = _text("page.css") + (_text("moving.css") if moving else "")
     script = _text("moving.js") if moving else ""
