@@ -26,7 +26,7 @@ from mechdesign.cli.execution import (
 )  # fmt: skip
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Interrupted, StudyError, explain
+from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
 from mechdesign.report.page import pages
