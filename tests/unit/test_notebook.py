@@ -159,6 +159,7 @@ def test_a_result_shows_what_is_met_and_how_its_main_table_begins() -> None:
     assert {"script", "style", "link"}.isdisjoint(tag for tag, _ in page.found)
     assert len(page.all("img")) == 1
     assert [verdict.met for verdict in result.verdicts] == [True, False]
+    assert "range of B.x: 54 mm (from 50 to 104)" in page.text
     begins = ("[mm]", "2 more columns", "extremes, 7 rows", "pictures: motion, paths")
     for words in (HOSTILE, "How does it move?", "1 of 2 met", "✗ not met", *begins):
         assert words in page.text

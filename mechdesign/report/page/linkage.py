@@ -28,6 +28,7 @@ from mechdesign.report.figures.drawing import (
     Color,
     Travel,
     bodies,
+    darker,
     lighter,
     link_colors,
     reach,
@@ -47,6 +48,7 @@ _LETTER = 0.6  # width of a letter in sizes
 _DIRECTIONS = 8  # in which names may stand
 _NET = np.linspace(0, 1, 9)  # places along a bar that names should not cover
 _FOOT = np.array([-10, -5, 0, 5, 10]) + 8j  # places that the symbol of a pivot covers
+_ROUND = ("stroke-linecap", "stroke-linejoin")
 _RULER = 0.3  # part of the width that the bar of the scale is long at most
 _LETTERS = {int(Path.MOVETO): "M", int(Path.LINETO): "L"}
 
@@ -85,7 +87,9 @@ class Sheet:
     def root(self, alt: str) -> Element:
         """The drawing, empty but for its white card."""
         looks = {"viewBox": f"0 0 {self.width:g} {self.height:.1f}", "role": "img", "aria-label": alt, "fill": "none"}
-        root = Element("svg", looks | {"stroke-linecap": "round", "stroke-linejoin": "round"})
+        root = Element(
+            "svg", looks | {"class": "moving-drawing", "stroke-linecap": "round", "stroke-linejoin": "round"}
+        )
         add(root, "rect", width="100%", height="100%", fill="white")
         return root
 
@@ -228,7 +232,7 @@ class Sketcher:
             stroke_width=width, opacity=share)  # fmt: skip
 
     def names(self, scenes: Sequence[Scene]) -> None:
-        """Names of the points, each on the side where it covers least in some poses of the motion."""
+        """Names of the points, each on the side where it covers least in some poses of the motion, and of the links."""
         slid = {guide.point for guide in self.scene.guides if guide.slider is not None}
         shown = [point for point, kind in self.scene.kinds().items() if kind != "none" or point in slid]
         nets = [self._covered(scene) for scene in scenes]
@@ -247,6 +251,21 @@ class Sketcher:
             _, _, shift = min(costs, key=lambda found: found[:2])
             add(self._placed(point), "text", point, x=shift.real, y=shift.imag + 0.35 * _NAME, text_anchor="middle",
                 font_size=_NAME, fill=style.INK, stroke="white", stroke_width=2.6, paint_order="stroke")  # fmt: skip
+
+        for name in self.scene.description.links:
+            if name != GROUND:
+                self._link_name(name)
+
+    def _link_name(self, name: str) -> None:
+        """A link's name at its middle, which stays level; the script shows it on request."""
+        body, ends = self.body(name), self.scene.link_points(name)
+        middle = sum(self.scene.points[point] for point in ends) / len(ends)
+        at, offset = self.sheet.at(middle), body.local(middle)
+        looks = {"data-offset": _pair(offset), "class": "moving-name moving-off"}
+        group = add(self.root, "g", data_at=body.point, data_turn=name, transform=_shift(at), **looks)
+        add(group, "text", name, y=-BAR / 2 - 3 if len(ends) < 3 else 0.35 * _NAME, text_anchor="middle",
+            font_size=_NAME - 2, font_style="italic", fill=to_hex(darker(self.colors[name])), stroke="white",
+            stroke_width=2.6, paint_order="stroke")  # fmt: skip
 
     def _covered(self, scene: Scene) -> Complexes:
         """Places along the links of a pose, and its joints."""
