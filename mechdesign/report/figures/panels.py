@@ -40,6 +40,7 @@ _MAP_TOP = 0.7
 _MAP_GAP = 0.5
 _MAX_MAP_HEIGHT = 5.2
 _FLAT = 0.8  # height over width below which two maps stand one below the other
+_EDGE_OF_MAP = 0.02  # of its size, beyond the region
 _NARROW = 10.0  # ratio of values up to which levels are at even steps
 _LETTER = 0.56  # mean width of a letter in font sizes
 # Steps of ticks that are parts of a turn in degrees.
@@ -228,9 +229,10 @@ def map_sheet(
         axes.set_xlabel(coordinate_label(study, over.names[0]))
         axes.set_ylabel(coordinate_label(study, over.names[1]))
         if len(maps) > 1 and over.equal:
-            # One part of the plane in all of them.
-            axes.set_xlim(float(np.nanmin(over.x)), float(np.nanmax(over.x)))
-            axes.set_ylim(float(np.nanmin(over.y)), float(np.nanmax(over.y)))
+            # One part of the plane in all of them, the boundary's line with it.
+            edge = _EDGE_OF_MAP * max(spans)
+            axes.set_xlim(float(np.nanmin(over.x) - edge), float(np.nanmax(over.x) + edge))
+            axes.set_ylim(float(np.nanmin(over.y) - edge), float(np.nanmax(over.y) + edge))
     return figure
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -50,6 +52,7 @@ _MAIN_AXES: tuple[tuple[str, str, float, str, Any], ...] = (
     ("k_min", "softest", np.pi / 2, style.VERMILION, "-"),
     ("k_max", "stiffest", 0.0, style.BLUE, (0, (2, 1))),
 )
+_LETTERS_AN_INCH = 14.5  # of a panel's title
 # Inches.
 _PANEL_TITLE = 0.17  # a line
 _HEADING = 0.32
@@ -144,10 +147,15 @@ def _directions(study: Study, result: Result) -> Figure | None:
               for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
     words = f"{force:g} {style.printed(study.units.label('force'))}"
     heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
-    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=4)
+    wide = (style.WIDTH - RIGHT) / min(len(scenes), 2) - LEFT
+    # Broken between coordinates only.
+    named = [re.sub("(?<!,) ", "\N{NO-BREAK SPACE}", pose_in_words(study, poses, int(row), 4)) for row in rows]
+    where = [textwrap.fill(words, int(wide * _LETTERS_AN_INCH)) for words in named]
+    lines = 4 + max(words.count("\n") for words in where)
+    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=lines)
     units = study.units.label("stiffness"), study.units.label("angle")
-    shapes = zip(panels, scenes.items(), rows, scales, ellipses, strict=True)
-    for axes, (k, scene), row, scale, ellipse in shapes:
+    shapes = zip(panels, scenes.items(), rows, scales, ellipses, where, strict=True)
+    for axes, (k, scene), row, scale, ellipse, words in shapes:
         at = scene.points[section.at]
         draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_small(len(panels)))
         axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
@@ -160,7 +168,7 @@ def _directions(study: Study, result: Result) -> Figure | None:
             toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
             said.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
         axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
-        said = [pose_in_words(study, poses, int(row)), *said, f"drawn {scale / force:g} times as large"]
+        said = [words, *said, f"drawn {scale / force:g} times as large"]
         axes.set_title("\n".join(said), loc="left", fontsize=8.5)
     handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{what} direction, {name}")
                for name, what, _, color, dashes in _MAIN_AXES]  # fmt: skip
