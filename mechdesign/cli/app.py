@@ -39,9 +39,9 @@ def _guard() -> Iterator[None]:
     except typer.Exit:
         raise
     except Exception as error:
-        from mechdesign.cli.docs import explained
+        from mechdesign.cli.docs import explain
 
-        code, message = explained(error)
+        code, message = explain(error)
         print(message, file=sys.stderr)
         raise typer.Exit(code) from None
 

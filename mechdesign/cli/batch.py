@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mechdesign.cli import terminal
-from mechdesign.cli.docs import explained
+from mechdesign.cli.docs import explain
 from mechdesign.cli.execution import Outcome, answer, claim, folder, load_study, tell
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
@@ -82,7 +82,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 directory = folder(study, "check", options, several=len(asked) > 1)
                 terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
         except Exception as error:
-            code, message = explained(error)
+            code, message = explain(error)
             terminal.say(message)
             worst = max(worst, code)
     return worst
@@ -116,7 +116,7 @@ def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome
 
 
 def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
-    code, message = explained(error)
+    code, message = explain(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     return Outcome(label, command, directory, code, 0, failed=message)
 
