@@ -10,11 +10,10 @@ from typing import Annotated, Any
 import typer
 
 from mechdesign.errors import StudyError
+from mechdesign.files import formats_of
 
 # Template of the study that is taken where there is none.
 BUILT_IN = "two_link_arm"
-# Of pictures.
-FORMATS = ("png", "svg", "pdf")
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
@@ -112,11 +111,9 @@ class Options:
             raise StudyError("--animate and --no-plots contradict each other")
         if self.formats is not None and self.no_plots:
             raise StudyError("--format and --no-plots contradict each other")
-        for kind in self.kinds.split(","):
-            if kind not in FORMATS:
-                raise StudyError(f"--format takes {', '.join(FORMATS)} or several with commas between, not {kind!r}")
+        formats_of(self.formats, "--format")
 
     @property
     def kinds(self) -> str:
         """Formats of the pictures, with commas between them."""
-        return ",".join(dict.fromkeys((self.formats or FORMATS[0]).replace(" ", "").lower().split(",")))
+        return formats_of(self.formats, "--format")

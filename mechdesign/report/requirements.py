@@ -90,6 +90,18 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     StudyError
         If a requirement names a column that the result has not, or one of words, or a row that its table never has.
         Every such mistake in one go, with its place.
+
+    Examples
+    --------
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
+    ... kinematics: {poses: [{arm: 0}, {arm: 30}]}
+    ... requirements: [{result: kinematics.P.x, at_least: 90}]
+    ... ''')
+    >>> for verdict in mechdesign.requirements(study, mechdesign.kinematics(study)):
+    ...     print(verdict)
+    kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30
     """
     verdicts: list[Verdict] = []
     problems: list[Problem] = []

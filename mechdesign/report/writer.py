@@ -22,6 +22,8 @@ from mechdesign.study import Study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mechdesign.report.figures.rendering import Gallery
+
 MECHANISM = "mechanism"
 ANIMATION = "motion.gif"
 FIGURES = "mechdesign.report.figures"
@@ -104,18 +106,33 @@ def write_sketch(directory: Path, study: Study) -> str:
     OutputError
         If it cannot be written.
     """
-    from mechdesign.report.figures import style
-    from mechdesign.report.figures.mechanism import sketch_figure
-
     check_writable(directory)
     path = directory / f"{MECHANISM}.png"
     try:
-        with style.context():
-            data = style.encoded(sketch_figure(study), "png")
+        data = sketch(study)
     except Exception as error:
         return f"warning: {_undrawn(path.name, explain(error)[1])}"
     write_file(path, data)
     return f"the sketch as understood is in {path}"
+
+
+def sketch(study: Study) -> bytes:
+    """The sketch as it is assembled, as a PNG."""
+    from mechdesign.report.figures import style
+    from mechdesign.report.figures.mechanism import sketch_figure
+
+    with style.context():
+        return style.encoded(sketch_figure(study), "png")
+
+
+def figures(study: Study, result: Result) -> Gallery:
+    """Figures of a result's command by their names, and why others could not be made; use inside `style.context`."""
+    from mechdesign.report.figures.rendering import Gallery
+
+    found = Gallery()
+    # What all pictures of a command share may fail too.
+    found.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
+    return found
 
 
 def pictures(
@@ -124,12 +141,10 @@ def pictures(
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings."""
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
-    from mechdesign.report.figures.rendering import Drawing, Gallery, render
+    from mechdesign.report.figures.rendering import Drawing, render
 
     with style.context():
-        gallery = Gallery()
-        # What all pictures of a command share may fail too.
-        gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
+        gallery = figures(study, result)
 
         def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
             figure = make()

@@ -359,11 +359,13 @@ def test_patches_of_a_workspace_are_kept_apart() -> None:
     poses = study_poses(study, "reliability")
     over = plane(study, poses)
     assert over is not None
-    assert [patch.stop - patch.start for patch in over.patches] == [3, 30, 30, 3]
-    assert (over.patches[0].start, over.patches[-1].stop) == (0, len(over.x))
+    ((_, sectors),) = over.maps
+    rays = [patch.rays for patch in sectors.patches]
+    assert [patch.stop - patch.start for patch in rays] == [3, 30, 30, 3]
+    assert (rays[0].start, rays[-1].stop) == (0, len(over.x))
     # The ends of the rays of a patch follow one another without jumps.
     z = over.x + 1j * over.y
-    for patch in over.patches:
+    for patch in rays:
         assert np.abs(np.diff(z[patch], axis=0)).max() < 0.4 * np.ptp(over.x)
 
 
@@ -371,7 +373,7 @@ def test_outline_of_a_map_is_the_boundary_of_the_workspace() -> None:
     study = mechdesign.load(Path(__file__).parents[2] / "configs/gallery/five_bar_precision_map.yaml")
     over = plane(study, study_poses(study, "reliability"))
     assert over is not None
-    z = np.concatenate(over.outline)
+    z = np.concatenate(over.maps[0][1].outline)
     # A leg is stretched, or its pin and C are as near as they may be.
     reach = np.abs(z - np.array([[100], [-100]]))
     assert np.abs(reach[..., None] - (140, 340)).min(axis=(0, 2)).max() < 1e-6

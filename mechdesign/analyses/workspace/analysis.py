@@ -12,6 +12,7 @@ from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.rays import SINGLE, Effort
 from mechdesign.analyses.region.regions import RAYS
+from mechdesign.analyses.workspace.ellipses import ellipses
 from mechdesign.analyses.workspace.index import Local, determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.analyses.workspace.point_path import point_path
@@ -130,7 +131,8 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     empty = sum(not given.panels.closes[0] for given in answers)
     named = {table.name: table for table in tables}
     along = poses_along(study, regions[0][1].held, named["boundary"])
-    return Result("workspace", named, tuple(warnings), {"regions": len(asked), "empty": empty}, drawn={"along": along})
+    drawn = {"along": along, "ellipses": ellipses(regions[0][1], regions[0][2])}
+    return Result("workspace", named, tuple(warnings), {"regions": len(asked), "empty": empty}, drawn=drawn)
 
 
 def _pieces(

@@ -54,14 +54,14 @@ _PANEL_TITLE = 0.3
 _NOTE = 0.3
 _GAP = 0.12
 _SMALL_SYMBOLS = 0.6
-# Of the animation: frames at most, colours, milliseconds, and dots an inch, 640 pixels wide.
-FRAMES = 60
-_GIF_COLORS = 128
+# Of the animation: frames at most, colours, milliseconds, and dots an inch, 480 pixels wide.
+FRAMES = 36
+_GIF_COLORS = 32
 _WHITE = 244  # brightness of 255 from which on a colour is white
 _CYCLE = 3600  # of the whole
 _MIN_FRAME = 50
 _MAX_FRAME = 160
-_DPI = 80
+_DPI = 60
 
 
 def figures(study: Study, result: Result) -> Gallery:

@@ -77,9 +77,17 @@ def context() -> Iterator[None]:
         yield
 
 
+class Picture(Figure):
+    """A figure that notebooks show; of others they show those alone that pyplot manages."""
+
+    def _repr_png_(self) -> bytes:
+        with context():
+            return encoded(self)
+
+
 def new_figure(height: float, *, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
+    figure = Picture(figsize=(WIDTH, height), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
