@@ -39,9 +39,9 @@ def _guard() -> Iterator[None]:
     except typer.Exit:
         raise
     except Exception as error:
-        from mechdesign.cli.docs import explain
+        from mechdesign.cli.docs import explained
 
-        code, message = explain(error)
+        code, message = explained(error)
         print(message, file=sys.stderr)
         raise typer.Exit(code) from None
 
@@ -82,12 +82,13 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
 
 
 for _name, _asked in COMMANDS.items():
-    _takes = (*given.COMMON, *given.OWN.get(_name, ()))
+    _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
     _add(_name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
 _add(
     "run",
     (
-        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.ANIMATE, given.JUNIT, given.FAIL_FAST, given.RESUME,
+        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
+        given.RESUME,
     ),
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",

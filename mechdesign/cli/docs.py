@@ -11,9 +11,8 @@ from typing import Any
 
 import typer
 
-from mechdesign import errors
 from mechdesign.cli.terminal import emit
-from mechdesign.errors import StudyError
+from mechdesign.errors import StudyError, explain
 from mechdesign.reference import Entry, below, entries, find, near, place
 
 _INDENT = "  "
@@ -46,9 +45,9 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
     emit("\n".join(_wrapped(line, width) for text in texts for line in text).rstrip("\n") + "\n")
 
 
-def explain(error: Exception) -> tuple[int, str]:
+def explained(error: Exception) -> tuple[int, str]:
     """Exit code and message of an exception; after the mistakes of a study how to look up what they are about."""
-    code, message = errors.explain(error)
+    code, message = explain(error)
     keys = [problem.key for problem in error.problems] if isinstance(error, StudyError) else []
     words = list(dict.fromkeys(filter(None, map(place, keys))))[:_NAMED]
     return code, f"{message}\n(mechdesign docs {' '.join(words)})" if words else message

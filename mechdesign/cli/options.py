@@ -66,6 +66,10 @@ QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wro
 NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
 FORMAT = _text("formats", str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.")
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
+REPORT = _flag("report", "--report", "Also write report.html: one page with all of it, which moves.")
+REPORTS = _flag(
+    "report", "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
+)
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
 FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
@@ -100,6 +104,7 @@ class Options:
     quiet: bool = False
     no_plots: bool = False
     formats: str | None = None
+    report: bool = False
     animate: bool = False
     all_modes: bool = False
     junit: Path | None = None

@@ -14,6 +14,7 @@ from mechdesign.errors import OutputError, explain
 from mechdesign.files import replace
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
+from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import Result
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 MECHANISM = "mechanism"
 ANIMATION = "motion.gif"
 FIGURES = "mechdesign.report.figures"
+# Ends the names under which pictures stand as HTML.
+INLINE = ".html"
 
 
 def check_writable(directory: Path) -> None:
@@ -65,16 +68,28 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
     }
     files |= {name: (text.encode(),) for name, text in result.files.items()}
     stale = manifest.recorded_files(manifest.read(directory) or {}).keys() - files.keys()
+    pages.remove(directory / pages.REPORT)
     warnings: tuple[str, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)
         digests = {name: replace(directory / name, blocks) for name, blocks in files.items()}
         for name in stale:
             (directory / name).unlink(missing_ok=True)
-        tables = dataclasses.replace(asked, plots=False, animate=False)
+        tables = dataclasses.replace(asked, plots=False, animate=False, report=False)
         replace(directory / manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
-        if asked.plots and not result.interrupted:
-            drawn, warnings = pictures(study, result, asked.formats.split(","), animate=asked.animate)
+        drawn: dict[str, bytes] = {}
+        plots = asked.plots and not result.interrupted
+        if plots:
+            kinds = asked.formats.split(",")
+            drawn, warnings = pictures(study, result, kinds, animate=asked.animate, inline=asked.report)
+        if asked.report:
+            from mechdesign.report.page import section
+
+            inline = {name: drawn.pop(f"{name}{INLINE}").decode() for name in _inline(drawn)}
+            mechanism = inline.pop(MECHANISM, "")
+            part, warnings = section.section(study, result, inline, mechanism, warnings, plots=asked.plots)
+            drawn[section.NAME] = section.encoded(part)
+        if drawn or plots:
             digests |= {name: replace(directory / name, [data]) for name, data in drawn.items()}
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
             replace(directory / manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
@@ -136,19 +151,28 @@ def figures(study: Study, result: Result) -> Gallery:
 
 
 def pictures(
-    study: Study, result: Result, formats: Sequence[str] = ("png",), *, animate: bool = False
+    study: Study, result: Result, formats: Sequence[str] = ("png",), *, animate: bool = False, inline: bool = False
 ) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings."""
+    """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
+
+    With `inline` there is of each also the HTML by which it stands in a page, under its name and `INLINE`.
+    """
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
     from mechdesign.report.figures.rendering import Drawing, render
+    from mechdesign.report.page import vector
 
     with style.context():
         gallery = figures(study, result)
 
         def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
             figure = make()
-            return {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
+            drawn = {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
+            if inline:
+                alt = f"{name.replace('_', ' ')}: {vector.described(figure)}"
+                html = vector.picture(figure, f"{result.command}-{name}", alt, drawn.get(f"{name}.png"))
+                drawn[f"{name}{INLINE}"] = html.encode()
+            return drawn
 
         drawings: dict[str, Drawing] = {
             f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
@@ -164,6 +188,10 @@ def pictures(
         del drawn[ANIMATION]
         warnings.append("no animation: it needs a sweep of one coordinate or a path")
     return drawn, tuple(warnings)
+
+
+def _inline(drawn: Iterable[str]) -> list[str]:
+    return [name.removesuffix(INLINE) for name in drawn if name.endswith(INLINE)]
 
 
 def _undrawn(name: str, why: str) -> str:

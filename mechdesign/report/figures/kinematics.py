@@ -44,7 +44,7 @@ _SHADE = "#EFEFEF"
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
-_PATH_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
+PATH_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
 # Of the panels of assemblies: their number side by side, inches, and the size of symbols in small ones.
 _MAX_COLUMNS = 4
@@ -284,7 +284,7 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
             for point in link_points(link):
                 owners.setdefault(point, name)
     for point, path in sweep.traces.items():
-        line, share = _PATH_LOOKS[min(ranked[point] + lift, 2)]
+        line, share = PATH_LOOKS[min(ranked[point] + lift, 2)]
         axes.plot(
             path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,
             zorder=2.5 + 0.1 * ranked[point], solid_joinstyle="round",

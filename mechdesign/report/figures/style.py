@@ -159,7 +159,12 @@ def printed(unit: str) -> str:
 def in_powers(value: float) -> str:
     """Three digits of a number as it is set in print: 1.66\N{MIDDLE DOT}10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT NINE}."""
     digits, power = f"{value:.2e}".split("e")
-    return f"{digits}\N{MIDDLE DOT}10{str(int(power)).translate(_RAISED)}"
+    return f"{digits}\N{MIDDLE DOT}10{raised(int(power))}"
+
+
+def raised(power: int) -> str:
+    """A whole number as an exponent."""
+    return str(power).translate(_RAISED)
 
 
 def encoded(figure: Figure, kind: str = "png") -> bytes:

@@ -396,7 +396,7 @@ def index_columns(region: Region) -> list[str]:
 
 
 def _index_map(study: Study, found: Sequence[Region], column: str) -> Figure:
-    norm = _norm(found, column)
+    norm = index_norm(found, column)
     told = found[0].local.column(column)
     places = np.concatenate([region.places() for region in found])
     point = study.workspace.point if study.workspace else ""
@@ -466,7 +466,7 @@ def _nearest(places: Complexes, others: Complexes) -> Floats:
     return np.asarray(np.abs(places[:, None] - others[None, :]).min(axis=1))
 
 
-def _norm(found: Sequence[Region], column: str) -> BoundaryNorm:
+def index_norm(found: Sequence[Region], column: str) -> BoundaryNorm:
     """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
     patches = [patch for region in found for patch in grids(region.local, column)]
     values = np.concatenate([z.ravel() for _, _, z in patches])
