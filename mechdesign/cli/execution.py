@@ -230,7 +230,7 @@ def write_report(
     told += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
     below = any(given.directory != directory for given in answers)
     path = directory / pages.REPORT
-    writer.write_file(path, page.report(study, told, below=below))
+    writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots))
     terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
 
 

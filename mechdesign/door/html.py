@@ -17,6 +17,7 @@ from mechdesign.errors import counted
 from mechdesign.mechanism.diagnosis import joints_in_words
 from mechdesign.mechanism.model import Drive, Link
 from mechdesign.report.figures.style import printed
+from mechdesign.report.page.headlines import headlines
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import cells
 from mechdesign.results import Column, Result, Table
@@ -86,6 +87,7 @@ def answer_html(
         met=sum(verdict.met for verdict in judged),
         required=len(judged),
         unjudged=verdicts if isinstance(verdicts, str) else "",
+        headlines=headlines(answer),
         warnings=answer.warnings,
         picture=_inline(picture),
         table=main,
@@ -102,7 +104,7 @@ def _render(template: str, **said: object) -> str:
 @cache
 def _environment() -> Environment:
     made = Environment(loader=PackageLoader("mechdesign.door"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    made.filters |= {"few": _few, "short": _short}
+    made.filters |= {"few": _few, "short": _short, "printed": printed}
     return made
 
 

@@ -13,6 +13,7 @@ from matplotlib.path import Path as Outline
 
 import mechdesign
 from mechdesign.analyses.poses import study_poses
+from mechdesign.errors import StudyError
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import number, plane
 from mechdesign.report.figures.reliability import figures
@@ -196,6 +197,23 @@ def test_pictures_of_samples_show_the_pose_that_fails_most_and_say_so() -> None:
     for name in ("histogram", "convergence", "estimate"):
         assert "at the pose that fails most, crank = 10 deg" in texts(found[name])
         assert set(result.tables[name]["crank"]) == {10}
+
+
+def test_a_study_may_choose_the_pose_whose_samples_are_shown() -> None:
+    found, result = drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", "reliability.methods=[monte_carlo]",
+                          "reliability.shown=1")  # fmt: skip
+    for name in ("histogram", "convergence", "estimate"):
+        assert "at crank = 80 deg" in texts(found[name])
+        assert set(result.tables[name]["crank"]) == {80}
+
+
+@pytest.mark.parametrize(("overrides", "message"), [
+    (["reliability.shown=3"], "there are only 2 poses"),
+    (["reliability.shown=1", "reliability.methods=[analytic]"], "no method draws samples"),
+])  # fmt: skip
+def test_a_pose_that_cannot_be_shown(overrides: list[str], message: str) -> None:
+    with pytest.raises(StudyError, match=message):
+        drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", *overrides)
 
 
 def test_a_far_limit_is_told_in_words() -> None:

@@ -28,6 +28,7 @@ _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
     "motion": kinematics.motion_table,
     "targets": kinematics.targets_table,
     "jacobian": kinematics.jacobian_table,
+    "instant_centres": kinematics.centres_table,
 }
 TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*_OF_MOTION, "extremes", "loops"),
@@ -35,7 +36,9 @@ TABLES: Mapping[str, Collection[str]] = {
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
 # Sections beside a command's own whose numbers it reads.
-ALSO_READ: Mapping[str, str] = {"kinematics": "workspace", "stiffness": "kinematics", "reliability": "kinematics"}
+ALSO_READ: Mapping[str, Collection[str]] = {
+    "kinematics": ("workspace",), "stiffness": ("kinematics",), "reliability": ("kinematics", "stiffness"),
+}  # fmt: skip
 
 
 class Stack(NamedTuple):
@@ -65,7 +68,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
     mechanism, section = study.mechanism, getattr(study, command)
     graph, joints, links = mechanism.graph, mechanism.description.joints, mechanism.description.links
     places = study.parameters.moved_places(names)
-    if follows(_without_poses(study), names, (command, ALSO_READ[command])):
+    if follows(_without_poses(study), names, (command, *ALSO_READ[command])):
         return False
     # Angles of slides and clamps in a ring may contradict each other, which is found design by design.
     turned = any(place.rpartition(".")[0] in joints or place.endswith((".x", ".y")) for place in places)
@@ -81,10 +84,10 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
         mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
     ):
         return False
-    if command == "reliability":
-        return _first_order(study, names)
-    # The order of the points along an elastic link is found once.
-    elastic = section.elastic if command == "stiffness" and section is not None else ()
+    if command == "reliability" and not _first_order(study, names):
+        return False
+    # The order of the points along an elastic link is found once; loads deflect what is made, too.
+    elastic = study.stiffness.elastic if command != "kinematics" and study.stiffness is not None else ()
     bent = tuple(f"{name}." for name in elastic if len(links[name].points) > 2)
     return not any(place.startswith(bent) for place in places)
 
@@ -164,7 +167,8 @@ def tables(
     absent: Mapping[str, str] = {}
     if command == "kinematics":
         motion = move(dataclasses.replace(motion_question(study), poses=poses), also=solved.append)
-        known = {"motion": True, "targets": bool(motion.errors), "jacobian": motion.question.square}
+        known = {"motion": True, "targets": bool(motion.errors), "jacobian": motion.question.square,
+                 "instant_centres": bool(motion.question.centres)}  # fmt: skip
         found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
         # Torn are designs whose motion ends where no limit is known.
         between, torn = kinematics.tables_between(motion, (), wanted, outputs)

@@ -17,9 +17,9 @@ from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, Sector, Sectors
 
 SLACK = 1e-9
-# Rays of the narrowest panel; and how far inside its ends it is traced where the ends themselves are degenerate.
+# Rays of the narrowest panel; and how far inside its ends it is traced, farther where the ends are still degenerate.
 FEWEST = 25
-BESIDE = 1e-9
+BESIDE = (0.0, 1e-9, 1e-7, 1e-5)
 # Nodes of a map along each ray, from boundary to boundary.
 GRID = 33
 # An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
@@ -78,20 +78,26 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
         number = max(FEWEST, round(rays * (high - low) / total) + 1)
         # Denser towards the ends, where cusps are thin and corners sharp.
         theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
-        zero = np.zeros(number, dtype=np.intp)
-        traced = panels.trace(zero, theta, SLACK)
-        if (traced.counts[[0, -1]] != traced.counts[number // 2]).any():
+        steps = np.zeros(2, dtype=np.intp)
+        for attempt in range(len(BESIDE)):
             # At its very ends a panel meets its neighbour, or an interval vanishes.
-            theta = np.clip(theta, low + BESIDE * (high - low), high - BESIDE * (high - low))
-            traced = panels.trace(zero, theta, SLACK)
-        ray, inner, outer, enters, leaves = whole(traced, SAME_ROOT * float(panels.reach[0]))
-        counts = np.bincount(ray, minlength=number)
-        usual = _most(counts)
+            first, last = (high - low) * np.array(BESIDE)[steps]
+            at = np.clip(theta, low + first, high - last)
+            traced = panels.trace(np.zeros(number, dtype=np.intp), at, SLACK)
+            ray, inner, outer, enters, leaves = whole(traced, SAME_ROOT * float(panels.reach[0]))
+            counts = np.bincount(ray, minlength=number)
+            usual = _most(counts)
+            lost = counts[[0, -1]] != usual
+            if attempt == 0:
+                lost |= (traced.counts[[0, -1]] != traced.counts[number // 2]).any()
+            if not lost.any():
+                break
+            steps = np.minimum(steps + lost, len(BESIDE) - 1)
         kept = np.flatnonzero(counts == usual)
-        first = np.searchsorted(ray, kept)
+        begins = np.searchsorted(ray, kept)
         for slot in range(usual):
-            at: Ints = first + slot
-            yield Patch(theta[kept], inner[at], outer[at], _most(enters[at]), _most(leaves[at]))
+            own: Ints = begins + slot
+            yield Patch(at[kept], inner[own], outer[own], _most(enters[own]), _most(leaves[own]))
 
 
 def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:

@@ -199,7 +199,7 @@ class _View:
                 det = xx * yy - xy * xy
                 way = (gy * xy - gx * yy) / det + 1j * (gx * xy - gy * xx) / det
                 good = (xx > 0) & (det > 0) & (np.abs(way) < FARTHEST)
-            part = part + np.where(good, step * way, 0.0)
+            part = part + step * np.where(good, way, 0.0)
         way = shape.width * part.real + 1j * shape.height * part.imag
         there = margins(part)[margin, margin, lanes] < -rounding
         nearest = np.where(there, shape.scale_at(way), np.inf)

@@ -9,20 +9,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from PIL import Image
 
+from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, fit, framed, windows
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, fit, framed, windows
+from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.panels import abscissa, clear_of_ticks, moving_names, tick_abscissa
+from mechdesign.report.figures.poses import poses_figure
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
-from mechdesign.results import Column, Result
+from mechdesign.report.figures.transmission import transmission_figure
+from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study, Units
 
 # More curves than this in one panel cannot be told apart.
@@ -37,6 +42,13 @@ _MAX_TALL_PANELS = 7  # more panels are lower
 _LEGEND_LETTERS = 26  # of the longest name in a legend
 _STILL = 1e-9  # part of its size by which a column changes that does not change
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
+_TICK = 9.0  # points, a tick of equal time across a path
+_LEGEND_LINE = 0.19  # inches
+_MOST_TICKS = 24  # along a motion
+_FEWEST_TICKS = 4
+_UNEVEN = 2e-3  # part of the mean step by which those of a sweep may differ
+_CENTRODES = ((0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (3, 2)))  # dashes
+_NEAR = 0.75  # larger sides of the mechanism from its middle up to which a centrode widens the window
 _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
@@ -65,16 +77,20 @@ _DPI = 60
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """``motion`` (curves of a sweep or path), ``paths`` (poses and point paths) and ``modes`` (every assembly).
+    """``motion``, ``paths``, ``poses``, ``transmission`` and ``modes``.
 
-    Lists and grids of poses have neither curves nor paths.
+    They are curves of a sweep or path, poses and point paths, limits or listed poses one by one, how force is passed
+    on, and every assembly. Lists of poses have neither curves nor paths, grids have no pictures but their assemblies.
     """
     found = Gallery()
     if result.drawn["poses"].motion:
         found.add("motion", curves_figure, study, result)
         sweep = Sweep.of(result.drawn["motion"])
         if len(sweep.valid):
-            found.add("paths", paths_figure, sweep)
+            found.add("paths", paths_figure, sweep, centres=result.tables.get("instant_centres"))
+    found.add("poses", poses_figure, study, result)
+    if result.drawn["poses"].motion:
+        found.add("transmission", transmission_figure, study, result)
     if "modes" in result.tables:
         found.add("modes", modes_figure, study, result)
     return found
@@ -136,6 +152,8 @@ def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[
     for column in columns:
         if column.values.dtype.kind != "f" or column.name in left_out or not np.isfinite(column.values).any():
             continue
+        if column.name.endswith("_advantage"):
+            continue  # has a picture with the transmission angles
         order = next((order for order in _ORDERS if column.name.endswith(f"_{order}")), "position")
         of = column.name.removesuffix(f"_{order}")
         if column.name in _RANKS:
@@ -243,18 +261,31 @@ def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, 
         )  # fmt: skip
 
 
-def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
+def paths_figure(sweep: Sweep, *, above: float = ABOVE, centres: Table | None = None) -> Figure:
     """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
 
-    `above` it, inches are left for a title.
+    The boldest paths have ticks at equal steps of time where the swept drive has a rate; `centres` are the instant
+    centres, of which those against the ground have a path, too. `above` it, inches are left for a title.
     """
     wanted = [
         target.table[:, -2] + 1j * target.table[:, -1]
         for target in sweep.study.targets.values()
         if target.table is not None and len(target.coordinates) == 2
     ]
-    places = np.concatenate([sweep.extent, *wanted])
+    centrodes = _centrodes(sweep, centres)
+    middle, *sides = extent(sweep.extent)
+    near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
+    places = np.concatenate([sweep.extent, *wanted, *near])
+    ticks = equal_times(sweep)
+    if told := len(centrodes) + (ticks is not None):
+        above = max(above, TITLE + _LEGEND_LINE * (told - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
+    for (link, path), dashes in zip(centrodes.items(), _CENTRODES * len(centrodes), strict=False):
+        path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
+        axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
+                  label=f"fixed centrode of {link}: path of its instant centre with the ground")  # fmt: skip
+    if ticks is not None:
+        _draw_ticks(axes, sweep, *ticks)
     for path in wanted:
         axes.plot(
             path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,
@@ -269,7 +300,70 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
     draw_paths(axes, sweep)
     first = int(sweep.valid[0])
     draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handlelength=2.6)
     return figure
+
+
+def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
+    """Paths of the instant centres that links have with the ground, by the links; a pin of the ground stays."""
+    found = {}
+    for name in centres.names if centres is not None else ():
+        pair, _, column = name.rpartition(".")
+        links = pair.split(".")
+        if column == "x" and GROUND in links and len(links) == 2 and centres is not None:
+            path = vector(centres[name], centres[f"{pair}.y"])[sweep.rows]
+            path[~np.isfinite(path)] = complex(np.nan, np.nan)
+            known = path[np.isfinite(path)]
+            if len(known) and np.abs(known - known[0]).max() > _STILL * sweep.mechanism.size:
+                found[next(link for link in links if link != GROUND)] = path
+    return found
+
+
+def _leaps(path: Complexes, side: float) -> Flags:
+    """Points from which a path leaps through infinity, by its places about the mechanism's middle."""
+    far = np.abs(path) > side
+    turned = (np.conj(path[:-1]) * path[1:]).real < 0
+    return np.append(far[:-1] & far[1:] & turned, False)
+
+
+def equal_times(sweep: Sweep) -> tuple[Ints, str] | None:
+    """Poses at equal steps of time, and how long these are in words; None where the swept drive has no one rate."""
+    section, poses = sweep.study.kinematics, sweep.poses
+    moving = moving_names(poses)
+    if section is None or not poses.motion or len(moving) != 1 or any(section.accelerations.values()):
+        return None
+    (name,) = moving
+    rates = {key: rate for key, rate in section.rates.items() if rate}
+    values = poses.values[name][sweep.rows]
+    steps = np.diff(values)
+    if set(rates) != {name} or np.ptp(steps) > _UNEVEN * abs(steps.mean()) or len(steps) < _FEWEST_TICKS:
+        return None
+    least = -(-len(steps) // _MOST_TICKS)
+    stride = next((k for k in range(least, 2 * least + 1) if len(steps) % k == 0), least)
+    step, units = abs(float(steps.mean())) * stride, sweep.study.units
+    unit = units.label(sweep.mechanism.quantity(name))
+    words = f"ticks every {step / abs(rates[name]):.3g} {units.time} ({step:.4g} {unit}".rstrip() + f" of {name})"
+    return np.arange(0, len(values) - sweep.closed, stride), words
+
+
+def _draw_ticks(axes: Axes, sweep: Sweep, rows: Ints, words: str) -> None:
+    """Short lines across the boldest paths, of a length on paper."""
+    ranked = ranks(sweep.study)
+    shown = paper(axes, np.array([0.0, 1.0], dtype=complex))
+    half, lines = _TICK / 2 / (shown[1, 0] - shown[0, 0]), []
+    for point, path in sweep.places.items():
+        if ranked[point] < max(ranked.values()):
+            continue
+        before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, len(path) - 1)
+        with np.errstate(invalid="ignore"):
+            along = np.where(np.isfinite(path[after]), path[after], path[rows])
+            along = along - np.where(np.isfinite(path[before]), path[before], path[rows])
+            across = 1j * half * along / np.abs(along)
+        ends = np.stack([path[rows] - across, path[rows] + across], axis=1)
+        lines += [np.column_stack([end.real, end.imag]) for end in ends if np.isfinite(end).all()]
+    axes.add_collection(LineCollection(lines, colors=style.INK, linewidths=1.2, zorder=2.8), autolim=False)
+    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2, label=words)
 
 
 def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:

@@ -28,6 +28,7 @@ from mechdesign.report.figures.drawing import (
     Color,
     Travel,
     bodies,
+    darker,
     lighter,
     link_colors,
     reach,
@@ -39,6 +40,7 @@ from mechdesign.report.figures.scene import Guide, Scene
 WIDTH = 520.0
 MAX_HEIGHT = 470.0
 _PAD = 30.0
+_STRIP = 14.0  # below, for the bar of the scale
 _POINTS = 72.0
 _STEEL = "#777777"
 _RAIL_SPACING = 6.0
@@ -47,6 +49,7 @@ _LETTER = 0.6  # width of a letter in sizes
 _DIRECTIONS = 8  # in which names may stand
 _NET = np.linspace(0, 1, 9)  # places along a bar that names should not cover
 _FOOT = np.array([-10, -5, 0, 5, 10]) + 8j  # places that the symbol of a pivot covers
+_ROUND = ("stroke-linecap", "stroke-linejoin")
 _RULER = 0.3  # part of the width that the bar of the scale is long at most
 _LETTERS = {int(Path.MOVETO): "M", int(Path.LINETO): "L"}
 
@@ -65,7 +68,7 @@ class Sheet:
         """A sheet that shows all of these places."""
         window = fit(places, WIDTH / _POINTS, MAX_HEIGHT / _POINTS, _PAD / _POINTS)
         scale, height = window.scale * _POINTS, window.height * _POINTS
-        return cls(window.middle + complex(-WIDTH, height) / 2 / scale, scale, WIDTH, height)
+        return cls(window.middle + complex(-WIDTH, height) / 2 / scale, scale, WIDTH, height + _STRIP)
 
     def at(self, place: complex) -> complex:
         """A place of the study in the drawing, whose y axis points down."""
@@ -85,7 +88,9 @@ class Sheet:
     def root(self, alt: str) -> Element:
         """The drawing, empty but for its white card."""
         looks = {"viewBox": f"0 0 {self.width:g} {self.height:.1f}", "role": "img", "aria-label": alt, "fill": "none"}
-        root = Element("svg", looks | {"stroke-linecap": "round", "stroke-linejoin": "round"})
+        root = Element(
+            "svg", looks | {"class": "moving-drawing", "stroke-linecap": "round", "stroke-linejoin": "round"}
+        )
         add(root, "rect", width="100%", height="100%", fill="white")
         return root
 
@@ -228,7 +233,7 @@ class Sketcher:
             stroke_width=width, opacity=share)  # fmt: skip
 
     def names(self, scenes: Sequence[Scene]) -> None:
-        """Names of the points, each on the side where it covers least in some poses of the motion."""
+        """Names of the points, each on the side where it covers least in some poses of the motion, and of the links."""
         slid = {guide.point for guide in self.scene.guides if guide.slider is not None}
         shown = [point for point, kind in self.scene.kinds().items() if kind != "none" or point in slid]
         nets = [self._covered(scene) for scene in scenes]
@@ -248,6 +253,23 @@ class Sketcher:
             add(self._placed(point), "text", point, x=shift.real, y=shift.imag + 0.35 * _NAME, text_anchor="middle",
                 font_size=_NAME, fill=style.INK, stroke="white", stroke_width=2.6, paint_order="stroke")  # fmt: skip
 
+        for name in self.scene.description.links:
+            if name != GROUND:
+                self._link_name(name)
+
+    def _link_name(self, name: str) -> None:
+        """A link's name at its middle, which stays level; the script shows it on request."""
+        body, ends = self.body(name), self.scene.link_points(name)
+        middle = sum(self.scene.points[point] for point in ends) / len(ends)
+        at, offset = self.sheet.at(middle), body.local(middle)
+        looks = {"data-offset": _pair(offset), "class": "moving-name moving-off"}
+        group = add(self.root, "g", data_at=body.point, data_turn=name, transform=_shift(at), **looks)
+        # Above the middle of a bar, in a plate, below a slider, whose point has its name above.
+        y = {1: SLIDER_SIZE[1] / 2 + _NAME, 2: -BAR / 2 - 3}.get(len(ends), 0.35 * _NAME)
+        color = to_hex(darker(self.colors[name]))
+        add(group, "text", name, y=y, text_anchor="middle", font_size=_NAME - 2, font_style="italic", fill=color,
+            stroke="white", stroke_width=2.6, paint_order="stroke")  # fmt: skip
+
     def _covered(self, scene: Scene) -> Complexes:
         """Places along the links of a pose, and its joints."""
         found = [np.array([self.sheet.at(place) for place in scene.points.values()])]
@@ -261,7 +283,7 @@ class Sketcher:
     def ruler(self, unit: str) -> None:
         """A bar of the drawing's scale at its lower left corner."""
         length = rounded(_RULER * self.sheet.width / self.sheet.scale)
-        begin, wide = complex(12, self.sheet.height - 10), length * self.sheet.scale
+        begin, wide = complex(12, self.sheet.height - 6), length * self.sheet.scale
         add(self.root, "path", d=f"M{_pair(begin - 4j)}v4h{_number(wide)}v-4", stroke=_STEEL)
         add(self.root, "text", f"{length:g} {unit}".rstrip(), x=begin.real + wide / 2, y=begin.imag - 4,
             text_anchor="middle", font_size=10, fill="#555555")  # fmt: skip

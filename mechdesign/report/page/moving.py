@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import tostring
 
@@ -21,7 +21,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import link_colors
 from mechdesign.report.figures.kinematics import PATH_LOOKS, curves_figure
 from mechdesign.report.figures.panels import abscissa
-from mechdesign.report.figures.scene import Sweep, pose, ranks
+from mechdesign.report.figures.scene import Scene, Sweep, pose, ranks
 from mechdesign.report.page.linkage import Sheet, Sketcher, rounded
 from mechdesign.report.page.roaming import roaming
 from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, places
@@ -32,13 +32,19 @@ from mechdesign.study import Study
 # Of more poses some are left out, evenly.
 MAX_POSES = 721
 _COMMON = 0.9  # part of the velocities that are smaller than the one whose arrow has the usual length
-_NAMED_POSES = 12  # in which names keep off the links
+_FEW_POSES = 24  # that the window shows whole, and in which names keep off the links
 # Seconds that a motion takes on the screen where it has no time of its own, and where its own is too short or long.
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
 _ASTRAY = 0.05  # part of a step by which the rates may lead elsewhere
 _TIMES = 10_000  # integers in the time of a motion
 _ARROW = 70.0  # length of the arrow of a usual velocity
+_WHY = {
+    Reason.NOT_CLOSED: "cannot be assembled here",
+    Reason.OTHER_ASSEMBLY: "in another assembly only",
+    Reason.LIMIT: "beyond a limit",
+    Reason.NOT_HELD: "does not hold its load here",
+}
 _RATES = ("velocity", "acceleration")
 
 
@@ -63,10 +69,14 @@ def _motion(study: Study, result: Result, name: str) -> Moving | None:
     some = np.unique(np.linspace(0, len(whole.rows) - 1, min(len(whole.rows), MAX_POSES)).round().astype(int))
     shown = Shown(study, whole.poses, whole.rows[some], whole.configuration.take(some))
     sweep = Sweep.of(shown)
-    if not len(sweep.valid):
+    if not len(sweep.valid) or len(sweep.rows) < 2:
         return None
     table, begin = result.tables["motion"], int(sweep.valid[0])
-    sheet = Sheet.around(whole.extent)
+    few = sweep.valid[np.unique(np.linspace(0, len(sweep.valid) - 1, _FEW_POSES).round().astype(int))]
+    scenes = [scene for index in few.tolist() if (scene := pose(sweep.mechanism, sweep.configuration, index))]
+    # Guides reach farther than points.
+    ends = [end for scene in scenes for guide in scene.guides for end in guide.ends(whole.travel, scene.span)]
+    sheet = Sheet.around(np.append(whole.extent, ends))
     numbers = Numbers(table, sweep.rows, begin)
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
@@ -81,38 +91,35 @@ def _motion(study: Study, result: Result, name: str) -> Moving | None:
         beside = inline(figure, name, described(figure))
         data["curves"] = _curves(study, sweep, figure, table, numbers)
     data["numbers"] = numbers.tracks
-    drawing = _drawing(study, sweep, whole, sheet, begin)
+    drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin))
     return Moving(drawing, beside, data, sweep.words(begin), headings, rows)
 
 
-def _drawing(study: Study, sweep: Sweep, whole: Sweep, sheet: Sheet, begin: int) -> str:
-    """The first valid pose, with the paths of its points."""
-    scene = pose(sweep.mechanism, sweep.configuration, begin)
-    assert scene is not None
-    root = sheet.root(f"the mechanism at {sweep.words(begin)}")
-    sketcher = Sketcher(root, sheet, sweep.mechanism, scene)
-    ranked, colors = ranks(study), link_colors(sweep.mechanism)
+def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str) -> str:
+    """The first of some valid poses, with the paths of the points."""
+    scene = scenes[0]
+    root = sheet.root(f"the mechanism at {words}")
+    sketcher = Sketcher(root, sheet, whole.mechanism, scene)
+    ranked, colors = ranks(study), link_colors(whole.mechanism)
     lift = 2 - max(ranked.values(), default=2)
     owners: dict[str, str] = {}
-    for name in sweep.mechanism.description.links:
+    for name in whole.mechanism.description.links:
         for point in scene.link_points(name) if name != GROUND else ():
             owners.setdefault(point, name)
     for point, path in sorted(whole.traces.items(), key=lambda item: ranked[item[0]]):
         sketcher.trace(path, colors[owners[point]], *PATH_LOOKS[min(ranked[point] + lift, 2)])
     sketcher.draw(whole.travel)
-    some = sweep.valid[np.unique(np.linspace(0, len(sweep.valid) - 1, _NAMED_POSES).round().astype(int))]
-    scenes = [pose(sweep.mechanism, sweep.configuration, int(index)) for index in some]
-    sketcher.names([scene, *filter(None, scenes)])
+    sketcher.names(scenes)
     sketcher.ruler(study.units.label("length"))
     return tostring(root, encoding="unicode")
 
 
 def _gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
-    """Runs of poses that are not valid: the first, the last, why."""
+    """Runs of poses that are not valid: the first, the last, why in words."""
     reason = sweep.configuration.reason
     ends = np.flatnonzero(np.diff(reason)) + 1
     runs = zip(np.append(0, ends).tolist(), np.append(ends, len(reason)).tolist(), strict=True)
-    return [(begin, end - 1, Reason(int(reason[begin])).text) for begin, end in runs if reason[begin]]
+    return [(begin, end - 1, _WHY[Reason(int(reason[begin]))]) for begin, end in runs if reason[begin]]
 
 
 def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, list[Cell | None]]]]:

@@ -28,8 +28,8 @@ from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
 # Cells of the region's larger side with one pose each at most, of a single region and of each of several.
-CELLS = 40
-FEW_CELLS = 28
+CELLS = 60
+FEW_CELLS = 32
 _DPI = 96  # of the map of an index
 _SWATCH = 16.0  # width of a colour in the legend
 _NAMED_POSES = 12  # in which names keep off the links

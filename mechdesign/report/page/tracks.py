@@ -23,7 +23,7 @@ PLACES = 20
 TURNS = 100
 CURVES = 10
 # Steps of a number up to its usual size, at least.
-_STEPS = 2000
+_STEPS = 1000
 _COMMON = 0.5  # part of the values that are smaller than what counts as the size of a column
 _ROUNDING = 1e-11  # of a number that should be zero, and its part of others of its unit
 _POWERS = (-3, 5)  # of ten, beyond which numbers are written with a power of their own

@@ -218,6 +218,8 @@ class ReliabilitySection(MotionSection):
     """Asks for the cheapest tolerances that reach a reliability at every pose. Example: {reliability: 0.999, cost: {r1:
     2}}
     """
+    shown: Annotated[int, fields.whole(1, 10**9)] | None = None
+    """The pose, by its number from 1, at which samples are shown; left out, the one that fails most. Example: 1"""
 
     def checked(self, checker: Checker) -> Self:
         """Check what varies and what is limited as well; wildcards and the clearances' links are filled in."""
@@ -250,6 +252,9 @@ class ReliabilitySection(MotionSection):
                     "change gradually; ask for monte_carlo or quasi_monte_carlo, or another pin model"
                 )
                 checker.report(("reliability", "methods", index), message)
+        if self.shown is not None and not any(METHODS[method].sampled for method in self.methods):
+            message = "no method draws samples that could be shown; ask for monte_carlo, say, or leave it out"
+            checker.report(("reliability", "shown"), message, at_key=True)
         if self.allocate is not None:
             _allocate(checker, self, dimensions, clearances)
         load = _load(checker, self, dimensions)

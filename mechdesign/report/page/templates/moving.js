@@ -17,10 +17,12 @@
     return values;
   }
 
-  // The value at a pose, or between two.
-  function between(values, at) {
+  // The value at a pose, or between two; behind the last comes the first again, where a turn has so many units.
+  function between(values, at, turn) {
     const k = Math.floor(at), part = at - k;
-    return part && k + 1 < values.length ? values[k] + part * (values[k + 1] - values[k]) : values[k];
+    if (!part) return values[k];
+    const step = values[(k + 1) % values.length] - values[k];
+    return values[k] + part * (turn ? step - turn * Math.round(step / turn) : step);
   }
 
   function make(name, attributes, parent) {
@@ -35,6 +37,9 @@
     element.append(...children);
     return element;
   }
+
+  // A number in words that are not broken into lines.
+  const said = (name, text, unit) => `${name} = ${text} ${unit}`.trim().replaceAll(" ", "\u00a0");
 
   // A place of the pointer in the units of a drawing.
   function within(drawing, event) {
@@ -61,8 +66,8 @@
     };
     const x = track(data.x, PLACES), y = track(data.y, PLACES), turn = track(data.turn, TURNS);
     const parts = [...drawing.querySelectorAll("[data-at]")].map(group => {
-      const {at, turn: link} = group.dataset;
-      return [group, x[at], y[at], link === undefined ? null : turn[link]];
+      const {at, turn: link, offset} = group.dataset;
+      return [group, x[at], y[at], link === undefined ? null : turn[link], offset && offset.split(" ").map(Number)];
     });
     const legs = [...drawing.querySelectorAll("[data-from]")].map(line => {
       const {from, to, part} = line.dataset;
@@ -71,16 +76,23 @@
     return {
       x, y,
       show(at) {
-        for (const [group, x, y, turn] of parts) {
-          const place = `translate(${between(x, at).toFixed(2)} ${between(y, at).toFixed(2)})`;
-          const known = isFinite(between(x, at));
-          group.classList.toggle("moving-off", !known);
-          if (known) group.setAttribute("transform", turn ? `${place} rotate(${between(turn, at).toFixed(3)})` : place);
+        for (const [group, x, y, turn, offset] of parts) {
+          let px = between(x, at), py = between(y, at);
+          const known = isFinite(px), angle = turn ? between(turn, at, 360) : 0;
+          group.classList.toggle("moving-gone", !known);
+          if (!known) continue;
+          if (offset) {
+            const [cos, sin] = [Math.cos(angle * Math.PI / 180), Math.sin(angle * Math.PI / 180)];
+            px += cos * offset[0] - sin * offset[1];
+            py += sin * offset[0] + cos * offset[1];
+          }
+          const place = `translate(${px.toFixed(2)} ${py.toFixed(2)})`;
+          group.setAttribute("transform", turn && !offset ? `${place} rotate(${angle.toFixed(3)})` : place);
         }
         for (const [line, x1, y1, x2, y2, first, last] of legs) {
           const from = [between(x1, at), between(y1, at)], to = [between(x2, at), between(y2, at)];
           const known = isFinite(from[0]) && isFinite(to[0]);
-          line.classList.toggle("moving-off", !known);
+          line.classList.toggle("moving-gone", !known);
           if (!known) continue;
           [[1, first], [2, last]].forEach(([end, share]) => {
             line.setAttribute(`x${end}`, (from[0] + share * (to[0] - from[0])).toFixed(2));
@@ -117,8 +129,8 @@
       [moved.x[point], moved.y[point], ...parts.map(part => decode(part, data.poses, PLACES)), make("path", {}, layer)]);
     if (found.length) {
       const size = drawing.viewBox.baseVal, [length, words] = data.arrow;
-      make("path", {d: `M${size.width - 14 - length} ${size.height - 12}h${length}m-8 -4l8 4l-8 4`}, layer);
-      const text = make("text", {x: size.width - 14, y: size.height - 20, "text-anchor": "end", "font-size": 10,
+      make("path", {d: `M${size.width - 14 - length} ${size.height - 10}h${length}m-8 -4l8 4l-8 4`}, layer);
+      const text = make("text", {x: size.width - 14, y: size.height - 18, "text-anchor": "end", "font-size": 10,
         fill: "#D55E00", stroke: "none"}, layer);
       text.textContent = words;
     }
@@ -128,7 +140,7 @@
         for (const [...parts] of found) {
           const path = parts.pop(), [px, py, x, y] = parts.map(values => between(values, at));
           const known = isFinite(x + y + px + py);
-          path.classList.toggle("moving-off", !known);
+          path.classList.toggle("moving-gone", !known);
           if (known) path.setAttribute("d", `M${px} ${py}${way(x, y)}${px + x} ${py + y}`);
         }
       },
@@ -155,10 +167,19 @@
       for (const [values, slope, start, high, low, dot] of dots) {
         const y = start + slope * between(values, at);
         const known = y >= high - 0.5 && y <= low + 0.5;
-        dot.classList.toggle("moving-off", !known);
+        dot.classList.toggle("moving-gone", !known);
         if (known) { dot.setAttribute("cx", place); dot.setAttribute("cy", y.toFixed(2)); }
       }
     };
+  }
+
+  // A box that shows or hides some layers.
+  function check(text, layers, on) {
+    const box = html("input", {type: "checkbox", checked: on});
+    const set = () => layers.forEach(layer => layer.classList.toggle("moving-off", !box.checked));
+    box.addEventListener("change", set);
+    set();
+    return html("label", {}, box, text);
   }
 
   // A motion: a slider, play and pause, speed, and what may be shown.
@@ -172,16 +193,10 @@
     const button = html("button", {type: "button", textContent: "Play"});
     const speed = html("select", {}, ...[[0.25, "\u00bc\u00d7"], [0.5, "\u00bd\u00d7"], [1, "1\u00d7"], [2, "2\u00d7"], [4, "4\u00d7"]]
       .map(([value, text]) => html("option", {value, textContent: text, selected: value === 1})));
-    const check = (text, layers, on) => {
-      const box = html("input", {type: "checkbox", checked: on});
-      const set = () => layers.forEach(layer => layer.classList.toggle("moving-off", !box.checked));
-      box.addEventListener("change", set);
-      set();
-      return html("label", {}, box, text);
-    };
     const controls = figure.querySelector(".moving-controls");
     controls.append(slider, button, html("label", {}, "Speed", speed),
       check("Paths", [...drawing.querySelectorAll(".moving-trace")], true),
+      check("Link names", [...drawing.querySelectorAll(".moving-name")], false),
       ...(rates.any ? [check("Velocities", [rates.layer], false)] : []),
       html("span", {className: "moving-pace", textContent: data.pace}));
     controls.hidden = false;
@@ -194,9 +209,9 @@
     function show(pose) {
       at = pose;
       const near = Math.round(pose) % data.poses, broken = gap(near);
-      moved.show(pose); told.show(near); rates.show(pose); point(pose);
-      const text = data.given.map(([name, unit, which]) => `${name} = ${told.text(which, near)} ${unit}`.trim()).join(", ") +
-        (broken ? `: ${broken[2]} here` : "");
+      moved.show(pose); told.show(near); rates.show(pose); point(Math.min(pose, last));
+      const text = data.given.map(([name, unit, which]) => said(name, told.text(which, near), unit)).join(", ") +
+        (broken ? `: ${broken[2]}` : "");
       words.textContent = text;
       slider.value = near;
       slider.setAttribute("aria-valuetext", text);
@@ -204,12 +219,12 @@
 
     // The pose of a time of the motion, between two where it is between two.
     function pose(time) {
-      let low = 0, high = last;
+      let low = 0, high = times[data.poses] > times[last] ? data.poses : last;
       while (high - low > 1) {
         const middle = (low + high) >> 1;
         if (times[middle] <= time) low = middle; else high = middle;
       }
-      return Math.min(last, low + Math.max(0, Math.min(1, (time - times[low]) / (times[high] - times[low] || 1))));
+      return low + Math.max(0, Math.min(1, (time - times[low]) / (times[high] - times[low] || 1)));
     }
 
     // Where the motion is after a time: round where it closes, back from its ends and from what cannot be assembled.
@@ -220,14 +235,14 @@
       if (data.returns) time = ((time % whole) + whole) % whole;
       else if (time < 0 || time > times[last]) { forward = -forward; time = Math.max(0, Math.min(times[last], time)); }
       const next = pose(time);
-      if (gap(Math.floor(next)) || gap(Math.ceil(next))) { forward = -forward; return Math.round(at); }
+      if (gap(Math.floor(next)) || gap(Math.ceil(next) % data.poses)) { forward = -forward; return Math.round(at); }
       return next;
     }
 
     function frame(now) {
-      const spent = Math.min(now - clock, 100) / 1000 / data.seconds * speed.value * whole;
+      const spent = Math.max(0, Math.min(now - clock, 100)) / 1000 / data.seconds * speed.value * whole;
       if (!calm.matches) { clock = now; show(ahead(spent)); }
-      else if (now - clock >= SLOW_PAUSE / speed.value) { clock = now; show(Math.round(ahead(whole / SLOW_STEPS))); }
+      else if (now - clock >= SLOW_PAUSE / speed.value) { clock = now; show(Math.round(ahead(whole / SLOW_STEPS)) % data.poses); }
       playing = requestAnimationFrame(frame);
     }
 
@@ -235,15 +250,13 @@
       cancelAnimationFrame(playing);
       playing = 0;
       button.textContent = "Play";
-      button.setAttribute("aria-pressed", "false");
-      if (at % 1) show(Math.round(at));
+      if (at % 1) show(Math.round(at) % data.poses);
     }
 
     function play() {
       if (gap(Math.round(at))) show(data.first);
       clock = performance.now();
       button.textContent = "Pause";
-      button.setAttribute("aria-pressed", "true");
       playing = requestAnimationFrame(frame);
     }
 
@@ -271,7 +284,7 @@
       chosen.moved.show(at);
       chosen.told.show(at);
       words.textContent = [chosen.title, ...["x", "y"].map((axis, k) =>
-        `${data.point}.${axis} = ${chosen.told.text(k, at)} ${data.unit}`.trim())].filter(Boolean).join(", ");
+        said(`${data.point}.${axis}`, chosen.told.text(k, at), data.unit))].filter(Boolean).join(", ");
     }
 
     // The nearest pose to a place; with a direction the nearest on that side.
@@ -313,6 +326,7 @@
       });
       controls.append(html("label", {}, "At", select));
     }
+    controls.append(check("Link names", [...drawing.querySelectorAll(".moving-name")], false));
     controls.append(html("span", {className: "moving-pace", textContent: "Move over the region, or use the arrow keys."}));
     controls.hidden = false;
     show(at);
