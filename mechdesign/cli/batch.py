@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Outcome, answer, claim, folder, load_study, tell
+from mechdesign.cli.execution import Outcome, answer, claim, extras, folder, load_study, tell
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Interrupted, StudyError, explain
@@ -79,7 +79,8 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             if not options.no_plots:
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
-                terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
+                told = write_sketch(directory, study, extras("check", options))
+                terminal.say(f"{label}: {told}", quiet=options.quiet)
         except Exception as error:
             code, message = explain(error)
             terminal.say(message)

@@ -12,7 +12,7 @@ from typing import Any
 import mechdesign
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
-from mechdesign.cli.options import BUILT_IN, Options
+from mechdesign.cli.options import BUILT_IN, STYLES, Options
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.journal import NAME, Journal
 from mechdesign.parallel import one_thread
@@ -92,8 +92,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     """
     begun = time.perf_counter()
     writer.check_writable(directory)
-    animate = options.animate and command == "kinematics"
-    asked = manifest.Extras(not options.no_plots, options.kinds, animate, options.all_modes)
+    asked = extras(command, options)
     if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
     if command in LONG:
@@ -125,6 +124,12 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         result=result,
     )  # fmt: skip
+
+
+def extras(command: str, options: Options) -> Extras:
+    """What else than tables the options want of a command."""
+    animate = options.animate and command == "kinematics"
+    return Extras(not options.no_plots, options.kinds, options.style or STYLES[0], animate, options.all_modes)
 
 
 def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:

@@ -15,6 +15,8 @@ from mechdesign.errors import StudyError
 BUILT_IN = "two_link_arm"
 # Of pictures.
 FORMATS = ("png", "svg", "pdf")
+# Widths of their pages and sizes of their type.
+STYLES = ("screen", "paper")
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
@@ -66,6 +68,13 @@ JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
 NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
 FORMAT = _text("formats", str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.")
+STYLE = _text(
+    "style",
+    str,
+    "--style",
+    "NAME",
+    "Of the pictures: screen, or paper for a journal's column, 88 mm wide with type of 8 pt. Default: screen.",
+)
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
@@ -79,7 +88,7 @@ RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
 # What every question takes, and what only some of them do.
-COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT)
+COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE)
 OWN = {"kinematics": (ANIMATE, ALL_MODES), "optimize": (RESUME_DESIGNS,)}
 
 
@@ -90,7 +99,7 @@ class Options:
     Raises
     ------
     StudyError
-        If two options contradict each other, or a format is none.
+        If two options contradict each other, or a format or style is none.
     """
 
     out: Path | None = None
@@ -101,6 +110,7 @@ class Options:
     quiet: bool = False
     no_plots: bool = False
     formats: str | None = None
+    style: str | None = None
     animate: bool = False
     all_modes: bool = False
     junit: Path | None = None
@@ -110,8 +120,11 @@ class Options:
     def __post_init__(self) -> None:
         if self.animate and self.no_plots:
             raise StudyError("--animate and --no-plots contradict each other")
-        if self.formats is not None and self.no_plots:
-            raise StudyError("--format and --no-plots contradict each other")
+        for option, value in (("--format", self.formats), ("--style", self.style)):
+            if value is not None and self.no_plots:
+                raise StudyError(f"{option} and --no-plots contradict each other")
+        if self.style is not None and self.style not in STYLES:
+            raise StudyError(f"--style takes {' or '.join(STYLES)}, not {self.style!r}")
         for kind in self.kinds.split(","):
             if kind not in FORMATS:
                 raise StudyError(f"--format takes {', '.join(FORMATS)} or several with commas between, not {kind!r}")

@@ -26,6 +26,7 @@ class Extras:
 
     plots: bool = True
     formats: str = "png"  # of the pictures, with commas between them
+    style: str = "screen"  # of the pictures
     animate: bool = False
     all_modes: bool = False
 
@@ -98,7 +99,7 @@ def is_current(directory: Path, study: Study, command: str, asked: Extras) -> di
         return None
     expected = computed_from(study, command) | asdict(asked)
     without = [name for name in ("plots", "animate") if not expected[name]]
-    for name in (*without, *(("formats",) if not asked.plots else ())):
+    for name in (*without, *(("formats", "style") if not asked.plots else ())):
         expected[name] = content.get(name)
     files = recorded_files(content)
     if not files or "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):

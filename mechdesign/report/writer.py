@@ -72,7 +72,7 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
         tables = dataclasses.replace(asked, plots=False, animate=False)
         replace(directory / manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
         if asked.plots and not result.interrupted:
-            drawn, warnings = pictures(study, result, asked.formats.split(","), animate=asked.animate)
+            drawn, warnings = pictures(study, result, asked)
             digests |= {name: replace(directory / name, [data]) for name, data in drawn.items()}
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
             replace(directory / manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
@@ -96,7 +96,7 @@ def write_file(path: Path, data: bytes) -> None:
         raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
 
 
-def write_sketch(directory: Path, study: Study) -> str:
+def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
     """Draw the sketch as it is understood into a directory, as ``mechanism.png``; says where it is, or why not.
 
     Raises
@@ -108,25 +108,26 @@ def write_sketch(directory: Path, study: Study) -> str:
     from mechdesign.report.figures.mechanism import sketch_figure
 
     check_writable(directory)
-    path = directory / f"{MECHANISM}.png"
+    paths = [directory / f"{MECHANISM}.{kind}" for kind in asked.formats.split(",")]
     try:
-        with style.context():
-            data = style.encoded(sketch_figure(study), "png")
+        with style.context(asked.style):
+            figure = sketch_figure(study)
+            drawn = {path: style.encoded(figure, path.suffix[1:]) for path in paths}
     except Exception as error:
-        return f"warning: {_undrawn(path.name, explain(error)[1])}"
-    write_file(path, data)
-    return f"the sketch as understood is in {path}"
+        return f"warning: {_undrawn(paths[0].name, explain(error)[1])}"
+    for path, data in drawn.items():
+        write_file(path, data)
+    return f"the sketch as understood is in {', '.join(map(str, paths))}"
 
 
-def pictures(
-    study: Study, result: Result, formats: Sequence[str] = ("png",), *, animate: bool = False
-) -> tuple[dict[str, bytes], tuple[str, ...]]:
+def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, bytes], tuple[str, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings."""
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
     from mechdesign.report.figures.rendering import Drawing, Gallery, render
 
-    with style.context():
+    formats = asked.formats.split(",")
+    with style.context(asked.style):
         gallery = Gallery()
         # What all pictures of a command share may fail too.
         gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
@@ -139,7 +140,7 @@ def pictures(
             f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
         }
         drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
-        if animate:
+        if asked.animate:
             from mechdesign.report.figures.kinematics import animation
 
             drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}

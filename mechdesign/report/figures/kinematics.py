@@ -19,7 +19,7 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
 from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, fit, framed, windows
-from mechdesign.report.figures.panels import abscissa, clear_of_ticks, moving_names, tick_abscissa
+from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
 from mechdesign.results import Column, Result
@@ -41,6 +41,8 @@ _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
+_LEFT = 1.0  # inches beside panels of curves
+_LEGEND_ROW = 0.19
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
@@ -54,14 +56,14 @@ _PANEL_TITLE = 0.3
 _NOTE = 0.3
 _GAP = 0.12
 _SMALL_SYMBOLS = 0.6
-# Of the animation: frames at most, colours, milliseconds, and dots an inch, 640 pixels wide.
+# Of the animation: frames at most, colours, milliseconds, and pixels across.
 FRAMES = 60
 _GIF_COLORS = 128
 _WHITE = 244  # brightness of 255 from which on a colour is white
 _CYCLE = 3600  # of the whole
 _MIN_FRAME = 50
 _MAX_FRAME = 160
-_DPI = 80
+_GIF_WIDTH = 640
 
 
 def figures(study: Study, result: Result) -> Gallery:
@@ -102,10 +104,15 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     if limits is not None and swept in limits:
         marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
+    # A narrow page has no room for legends beside its panels: they stand above them.
+    above = style.narrow()
+    rows = max(-(-len(panel[:MAX_CURVES]) // _columns(panel)) + (len(panel) > MAX_CURVES) for panel in panels)
+    room = 0.1 + _LEGEND_ROW * rows
     longest = min(max(len(curve.of) for panel in panels for curve in panel[:MAX_CURVES]), _LEGEND_LETTERS)
     figure, axes = style.page(
-        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=1.0, right=0.6 + 0.08 * longest,
-        top=0.4 if marks else 0.15, bottom=0.5, down=0.2, sharex=True,
+        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=_LEFT,
+        right=0.15 if above else 0.6 + 0.08 * longest, top=(0.4 if marks else 0.15) + room * above, bottom=0.5,
+        down=room if above else 0.2, sharex=True,
     )  # fmt: skip
     colors: dict[tuple[str, str], str] = {}
     for axis, panel in zip(axes, panels, strict=True):
@@ -181,6 +188,15 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
     return found
 
 
+def _shortened(name: str) -> str:
+    return name if len(name) <= _LEGEND_LETTERS else f"{name[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+
+
+def _columns(panel: list[_Curve]) -> int:
+    """Columns of a legend above a panel."""
+    return fitting([_shortened(curve.of) for curve in panel[:MAX_CURVES]], style.width() - _LEFT - 0.3)
+
+
 def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
     shown: list[Floats] = []
     for curve in panel[:MAX_CURVES]:
@@ -188,16 +204,11 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
         # A name keeps its colour from its position to its acceleration.
         color = colors.setdefault((curve.of, "" if curve.order in _RANKS[:4] else curve.order), _COLORS[len(shown)])
         hidden = any(_coincide(values, other) for other in shown)
-        label = (
-            curve.of
-            if len(curve.of) <= _LEGEND_LETTERS
-            else f"{curve.of[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
-        )
         # In grey the markers tell what the colours tell.
         which, every = _COLORS.index(color), max(len(x) // _MARKS, 1)
         marker = _MARKERS[which] if len(panel) > 1 else ""
-        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=label, marker=marker,
-                  markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
+        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=_shortened(curve.of),
+                  marker=marker, markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
         shown.append(values)
     first = panel[0]
     title = first.order.replace("_", " ")
@@ -220,7 +231,10 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
     if len(panel) > 1 or first.of != first.order:
         left_out = len(panel) - len(shown)
         note = f"and {left_out} more" if left_out else None
-        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=note, title_fontsize=9, alignment="left")
+        place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+        if style.narrow():
+            place = {"loc": "lower left", "bbox_to_anchor": (-0.02, 0.97), "ncols": _columns(panel), "borderaxespad": 0}
+        axis.legend(title=note, title_fontsize=9, alignment="left", **place)
 
 
 def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, str]], shaded: bool) -> None:
@@ -316,13 +330,13 @@ def modes_figure(study: Study, result: Result) -> Figure:
             axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=columns == 1, drives=False,
             travel=sweep.travel, size=_SMALL_SYMBOLS if columns > 1 else 1.0,
         )  # fmt: skip
-    figure.text(LEFT / style.WIDTH, 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
+    figure.text(LEFT / style.width(), 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
     return figure
 
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches: all of them on about one screen."""
-    width = (style.WIDTH - LEFT - RIGHT - _GAP * (columns - 1)) / columns
+    width = (style.width() - LEFT - RIGHT - _GAP * (columns - 1)) / columns
     return width, min(max(8.0 / rows, _MIN_HEIGHT), _MAX_HEIGHT)
 
 
@@ -345,7 +359,7 @@ def gif(sweep: Sweep) -> bytes:
     most = FRAMES + 1 if closed else FRAMES // 2 + 1
     some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
     figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=HEIGHT, above=TITLE)
-    figure.set_dpi(_DPI)
+    figure.set_dpi(_GIF_WIDTH / style.width())
     draw_paths(axes, sweep)
     pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)
     pictures = pictures if closed else pictures + pictures[-2:0:-1]

@@ -114,7 +114,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    return (style.WIDTH - RIGHT - LEFT * columns) / columns, _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
+    return (style.width() - RIGHT - LEFT * columns) / columns, _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
 
 
 def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: int = 0) -> None:

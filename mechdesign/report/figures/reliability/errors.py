@@ -221,7 +221,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
     known, unseen = methods(table), _unseen(table)
     count = poses.count if swept is not None else min(poses.count, MAX_LISTED)
     values = np.arange(count, dtype=np.float64) if swept is None else swept.values
-    written = swept is None and count * len(known) <= MAX_WRITTEN
+    written = swept is None and count * len(known) <= (MAX_WRITTEN // 2 if style.narrow() else MAX_WRITTEN)
     # Methods stand beside each other at a listed pose; of a sweep those that are simulated, a little.
     beside = known if swept is None else [method for method in known if look(method).sampled]
     step = min(0.3 if written else 0.14, 0.8 / len(known)) if swept is None else 0.2 * np.ptp(values) / count
