@@ -77,6 +77,13 @@ STYLE = _text(
 )
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
+BEFORE = _text(
+    "before",
+    Path,
+    "--before",
+    "STUDY",
+    "Also draw this study, without the overrides of --set, in dashes under the other: before and after a change.",
+)
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
 FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
 RESUME = _flag(
@@ -89,7 +96,7 @@ RESUME_DESIGNS = _flag(
 )
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE)
-OWN = {"kinematics": (ANIMATE, ALL_MODES), "optimize": (RESUME_DESIGNS,)}
+OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
 
 
 @dataclass(frozen=True)
@@ -113,6 +120,7 @@ class Options:
     style: str | None = None
     animate: bool = False
     all_modes: bool = False
+    before: Path | None = None
     junit: Path | None = None
     fail_fast: bool = False
     resume: bool = False
@@ -120,7 +128,7 @@ class Options:
     def __post_init__(self) -> None:
         if self.animate and self.no_plots:
             raise StudyError("--animate and --no-plots contradict each other")
-        for option, value in (("--format", self.formats), ("--style", self.style)):
+        for option, value in (("--format", self.formats), ("--style", self.style), ("--before", self.before)):
             if value is not None and self.no_plots:
                 raise StudyError(f"{option} and --no-plots contradict each other")
         if self.style is not None and self.style not in STYLES:

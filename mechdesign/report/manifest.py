@@ -29,6 +29,7 @@ class Extras:
     style: str = "screen"  # of the pictures
     animate: bool = False
     all_modes: bool = False
+    before: Mapping[str, Any] | None = None  # the study before a change, which pictures show as well
 
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
@@ -43,6 +44,12 @@ def computed_from(study: Study, command: str) -> dict[str, Any]:
         "overrides": list(study.overrides),
         "seed": study.seed,
     }
+
+
+def shown_before(study: Study) -> dict[str, Any]:
+    """What the manifest says of a study that pictures show as well."""
+    about = computed_from(study, "")
+    return {key: about[key] for key in ("study", "inputs", "overrides") if key in about}
 
 
 def compose(

@@ -16,9 +16,11 @@ from PIL import Image
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.report.before import Before, known
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
 from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, fit, framed, windows
+from mechdesign.report.figures.overlay import DASHES, draw_sweep, name_both
 from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
@@ -76,7 +78,7 @@ def figures(study: Study, result: Result) -> Gallery:
         found.add("motion", curves_figure, study, result)
         sweep = Sweep.of(result.drawn["motion"])
         if len(sweep.valid):
-            found.add("paths", paths_figure, sweep)
+            found.add("paths", paths_figure, sweep, before=known(result.drawn))
     if "modes" in result.tables:
         found.add("modes", modes_figure, study, result)
     return found
@@ -100,6 +102,7 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     panels = _panels(study, [column for column in table.columns if column.name != "valid"], swept, x)
     if not panels:
         return None
+    before = known(result.drawn)
     limits, marks = result.tables.get("limits"), []
     if limits is not None and swept in limits:
         marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
@@ -119,13 +122,34 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
         for begin, end in invalid:
             axis.axvspan(begin, end, color=_SHADE, linewidth=0, zorder=0)
         _draw(axis, panel, x, study.units, colors)
+        if before is not None:
+            _draw_before(axis, panel, before, colors)
     _draw_limits(figure, axes, marks, bool(invalid))
     axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
     axes[-1].margins(x=0.02)
     axes[-1].set_xlabel(over.label)
     tick_abscissa(axes[-1], over)
     clear_of_ticks(figure, axes)
+    if before is not None:
+        name_both(figure, before)
     return figure
+
+
+def _draw_before(axis: Axes, panel: list[_Curve], before: Before, colors: dict[tuple[str, str], str]) -> None:
+    """The curves of the study before, dashed, each in the colour of its name."""
+    table, x = before.result.tables["motion"], abscissa(before.study, before.result.drawn["poses"]).values
+    low, high = axis.get_ylim()
+    for curve in panel[:MAX_CURVES]:
+        if curve.column.name in table:
+            color = colors[curve.of, "" if curve.order in _RANKS[:4] else curve.order]
+            values = table[curve.column.name]
+            axis.plot(x, values, color=color, linestyle=DASHES, linewidth=1.1, zorder=1.9)
+            if curve.order == "position" and np.isfinite(values).any():
+                low, high = min(low, float(np.nanmin(values))), max(high, float(np.nanmax(values)))
+    # Near a dead centre rates grow without bound: their axis stays that of the study now.
+    if (low, high) != axis.get_ylim():
+        margin = 0.04 * (high - low)
+        axis.set_ylim(low - margin, high + margin)
 
 
 def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
@@ -257,17 +281,18 @@ def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, 
         )  # fmt: skip
 
 
-def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
+def paths_figure(sweep: Sweep, *, above: float = ABOVE, before: Before | None = None) -> Figure:
     """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
 
-    `above` it, inches are left for a title.
+    `above` it, inches are left for a title. A study before it lies under it in grey dashes.
     """
     wanted = [
         target.table[:, -2] + 1j * target.table[:, -1]
         for target in sweep.study.targets.values()
         if target.table is not None and len(target.coordinates) == 2
     ]
-    places = np.concatenate([sweep.extent, *wanted])
+    earlier = Sweep.of(before.result.drawn["motion"]) if before is not None else None
+    places = np.concatenate([sweep.extent, *wanted, *([earlier.extent] if earlier is not None else [])])
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
     for path in wanted:
         axes.plot(
@@ -280,9 +305,13 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
     some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
     for index in np.unique(some[1 : -1 if sweep.closed else None]):
         draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index))
+    if earlier is not None:
+        draw_sweep(axes, earlier)
     draw_paths(axes, sweep)
     first = int(sweep.valid[0])
     draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
+    if before is not None:
+        name_both(figure, before)
     return figure
 
 
