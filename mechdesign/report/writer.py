@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MECHANISM = "mechanism"
+DIMENSIONS = "dimensions"  # of `check`
 ANIMATION = "motion.gif"
 FIGURES = "mechdesign.report.figures"
 
@@ -97,7 +98,7 @@ def write_file(path: Path, data: bytes) -> None:
 
 
 def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
-    """Draw the sketch as it is understood into a directory, as ``mechanism.png``; says where it is, or why not.
+    """Draw the sketch as it is understood into a directory, as ``mechanism`` and ``dimensions``; says what is there.
 
     Raises
     ------
@@ -105,19 +106,26 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
         If it cannot be written.
     """
     from mechdesign.report.figures import style
+    from mechdesign.report.figures.dimensions import dimensions_figure
     from mechdesign.report.figures.mechanism import sketch_figure
 
     check_writable(directory)
-    paths = [directory / f"{MECHANISM}.{kind}" for kind in asked.formats.split(",")]
-    try:
-        with style.context(asked.style):
-            figure = sketch_figure(study)
-            drawn = {path: style.encoded(figure, path.suffix[1:]) for path in paths}
-    except Exception as error:
-        return f"warning: {_undrawn(paths[0].name, explain(error)[1])}"
-    for path, data in drawn.items():
-        write_file(path, data)
-    return f"the sketch as understood is in {', '.join(map(str, paths))}"
+    kinds, told = asked.formats.split(","), []
+    drawings = ((MECHANISM, "the sketch as understood is", sketch_figure),
+                (DIMENSIONS, "its dimensions are", dimensions_figure))  # fmt: skip
+    for name, what, make in drawings:
+        paths = [directory / f"{name}.{kind}" for kind in kinds]
+        try:
+            with style.context(asked.style):
+                figure = make(study)
+                drawn = {path: style.encoded(figure, path.suffix[1:]) for path in paths}
+        except Exception as error:
+            told.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
+            continue
+        for path, data in drawn.items():
+            write_file(path, data)
+        told.append(f"{what} in {', '.join(map(str, paths))}")
+    return "; ".join(told)
 
 
 def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, bytes], tuple[str, ...]]:

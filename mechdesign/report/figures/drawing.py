@@ -256,7 +256,8 @@ def _slide_labels(scene: Scene) -> list[Label]:
     ]
 
 
-def _link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
+def link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
+    """Names of the moving links that are no drive."""
     labels = []
     for name in scene.description.links:
         places = [scene.points[point] for point in scene.link_points(name)]
@@ -339,7 +340,7 @@ def draw_mechanism(
     named = _draw_drives(pen, scene) if drives else []
     if labels:
         # The most needed first.
-        named = [*point_labels(scene), *named, *_slide_labels(scene), *_link_labels(scene, colors)]
+        named = [*point_labels(scene), *named, *_slide_labels(scene), *link_labels(scene, colors)]
         place_labels(axes, named, covered(axes), order=pen.order + 2)
 
 

@@ -80,8 +80,8 @@ def windows(
 
 
 def framed(
-    places: Complexes | Iterable[complex], unit: str, *, height: float, above: float = ABOVE
+    places: Complexes | Iterable[complex], unit: str, *, height: float, above: float = ABOVE, pad: float = PAD
 ) -> tuple[Figure, Axes]:
     """A figure with one window as wide as the page; `above` it, inches are left for a title."""
-    figure, (axes,) = windows(fit(places, style.width() - LEFT - RIGHT, height), unit, above=above)
+    figure, (axes,) = windows(fit(places, style.width() - LEFT - RIGHT, height, pad), unit, above=above)
     return figure, axes
