@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from itertools import combinations
+from itertools import combinations, cycle
 from string import ascii_uppercase
 
 import numpy as np
@@ -153,7 +153,9 @@ def score_curves(designs: Designs) -> Figure:
         axes.plot(column[best], score[best], color=style.INK, linewidth=1.6 if count > 1 else 2.0,
                   label="best near each value" if count > 1 else told)  # fmt: skip
         for k, color in zip(range(len(designs.goals)) if many and count == 1 else (), style.PALETTE, strict=False):
-            axes.plot(column[best], designs.share(k)[best], color=color, label=f"{designs.goals[k].name}, normalised")
+            dashes = style.DASHES[(k + 1) % len(style.DASHES)]
+            axes.plot(column[best], designs.share(k)[best], color=color, linestyle=dashes,
+                      label=f"{designs.goals[k].name}, normalised")  # fmt: skip
         axes.plot(column[winner], score[winner], "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
         axes.set_title(f"best: {name} = {column[winner]:.4g}", loc="right", fontsize=9, color=style.VERMILION)
         axes.set_xlabel(label(designs, name))
@@ -321,11 +323,11 @@ def convergence(designs: Designs) -> Figure:
     axes = figure.add_subplot()
     count = np.arange(1, len(designs) + 1)
     if len(designs.goals) > 1:
-        for row in designs.weights:
+        for row, dashes in zip(designs.weights, cycle(style.DASHES), strict=False):
             so_far = np.maximum.accumulate(np.nan_to_num(designs.score(row), nan=-np.inf))
             known = np.isfinite(so_far)
             weights = ", ".join(f"{weight:g}" for weight in row)
-            axes.step(count[known], so_far[known] / so_far[-1], where="post", label=f"({weights})")
+            axes.step(count[known], so_far[known] / so_far[-1], where="post", label=f"({weights})", linestyle=dashes)
         axes.set_ylabel("best score so far / best")
         goals = ", ".join(each.name for each in designs.goals)
         axes.legend(title=f"weights of ({goals})", loc="upper left", bbox_to_anchor=(1.01, 1.0), title_fontsize=9,

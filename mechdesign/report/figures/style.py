@@ -51,6 +51,9 @@ LOOKS = {
 # Okabe and Ito: told apart with every kind of colour vision, and in grey by their order of brightness.
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#F0E442")
 BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = PALETTE
+# For pictures in grey, where brightness tells few apart.
+DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (2, 1)), (0, (6, 1, 1.5, 1)), (0, (1, 1.5)), (0, (8, 1, 1, 1, 1, 1)))
+HATCHES = ("", "////", "....", "xxxx")
 INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"

@@ -74,8 +74,10 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         for place, values in enumerate(shown[:, ranked]):
             height = 0.8 / len(shown)
             label = pose_in_words(study, poses, place) if len(shown) > 1 else "share, to the first order"
-            drawn = axis.barh(np.arange(len(ranked)) + (place + 0.5) * height - 0.4, values, height,
-                              color=style.PALETTE[place % len(style.PALETTE)])  # fmt: skip
+            look: dict[str, Any] = {"color": style.PALETTE[place % len(style.PALETTE)]}
+            if hatch := style.HATCHES[place % len(style.HATCHES)]:
+                look |= {"hatch": hatch, "edgecolor": "white", "linewidth": 0}
+            drawn = axis.barh(np.arange(len(ranked)) + (place + 0.5) * height - 0.4, values, height, **look)
             entries[label] = drawn
             if len(shown) == 1:
                 axis.bar_label(drawn, fmt="%.1f", padding=2, fontsize=8)
@@ -201,5 +203,7 @@ def _failures(axis: Axes, tables: Mapping[str, Table], allowed: float) -> None:
 
 def _pair(axis: Axes, given: Floats, allocated: Floats) -> None:
     places = np.arange(len(given))
-    axis.barh(places - 0.2, given, 0.36, color=style.FAINT, label="as given")
+    axis.barh(
+        places - 0.2, given, 0.36, color=style.FAINT, hatch="////", edgecolor="white", linewidth=0, label="as given"
+    )
     axis.barh(places + 0.2, allocated, 0.36, color=style.BLUE, label="allocated")
