@@ -1,10 +1,18 @@
 """Design studies of planar mechanisms: one description, four questions.
 
 >>> import mechdesign
->>> study = mechdesign.load("study.yaml", overrides={"reliability.samples": 1000})  # doctest: +SKIP
->>> result = mechdesign.reliability(study, seed=1)  # doctest: +SKIP
->>> result.tables["moments"]["sigma"]  # doctest: +SKIP
->>> mechdesign.requirements(study, result)  # doctest: +SKIP
+>>> from mechdesign.study import template_path
+>>> study = mechdesign.load(template_path("four_bar"), overrides={"mechanism.links.rocker.2": 65})
+>>> result = mechdesign.kinematics(study)
+>>> result
+<kinematics of 'four_bar': How does it move?
+  motion (73 rows), extremes (4 rows), limits (0 rows), loops (1 row), toggles (2 rows)
+  no warnings>
+>>> result.tables["extremes"]["range"].round(3)
+array([54.   , 27.547, 55.587, 62.41 ])
+
+In a notebook a study and a result show themselves; ``result.figure("paths")`` is one of its pictures, `figures` their
+names, `verdicts` what is met of what the study requires, and ``result.save("folder")`` writes what the command writes.
 
 The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics.
 """
@@ -17,24 +25,23 @@ from typing import TYPE_CHECKING, Any
 from mechdesign.commands import COMMANDS
 
 if TYPE_CHECKING:
-    from mechdesign.analyses.kinematics.analysis import kinematics as kinematics
-    from mechdesign.analyses.optimize.analysis import optimize as optimize
-    from mechdesign.analyses.reliability.analysis import reliability as reliability
-    from mechdesign.analyses.stiffness.analysis import stiffness as stiffness
-    from mechdesign.analyses.workspace.analysis import workspace as workspace
+    from mechdesign.door.questions import kinematics as kinematics
+    from mechdesign.door.questions import load as load
+    from mechdesign.door.questions import optimize as optimize
+    from mechdesign.door.questions import reliability as reliability
+    from mechdesign.door.questions import stiffness as stiffness
+    from mechdesign.door.questions import workspace as workspace
     from mechdesign.errors import AssemblyError as AssemblyError
     from mechdesign.errors import MechdesignError as MechdesignError
     from mechdesign.errors import StudyError as StudyError
     from mechdesign.report.requirements import requirements as requirements
-    from mechdesign.study import load as load
 
     __version__: str
 
 _HOMES = {
     **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
-    "load": "mechdesign.study",
     "requirements": "mechdesign.report.requirements",
-    **{name: command.module for name, command in COMMANDS.items()},
+    **dict.fromkeys(("load", *COMMANDS), "mechdesign.door.questions"),
 }
 __all__ = sorted((*_HOMES, "__version__"))
 

@@ -16,6 +16,16 @@ if TYPE_CHECKING:
     from mechdesign.results import Result
 
 
+EXIT_CODES = {
+    0: "done, every requirement met",
+    1: "done, a requirement not met",
+    2: "the command or the study file is wrong; nothing was computed",
+    3: "the study is right, but the mechanism cannot do it: a pose that cannot be assembled, no feasible design",
+    4: "a numerical failure, or results that could not be written",
+    130: "interrupted; what was finished is whole",
+}
+
+
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name that resembles this one most, None where none does."""
     folded = {candidate.casefold(): candidate for candidate in known}
@@ -35,7 +45,12 @@ def counted(number: int, what: str) -> str:
 
 
 class MechdesignError(Exception):
-    """Base of every error that mechdesign raises on purpose."""
+    """Base of every error that mechdesign raises on purpose.
+
+    >>> import mechdesign
+    >>> issubclass(mechdesign.StudyError, mechdesign.MechdesignError)
+    True
+    """
 
     exit_code = 4
 
@@ -58,7 +73,15 @@ class Problem:
 
 
 class StudyError(MechdesignError):
-    """The study file or a command's arguments are wrong; nothing was computed."""
+    """The study file or a command's arguments are wrong; nothing was computed. `problems` has each mistake.
+
+    >>> import mechdesign
+    >>> try:
+    ...     mechdesign.load(text="mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, r]}, drives: [arm]}")
+    ... except mechdesign.StudyError as error:
+    ...     print(error.problems[0].key, "in column", error.problems[0].column)
+    mechanism.links.arm.2 in column 54
+    """
 
     exit_code = 2
 
@@ -78,7 +101,16 @@ class MechanismError(MechdesignError):
 
 
 class AssemblyError(MechdesignError):
-    """The study is right, but the mechanism cannot do what is asked (a pose, a design)."""
+    """The study is right, but the mechanism cannot do what is asked (a pose, a design).
+
+    >>> import mechdesign
+    >>> arm = "mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}"
+    >>> try:
+    ...     mechdesign.kinematics(mechdesign.load(text=arm, overrides={"kinematics.poses": [{"P.x": 120}]}))
+    ... except mechdesign.AssemblyError as error:
+    ...     print(error)
+    no pose is valid; P.x = 120 mm: cannot be assembled
+    """
 
     exit_code = 3
 

@@ -36,41 +36,69 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class _Function:
-    """A function of the language and its partial derivatives, on floats and arrays."""
+    """A function of the language, what it is, and its partial derivatives, on floats and arrays."""
 
+    meaning: str
     value: Callable[..., Any]
     partials: Callable[..., tuple[Any, ...]]
     angles: Literal["", "takes", "gives"] = ""
 
 
 _FUNCTIONS: dict[str, _Function] = {
-    "sqrt": _Function(np.sqrt, lambda x: (0.5 / np.sqrt(x),)),
-    "exp": _Function(np.exp, lambda x: (np.exp(x),)),
-    "log": _Function(np.log, lambda x: (1.0 / np.asarray(x, dtype=float),)),
-    "abs": _Function(np.abs, lambda x: (np.sign(x),)),
-    "sin": _Function(np.sin, lambda x: (np.cos(x),), "takes"),
-    "cos": _Function(np.cos, lambda x: (-np.sin(x),), "takes"),
-    "tan": _Function(np.tan, lambda x: (1.0 + np.tan(x) ** 2,), "takes"),
-    "asin": _Function(np.arcsin, lambda x: (1.0 / np.sqrt((1.0 - x) * (1.0 + x)),), "gives"),
-    "acos": _Function(np.arccos, lambda x: (-1.0 / np.sqrt((1.0 - x) * (1.0 + x)),), "gives"),
-    "atan": _Function(np.arctan, lambda x: (1.0 / (1.0 + np.square(x)),), "gives"),
+    "sqrt": _Function("square root", np.sqrt, lambda x: (0.5 / np.sqrt(x),)),
+    "exp": _Function("exponential function", np.exp, lambda x: (np.exp(x),)),
+    "log": _Function("natural logarithm", np.log, lambda x: (1.0 / np.asarray(x, dtype=float),)),
+    "abs": _Function("absolute value", np.abs, lambda x: (np.sign(x),)),
+    "sin": _Function("sine of an angle", np.sin, lambda x: (np.cos(x),), "takes"),
+    "cos": _Function("cosine of an angle", np.cos, lambda x: (-np.sin(x),), "takes"),
+    "tan": _Function("tangent of an angle", np.tan, lambda x: (1.0 + np.tan(x) ** 2,), "takes"),
+    "asin": _Function(
+        "angle whose sine it is, within a quarter turn of 0",
+        np.arcsin,
+        lambda x: (1.0 / np.sqrt((1.0 - x) * (1.0 + x)),),
+        "gives",
+    ),
+    "acos": _Function(
+        "angle whose cosine it is, from 0 to half a turn",
+        np.arccos,
+        lambda x: (-1.0 / np.sqrt((1.0 - x) * (1.0 + x)),),
+        "gives",
+    ),
+    "atan": _Function(
+        "angle whose tangent it is, within a quarter turn of 0",
+        np.arctan,
+        lambda x: (1.0 / (1.0 + np.square(x)),),
+        "gives",
+    ),
     "atan2": _Function(
+        "angle from the x axis to the place (x, y)",
         np.arctan2,
         lambda y, x: (x / (np.square(x) + np.square(y)), -y / (np.square(x) + np.square(y))),
         "gives",
     ),
-    "hypot": _Function(np.hypot, lambda x, y: (x / np.hypot(x, y), y / np.hypot(x, y))),
-    "min": _Function(np.minimum, lambda x, y: (np.where(x <= y, 1.0, 0.0), np.where(x <= y, 0.0, 1.0))),
-    "max": _Function(np.maximum, lambda x, y: (np.where(x >= y, 1.0, 0.0), np.where(x >= y, 0.0, 1.0))),
-    "+": _Function(np.add, lambda x, y: (1.0, 1.0)),
-    "-": _Function(np.subtract, lambda x, y: (1.0, -1.0)),
-    "*": _Function(np.multiply, lambda x, y: (y, x)),
-    "/": _Function(np.true_divide, lambda x, y: (np.true_divide(1.0, y), -np.true_divide(x, np.square(y)))),
+    "hypot": _Function(
+        "square root of the sum of squares", np.hypot, lambda x, y: (x / np.hypot(x, y), y / np.hypot(x, y))
+    ),
+    "min": _Function(
+        "the smallest of two numbers or more",
+        np.minimum,
+        lambda x, y: (np.where(x <= y, 1.0, 0.0), np.where(x <= y, 0.0, 1.0)),
+    ),
+    "max": _Function(
+        "the largest of two numbers or more",
+        np.maximum,
+        lambda x, y: (np.where(x >= y, 1.0, 0.0), np.where(x >= y, 0.0, 1.0)),
+    ),
+    "+": _Function("sum", np.add, lambda x, y: (1.0, 1.0)),
+    "-": _Function("difference", np.subtract, lambda x, y: (1.0, -1.0)),
+    "*": _Function("product", np.multiply, lambda x, y: (y, x)),
+    "/": _Function("quotient", np.true_divide, lambda x, y: (np.true_divide(1.0, y), -np.true_divide(x, np.square(y)))),
     "**": _Function(
+        "power; groups to the right and binds more tightly than a sign",
         np.float_power,
         lambda x, y: (y * np.float_power(x, np.subtract(y, 1.0)), np.float_power(x, y) * np.log(x)),
     ),
-    "negate": _Function(np.negative, lambda x: (-1.0,)),
+    "negate": _Function("negative", np.negative, lambda x: (-1.0,)),
 }
 _BINDING = {"+": 10, "-": 10, "*": 20, "/": 20, "**": 40}
 _OF_TWO = frozenset(("atan2", "hypot", "min", "max", *_BINDING))
@@ -78,7 +106,9 @@ _UNARY_BINDING = 30
 
 FUNCTIONS = frozenset(name for name in _FUNCTIONS if name.isalnum() and name != "negate")
 """Names of the functions that an expression may call."""
-RESERVED = FUNCTIONS | {"pi"}
+CONSTANTS = {"pi": (math.pi, "circumference of a circle over its diameter")}
+"""Values and meanings of the constants that an expression may name."""
+RESERVED = FUNCTIONS | CONSTANTS.keys()
 """Names that a parameter cannot bear."""
 
 _Step = tuple[Literal["constant", "name", "call"], float | str]
@@ -191,6 +221,18 @@ class Expression:
         return inner, outer
 
 
+def meanings() -> dict[str, tuple[str, str]]:
+    """Functions, operators and constants by name: how each is written, and what it is."""
+    found = {name: (name, meaning) for name, (_, meaning) in CONSTANTS.items()}
+    turn = {"takes": "; the angle is in the study's unit", "gives": ", in the study's unit", "": ""}
+    for name, function in _FUNCTIONS.items():
+        call = "(y, x)" if name == "atan2" else "(x, y)" if arity(name) == 2 else "(x)"
+        written = f"{name}{call}" if name in FUNCTIONS else f"x {name} y"
+        if name != "negate":
+            found[name] = (written, function.meaning + turn[function.angles])
+    return found
+
+
 def arity(name: str) -> int:
     """Number of arguments that a function or operator takes."""
     return 2 if name in _OF_TWO else 1
@@ -278,8 +320,8 @@ class _Parser:
             self.program.append(("constant", float(token)))
         elif self._take("("):
             self._call(token)
-        elif token == "pi":
-            self.program.append(("constant", math.pi))
+        elif token in CONSTANTS:
+            self.program.append(("constant", CONSTANTS[token][0]))
         elif token in FUNCTIONS:
             raise ExpressionError(f"the function {token!r} needs its argument in parentheses")
         else:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pandas
 
 # Number of columns that a table's repr names.
 MAX_SHOWN = 8
@@ -36,7 +39,8 @@ class Column:
 class Table:
     """Columns of equal length; ``table["sigma"]`` is the NumPy array.
 
-    Iteration gives its rows as dictionaries, so that ``pandas.DataFrame(table)`` is the same table.
+    Iteration gives its rows as dictionaries, so that ``pandas.DataFrame(table)`` is the same table; `to_pandas` has its
+    units as well. Polars takes ``polars.DataFrame(table.to_dict())``.
     """
 
     name: str
@@ -90,6 +94,23 @@ class Table:
     def to_dict(self) -> dict[str, NDArray[Any]]:
         """The arrays by the names of their columns, as most libraries of tables take them."""
         return {column.name: column.values for column in self.columns}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table as pandas has it: a column each, their units in ``attrs["units"]``.
+
+        Raises
+        ------
+        ImportError
+            If pandas, which mechdesign does without, is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            message = "to_pandas needs pandas: pip install pandas; to_dict() gives the columns without it"
+            raise ImportError(message) from error
+        frame = pandas.DataFrame(self.to_dict())
+        frame.attrs["units"] = {column.name: column.unit for column in self.columns}
+        return frame
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Iterate over rows as dictionaries of Python scalars."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mechdesign.indices import REGIONAL
 from mechdesign.results import Column
 from mechdesign.study import Units
 
@@ -15,9 +16,9 @@ SHARED: Mapping[str, tuple[str, str]] = {
     "valid": ("none", "1 where the pose is assembled and within its limits"),
     "x": ("length", "place of the point"),
     "y": ("length", "place of the point"),
-    "SUI": ("none", "area of the region over that of the rectangle around it"),
-    "area": ("area", "area of the region"),
-    "box_area": ("area", "area of the rectangle around the region"),
+    "SUI": ("none", REGIONAL["SUI"].meaning),
+    "area": ("area", REGIONAL["area"].meaning),
+    "box_area": ("area", REGIONAL["box_area"].meaning),
     "kind": ("none", "what ends the region: limit or singularity"),
     "at": ("none", "which limit or singularity"),
     "side": ("none", "which end of the ray's interval"),

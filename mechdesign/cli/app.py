@@ -13,13 +13,12 @@ import typer
 from mechdesign.cli import options as given
 from mechdesign.cli.options import BUILT_IN, Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Interrupted, explain
+from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
     name="mechdesign",
     help="Design studies of planar mechanisms: one study file, four questions, tables and pictures.",
-    epilog="Exit codes: 0 done, 1 a requirement not met, 2 wrong command or study, 3 the mechanism cannot do it, "
-    "4 numerical failure or unwritable results, 130 interrupted.",
+    epilog="Exit codes: " + ". ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     add_completion=False,
     no_args_is_help=True,
     # Rich would cost --help a tenth of a second.
@@ -40,7 +39,9 @@ def _guard() -> Iterator[None]:
     except typer.Exit:
         raise
     except Exception as error:
-        code, message = explain(error)
+        from mechdesign.cli.docs import explained
+
+        code, message = explained(error)
         print(message, file=sys.stderr)
         raise typer.Exit(code) from None
 
@@ -81,12 +82,13 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
 
 
 for _name, _asked in COMMANDS.items():
-    _takes = (*given.COMMON, *given.OWN.get(_name, ()))
+    _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
     _add(_name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
 _add(
     "run",
     (
-        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.ANIMATE, given.JUNIT, given.FAIL_FAST, given.RESUME,
+        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
+        given.RESUME,
     ),
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",
@@ -120,6 +122,27 @@ def new(
         from mechdesign.study import template as template_text
 
         emit(template_text(template or BUILT_IN))
+
+
+@app.command("docs", context_settings={"ignore_unknown_options": True})
+def docs(
+    words: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[WORD]...",
+            help="Keys of the study (kinematics.sweep, sweep), commands, options, indices, units, ...",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Say what words mean; without any, which there are."""
+    with _guard():
+        import typer.main
+
+        from mechdesign.cli.docs import show
+
+        group: Any = typer.main.get_command(app)
+        show(words or (), group.commands)
 
 
 @app.command("schema", short_help="Print the JSON Schema of the study file.")

@@ -2,33 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mechdesign.cli import terminal
-from mechdesign.cli.execution import Outcome, answer, claim, extras, folder, load_study, tell
+from mechdesign.cli.docs import explained
+from mechdesign.cli.execution import (
+    OUTCOMES,
+    Outcome,
+    answer,
+    claim,
+    extras,
+    folder,
+    interrupted,
+    load_study,
+    tell,
+    write_report,
+)  # fmt: skip
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Interrupted, StudyError, explain
+from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
+from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, foresee
 from mechdesign.report.writer import write_file, write_sketch
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
 
-_OUTCOMES = {
-    0: "done",
-    1: "requirement not met",
-    2: "wrong study",
-    3: "cannot be assembled",
-    4: "failed",
-    Interrupted.exit_code: "interrupted",
-}
+if TYPE_CHECKING:
+    from mechdesign.report.page.page import Entry
 
 
 def questions(study: Study) -> tuple[str, ...]:
@@ -46,18 +56,22 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
     summary and the JUnit file then show what was finished.
     """
     answers: list[Outcome] = []
+    asked: Sequence[Path | None] = paths or [None]
+    book = Book(options, several=len(asked) > 1)
     try:
-        for given in _answers(paths or [None], options):
-            answers.append(given)
-            if given.exit_code and options.fail_fast:
-                break
+        with closing(_answers(asked, options, book)) as found:
+            for given in found:
+                answers.append(given)
+                if given.exit_code and options.fail_fast:
+                    break
     except KeyboardInterrupt:
         terminal.say("interrupted; what was finished is whole")
         answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
     terminal.show(_summary(answers), as_json=options.json)
     if options.junit is not None:
         write_file(options.junit, _junit(answers).encode())
-    return max(given.exit_code for given in answers)
+    book.close()
+    return max(book.exit_code, *(given.exit_code for given in answers))
 
 
 @one_thread()
@@ -82,41 +96,116 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 told = write_sketch(directory, study, extras("check", options))
                 terminal.say(f"{label}: {told}", quiet=options.quiet)
         except Exception as error:
-            code, message = explain(error)
+            code, message = explained(error)
             terminal.say(message)
             worst = max(worst, code)
     return worst
 
 
-def _answers(paths: Sequence[Path | None], options: Options) -> Iterator[Outcome]:
-    """Answers of all studies in order; every study is read before the first is computed."""
+def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Generator[Outcome, None, None]:
+    """Answers of all studies in order, without their results; every study is read before the first is computed.
+
+    However the answers to a study end, its page is written.
+    """
     studies: list[Study] = []
     for path in paths:
         try:
             studies.append(load_study(path, options))
         except Exception as error:
-            yield _failure(path.stem if path else "study", "check", Path(), error)
+            yield book.missing(_failure(path.stem if path else "study", "check", Path(), error))
     owners: dict[str, Path | None] = {}
     for study in studies:
         label = study.label
         try:
             claim(owners, study)
         except StudyError as error:
-            yield _failure(label, "check", Path(), error)
+            yield book.missing(_failure(label, "check", Path(), error))
             continue
         root = folder(study, "", options, several=len(paths) > 1)
-        for command in questions(study):
-            try:
-                given = answer(study, command, root / command, options)
-            except Exception as error:
-                yield _failure(label, command, root / command, error)
-            else:
-                tell(given, options)
+        told: list[Outcome] = []
+        try:
+            for command in questions(study):
+                try:
+                    given = replace(answer(study, command, root / command, options), result=None)
+                    tell(given, options)
+                except KeyboardInterrupt as error:
+                    told.append(interrupted(study, command, root / command, error))
+                    raise
+                except Exception as error:
+                    given = _failure(label, command, root / command, error)
+                told.append(given)
                 yield given
+        finally:
+            book.add(study, root, told)
+
+
+class Book:
+    """The reports of a run, where they are wanted: a page a study, and an index of several."""
+
+    def __init__(self, options: Options, *, several: bool) -> None:
+        self.options = options
+        self.several = several
+        self.exit_code = 0
+        self._entries: list[Entry] = []
+        self._folder = Path()
+
+    def add(self, study: Study, root: Path, told: Sequence[Outcome]) -> None:
+        """Write the page of a study with what was told of its questions; without the option an older one goes."""
+        try:
+            if not self.options.report:
+                pages.remove(root / pages.REPORT)
+                return
+            left = [command for command in questions(study) if command not in {given.command for given in told}]
+            write_report(root, study, told, self.options, left)
+            self._folder = root.parent
+            if self.several:
+                self._entries.append(self._entry(study, told))
+        except Exception as error:
+            self._fail(f"{study.label}: report: {explained(error)[1]}", error)
+
+    def missing(self, given: Outcome) -> Outcome:
+        """Note a study that could not be read in the index; gives it back."""
+        if self.options.report and self.several:
+            from mechdesign.report.page.page import Entry
+
+            self._entries.append(Entry(given.study, given.study, [], failed=given.failed))
+        return given
+
+    def close(self) -> None:
+        """Write the index of the studies, where there are pages of several."""
+        if not any(entry.link for entry in self._entries):
+            return
+        from mechdesign.report.page.page import index
+
+        path = self._folder / pages.INDEX
+        try:
+            write_file(path, index(self._entries))
+            terminal.say(f"index of the reports in {path}", quiet=self.options.quiet)
+        except Exception as error:
+            self._fail(explained(error)[1], error)
+
+    def _entry(self, study: Study, told: Sequence[Outcome]) -> Entry:
+        from mechdesign.report.page.page import Entry, thumbnail
+
+        verdicts = [verdict for given in told for verdict in given.verdicts]
+        return Entry(
+            study.name,
+            study.label,
+            [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
+            met=sum(verdict.met for verdict in verdicts),
+            required=len(study.requirements),
+            warnings=len({warning for given in told for warning in given.warnings}),
+            drawing="" if self.options.no_plots else thumbnail(study),
+            link=f"{study.label}/{pages.REPORT}",
+        )
+
+    def _fail(self, message: str, error: Exception) -> None:
+        terminal.say(message)
+        self.exit_code = max(self.exit_code, explained(error)[0])
 
 
 def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
-    code, message = explain(error)
+    code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     return Outcome(label, command, directory, code, 0, failed=message)
 
@@ -128,7 +217,7 @@ def _summary(answers: Sequence[Outcome]) -> Table:
     found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
         "study": (str, lambda given: given.study),
         "command": (str, lambda given: given.command),
-        "outcome": (str, lambda given: _OUTCOMES[given.exit_code] + " (kept)" * given.kept),
+        "outcome": (str, lambda given: OUTCOMES[given.exit_code] + " (kept)" * given.kept),
         "exit_code": (int, lambda given: given.exit_code),
         "requirements": (str, met),
         "rows": (int, lambda given: given.rows),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -20,12 +22,21 @@ from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
+from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.report.tables import from_csv
 from mechdesign.results import Result, Table
 from mechdesign.study import Study, load, template_path
 
 STANDARD_INPUT = Path("-")
+OUTCOMES = {
+    0: "done",
+    1: "requirement not met",
+    2: "wrong study",
+    3: "cannot be assembled",
+    4: "failed",
+    Interrupted.exit_code: "interrupted",
+}
 
 
 @dataclass(frozen=True)
@@ -42,6 +53,7 @@ class Outcome:
     verdicts: Sequence[Verdict] = ()
     seconds: float = 0.0
     kept: bool = False
+    written: bool = False  # whether the directory holds what was found
     result: Result | None = None
 
 
@@ -129,7 +141,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        result=result,
+        written=True, result=result,
     )  # fmt: skip
 
 
@@ -146,7 +158,8 @@ def _earlier(before: Study, command: str, options: Options) -> Result:
 def extras(command: str, options: Options) -> Extras:
     """What else than tables the options want of a command."""
     animate = options.animate and command == "kinematics"
-    return Extras(not options.no_plots, options.kinds, options.style or STYLES[0], animate, options.all_modes)
+    look = options.style or STYLES[0]
+    return Extras(not options.no_plots, options.kinds, animate, options.all_modes, options.report, look)
 
 
 def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
@@ -154,8 +167,9 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     content = manifest.is_current(directory, study, command, asked)
     if content is None:
         return None
+    numbers = {"worst": math.nan, "margin": math.nan}
     verdicts = [
-        Verdict(**entry | {"worst": float("nan") if entry["worst"] is None else entry["worst"]})
+        Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
         for entry in content["requirements"]
     ]
     if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
@@ -163,8 +177,9 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     rows = next(iter(content["tables"].values()))["rows"]
     code = _exit_code(content["failed"], verdicts)
     return Outcome(
-        study.label, command, directory, code, rows, content["warnings"], content["failed"], verdicts, kept=True
-    )
+        study.label, command, directory, code, rows, content["warnings"], content["failed"], verdicts, kept=True,
+        written=True,
+    )  # fmt: skip
 
 
 def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
@@ -217,12 +232,51 @@ def tell(given: Outcome, options: Options) -> None:
     terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 
 
+def write_report(
+    directory: Path, study: Study, answers: Sequence[Outcome], options: Options, left: Sequence[str] = ()
+) -> None:
+    """Write a study's page from what its questions left in their folders; `left` are questions that were not asked.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    from mechdesign.report.page import page, section
+
+    told = []
+    for given in answers:
+        path = given.directory / section.NAME
+        part = json.loads(path.read_text(encoding="utf-8")) if given.written and path.exists() else None
+        outcome = OUTCOMES[given.exit_code]
+        told.append(page.Answered(given.command, outcome, given.exit_code, given.failed, given.verdicts, part))
+    told += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
+    below = any(given.directory != directory for given in answers)
+    path = directory / pages.REPORT
+    writer.write_file(path, page.report(study, told, below=below))
+    terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
+
+
+def interrupted(study: Study, command: str, directory: Path, error: KeyboardInterrupt) -> Outcome:
+    """The outcome of a question that was interrupted; what was finished of it may be a result."""
+    code = Interrupted.exit_code
+    words = str(error) or "interrupted"
+    return Outcome(study.label, command, directory, code, 0, failed=words, written=isinstance(error, Interrupted))
+
+
 @one_thread()
 def ask(command: str, path: Path | None, options: Options) -> int:
     """One command from end to end; returns its exit code."""
     study = load_study(path, options)
     directory = folder(study, command, options)
-    given = answer(study, command, directory, options)
+    try:
+        given = answer(study, command, directory, options)
+    except Interrupted as error:
+        if options.report:
+            write_report(directory, study, [interrupted(study, command, directory, error)], options)
+        raise
+    if options.report:
+        write_report(directory, study, [given], options)
     table = given.result.main if given.result is not None else _main_table(directory)
     terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))
     tell(given, options)

@@ -10,12 +10,11 @@ from typing import Annotated, Any
 import typer
 
 from mechdesign.errors import StudyError
+from mechdesign.files import formats_of
 
 # Template of the study that is taken where there is none.
 BUILT_IN = "two_link_arm"
-# Of pictures.
-FORMATS = ("png", "svg", "pdf")
-# Widths of their pages and sizes of their type.
+# Widths of the pages of pictures and sizes of their type.
 STYLES = ("screen", "paper")
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
@@ -76,6 +75,10 @@ STYLE = _text(
     "Of the pictures: screen, or paper for a journal's column, 88 mm wide with type of 8 pt. Default: screen.",
 )
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
+REPORT = _flag("report", "--report", "Also write report.html: one page with all of it, which moves.")
+REPORTS = _flag(
+    "report", "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
+)
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
 BEFORE = _text(
     "before",
@@ -118,6 +121,7 @@ class Options:
     no_plots: bool = False
     formats: str | None = None
     style: str | None = None
+    report: bool = False
     animate: bool = False
     all_modes: bool = False
     before: Path | None = None
@@ -133,11 +137,9 @@ class Options:
                 raise StudyError(f"{option} and --no-plots contradict each other")
         if self.style is not None and self.style not in STYLES:
             raise StudyError(f"--style takes {' or '.join(STYLES)}, not {self.style!r}")
-        for kind in self.kinds.split(","):
-            if kind not in FORMATS:
-                raise StudyError(f"--format takes {', '.join(FORMATS)} or several with commas between, not {kind!r}")
+        formats_of(self.formats, "--format")
 
     @property
     def kinds(self) -> str:
         """Formats of the pictures, with commas between them."""
-        return ",".join(dict.fromkeys((self.formats or FORMATS[0]).replace(" ", "").lower().split(",")))
+        return formats_of(self.formats, "--format")

@@ -6,12 +6,12 @@ From the sketch every pose would be a long way, and places out of reach would be
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value, nearest, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import MAX_CHANGE, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
@@ -30,6 +30,8 @@ LIMIT_GAP = 15
 DIFFERENCE_STEP = 1e-6
 # Steps in which dimensions are changed.
 STAGES = 8
+# Steps in which held coordinates are brought from their values in the sketch to others.
+HELD_STAGES = 16
 # Of the nominal poses, those at every so many-th place of the lattice are brought to other dimensions.
 SEED_EVERY = 3
 # Poses of all designs that are kept for later calls.
@@ -79,17 +81,34 @@ class Atlas:
     def of(plan: Plan, held: tuple[float, ...]) -> Atlas:
         """Poses of the nominal mechanism, grown from the sketch's place until nothing more is reached.
 
-        There are none where the mechanism cannot be brought from its sketch to the held values.
+        Where the held values cannot be had there, all poses with those of the sketch are brought to them step by step.
+        There are none where that does not lead to them either.
         """
-        sketch = plan.core.sketch_configuration
-        origin = complex(*(float(sketch.value(c)) for c in plan.structure.given[:2]))
-        given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, held)]
-        first = plan.solve(given, limits=False)
-        start = plan.start(first)
-        atlas = Atlas(plan, held, np.array(start.signs).reshape(-1, 1), origin)
-        seeds = np.flatnonzero(first.valid)
-        table = table_of(start.unknowns, (1,))[:, seeds]
-        (atlas.known[b""],) = atlas._grown({}, seeds, np.zeros(len(seeds), complex), table)
+        sketch, coordinates = plan.core.sketch_configuration, plan.structure.given
+        origin = complex(*(float(sketch.value(c)) for c in coordinates[:2]))
+
+        def begun(values: Sequence[float]) -> tuple[Atlas, Floats]:
+            given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, values)]
+            first = plan.solve(given, limits=False)
+            start = plan.start(first)
+            found = Atlas(plan, tuple(values), np.array(start.signs).reshape(-1, 1), origin)
+            return found, table_of(start.unknowns, (1,))[:, np.flatnonzero(first.valid)]
+
+        atlas, table = begun(held)
+        lattice = np.zeros(table.shape[1], dtype=complex)
+        if not lattice.size:
+            drawn = [float(sketch.value(c)) for c in coordinates[2:]]
+            goal = [nearest(v, at) if c.quantity == "angle" else v for c, v, at in
+                    zip(coordinates[2:], held, drawn, strict=True)]  # fmt: skip
+            between, table = begun(drawn)
+            lattice = np.zeros(table.shape[1], dtype=complex)
+            for share in np.linspace(0, 1, HELD_STAGES + 1).tolist():
+                values = tuple(at + share * (v - at) for at, v in zip(drawn, goal, strict=True))
+                between = replace(between, held=values)
+                (poses,) = between._grown({}, np.zeros(len(lattice), dtype=np.intp), lattice, table)
+                lattice, table = poses.lattice, poses.table
+            atlas = replace(between, held=held)
+        (atlas.known[b""],) = atlas._grown({}, np.zeros(len(lattice), dtype=np.intp), lattice, table)
         return atlas
 
     @property

@@ -99,8 +99,9 @@ def follow(
         return table_of(state.unknowns, lanes.shape), state
 
     def change(new: Floats, old: Floats) -> Floats:
-        """How far the unknowns moved, angles the short way round."""
-        return np.where(angles, wrap(new - old), new - old)
+        """How far the unknowns moved, angles the short way round; nan where a step has no end."""
+        with np.errstate(invalid="ignore"):
+            return np.where(angles, wrap(new - old), new - old)
 
     def planned(slope: Floats, table: Floats) -> Floats:
         """Step over which the unknowns change as much as is planned."""

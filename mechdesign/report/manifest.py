@@ -17,18 +17,19 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 
 NAME = "manifest.json"
-_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "pydantic", "pint", "pyyaml", "pymoo")
+_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "pymoo")
 
 
 @dataclass(frozen=True)
 class Extras:
-    """What else than tables is wanted of a command: pictures, the animation, every assembly mode."""
+    """What else than tables is wanted of a command: pictures, the animation, every assembly mode, an HTML report."""
 
     plots: bool = True
     formats: str = "png"  # of the pictures, with commas between them
-    style: str = "screen"  # of the pictures
     animate: bool = False
     all_modes: bool = False
+    report: bool = False
+    style: str = "screen"  # of the pictures
     before: Mapping[str, Any] | None = None  # the study before a change, which pictures show as well
 
 
@@ -105,7 +106,7 @@ def is_current(directory: Path, study: Study, command: str, asked: Extras) -> di
     if content is None:
         return None
     expected = computed_from(study, command) | asdict(asked)
-    without = [name for name in ("plots", "animate") if not expected[name]]
+    without = [name for name in ("plots", "animate", "report") if not expected[name]]
     for name in (*without, *(("formats", "style") if not asked.plots else ())):
         expected[name] = content.get(name)
     files = recorded_files(content)

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.results import Result, Table
-from mechdesign.rows import UnknownColumnError, choose
+from mechdesign.rows import IN_UNIT, UnknownColumnError, choose
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 
@@ -23,6 +23,8 @@ class Verdict:
     met: bool  # whether the worst row meets it
     worst: float  # the value of the worst row; nan where a row has none or no row was found
     place: str = ""  # the pose or row where it is worst
+    margin: float = float("nan")  # of the worst row to the limit, negative beyond it
+    unit: str = ""  # of `worst` and `margin`
 
     def __str__(self) -> str:
         place = f" at {self.place}" if self.place else ""
@@ -90,6 +92,18 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     StudyError
         If a requirement names a column that the result has not, or one of words, or a row that its table never has.
         Every such mistake in one go, with its place.
+
+    Examples
+    --------
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
+    ... kinematics: {poses: [{arm: 0}, {arm: 30}]}
+    ... requirements: [{result: kinematics.P.x, at_least: 90}]
+    ... ''')
+    >>> for verdict in mechdesign.requirements(study, mechdesign.kinematics(study)):
+    ...     print(verdict)
+    kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30
     """
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
@@ -126,12 +140,25 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
     if undefined.size:
         worst, met = undefined[0], False
     else:
-        low, high = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
-        low_met = requirement.at_least is None or values[low] >= requirement.at_least
-        high_met = requirement.at_most is None or values[high] <= requirement.at_most
-        met = bool(low_met and high_met)
-        worst = high if requirement.at_least is None or not high_met else low
-    return Verdict(words, met, float(values[worst]), _place(table, int(worst), name, freedom))
+        ends = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
+        worst = min(ends, key=lambda row: margin_of(requirement, float(values[row])))
+        met = margin_of(requirement, float(values[worst])) >= 0
+    return Verdict(
+        words, met, float(values[worst]), place_of(table, int(worst), name, freedom),
+        margin_of(requirement, float(values[worst])), unit_of(table, name, int(worst)),
+    )  # fmt: skip
+
+
+def margin_of(requirement: Requirement, value: float) -> float:
+    """How far a value is from the nearer limit, negative beyond it."""
+    room = [value - requirement.at_least] if requirement.at_least is not None else []
+    return min([*room, *([requirement.at_most - value] if requirement.at_most is not None else [])])
+
+
+def unit_of(table: Table, name: str, row: int) -> str:
+    """Unit of a column in a row: the row's own, where the column's meaning says so."""
+    column = table.column(name)
+    return str(table["unit"][row]) if IN_UNIT in column.meaning and "unit" in table else column.unit
 
 
 def _words(requirement: Requirement) -> str:
@@ -142,8 +169,10 @@ def _words(requirement: Requirement) -> str:
     return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
 
 
-def _place(table: Table, row: int, judged: str, freedom: int) -> str:
-    """The row in words: its leading columns, which are the pose and words such as the method."""
+def place_of(table: Table, row: int, judged: str, freedom: int) -> str:
+    """The row in words: its leading columns, which are the pose and words such as the method; an only row has none."""
+    if len(table) == 1:
+        return ""
     parts: list[str] = []
     for column in table.columns:
         if column.numeric:

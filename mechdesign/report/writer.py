@@ -14,6 +14,7 @@ from mechdesign.errors import OutputError, explain
 from mechdesign.files import replace
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
+from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import Result
@@ -22,10 +23,14 @@ from mechdesign.study import Study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mechdesign.report.figures.rendering import Gallery
+
 MECHANISM = "mechanism"
 DIMENSIONS = "dimensions"  # of `check`
 ANIMATION = "motion.gif"
 FIGURES = "mechdesign.report.figures"
+# Ends the names under which pictures stand as HTML.
+INLINE = ".html"
 
 
 def check_writable(directory: Path) -> None:
@@ -64,16 +69,27 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
     }
     files |= {name: (text.encode(),) for name, text in result.files.items()}
     stale = manifest.recorded_files(manifest.read(directory) or {}).keys() - files.keys()
+    pages.remove(directory / pages.REPORT)
     warnings: tuple[str, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)
         digests = {name: replace(directory / name, blocks) for name, blocks in files.items()}
         for name in stale:
             (directory / name).unlink(missing_ok=True)
-        tables = dataclasses.replace(asked, plots=False, animate=False)
+        tables = dataclasses.replace(asked, plots=False, animate=False, report=False)
         replace(directory / manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
-        if asked.plots and not result.interrupted:
+        drawn: dict[str, bytes] = {}
+        plots = asked.plots and not result.interrupted
+        if plots:
             drawn, warnings = pictures(study, result, asked)
+        if asked.report:
+            from mechdesign.report.page import section
+
+            inline = {name: drawn.pop(f"{name}{INLINE}").decode() for name in _inline(drawn)}
+            mechanism = inline.pop(MECHANISM, "")
+            part, warnings = section.section(study, result, inline, mechanism, warnings, plots=asked.plots)
+            drawn[section.NAME] = section.encoded(part)
+        if drawn or plots:
             digests |= {name: replace(directory / name, [data]) for name, data in drawn.items()}
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
             replace(directory / manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
@@ -105,11 +121,11 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
     OutputError
         If it cannot be written.
     """
+    check_writable(directory)
     from mechdesign.report.figures import style
     from mechdesign.report.figures.dimensions import dimensions_figure
     from mechdesign.report.figures.mechanism import sketch_figure
 
-    check_writable(directory)
     kinds, told = asked.formats.split(","), []
     drawings = ((MECHANISM, "the sketch as understood is", sketch_figure),
                 (DIMENSIONS, "its dimensions are", dimensions_figure))  # fmt: skip
@@ -128,21 +144,47 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
     return "; ".join(told)
 
 
+def sketch(study: Study) -> bytes:
+    """The sketch as it is assembled, as a PNG."""
+    from mechdesign.report.figures import style
+    from mechdesign.report.figures.mechanism import sketch_figure
+
+    with style.context():
+        return style.encoded(sketch_figure(study), "png")
+
+
+def figures(study: Study, result: Result) -> Gallery:
+    """Figures of a result's command by their names, and why others could not be made; use inside `style.context`."""
+    from mechdesign.report.figures.rendering import Gallery
+
+    found = Gallery()
+    # What all pictures of a command share may fail too.
+    found.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
+    return found
+
+
 def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings."""
+    """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
+
+    For a report there is of each also the HTML by which it stands in a page, under its name and `INLINE`.
+    """
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
-    from mechdesign.report.figures.rendering import Drawing, Gallery, render
+    from mechdesign.report.figures.rendering import Drawing, render
+    from mechdesign.report.page import vector
 
     formats = asked.formats.split(",")
     with style.context(asked.style):
-        gallery = Gallery()
-        # What all pictures of a command share may fail too.
-        gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
+        gallery = figures(study, result)
 
         def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
             figure = make()
-            return {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
+            drawn = {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
+            if asked.report:
+                alt = f"{name.replace('_', ' ')}: {vector.described(figure)}"
+                html = vector.picture(figure, f"{result.command}-{name}", alt, drawn.get(f"{name}.png"))
+                drawn[f"{name}{INLINE}"] = html.encode()
+            return drawn
 
         drawings: dict[str, Drawing] = {
             f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
@@ -158,6 +200,10 @@ def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, byt
         del drawn[ANIMATION]
         warnings.append("no animation: it needs a sweep of one coordinate or a path")
     return drawn, tuple(warnings)
+
+
+def _inline(drawn: Iterable[str]) -> list[str]:
+    return [name.removesuffix(INLINE) for name in drawn if name.endswith(INLINE)]
 
 
 def _undrawn(name: str, why: str) -> str:

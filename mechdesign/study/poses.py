@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +33,21 @@ class PoseGroup:
         return [self.values[name] for name in self.names]
 
 
+class Sector(NamedTuple):
+    """Rays of one patch of a workspace, which turn on from one to the next, and the nodes of a finer map over it."""
+
+    rays: slice  # of the poses' grid
+    about: complex  # where the rays begin
+    nodes: Complexes  # of the finer map, shape (n, nodes), on rays that begin and end with the patch
+
+
+class Sectors(NamedTuple):
+    """The patches of a region of the workspace, and the curves of its boundary."""
+
+    patches: tuple[Sector, ...]
+    outline: tuple[Complexes, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Poses:
     """All poses of a question; of several designs, one design's after the other's."""
@@ -51,9 +67,8 @@ class Poses:
     # length, in the study's units; nan where the path has no direction.
     slopes: Mapping[str, Floats] = field(default_factory=dict)
     bends: Mapping[str, Floats] = field(default_factory=dict)
-    # Of a grid of rays: those of each patch of the workspace, which turn on from one to the next.
-    patches: tuple[slice, ...] = ()
-    outline: tuple[Complexes, ...] = ()  # curves of the workspace's boundary
+    # Of a grid of rays over a workspace: one a value of its held coordinates.
+    regions: tuple[Sectors, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -43,13 +43,13 @@ def test_a_turn_is_a_loop_of_bounded_size(folder, invoke):
     assert done.exit_code == 0
     data = (folder_of(folder) / "motion.gif").read_bytes()
     shown, info = frames(data)
-    assert len(shown) == 60
+    assert len(shown) == 36
     assert info["loop"] == 0
     assert info["duration"] * len(shown) == pytest.approx(3600)
-    assert {frame.shape[1] for frame in shown} == {640}
-    assert len(data) < 1_000_000
+    assert {frame.shape[1] for frame in shown} == {480}
+    assert len(data) < 300_000
     # No frame twice, and each on white paper.
-    assert len({frame.tobytes() for frame in shown}) == 60
+    assert len({frame.tobytes() for frame in shown}) == 36
     assert all((frame[2, -3] == 255).all() for frame in shown)
     manifest = json.loads((folder_of(folder) / "manifest.json").read_text())
     assert manifest["files"]["motion.gif"] == hashlib.sha256(data).hexdigest()
@@ -79,7 +79,7 @@ def test_poses_that_fail_have_no_frame(folder, invoke):
     shown, _ = frames((folder_of(folder, "rocker") / "motion.gif").read_bytes())
     # -180 and 180 deg are one pose; the frames between the ends come twice.
     assert 0 < valid < len(motion)
-    assert len(shown) == min(2 * (valid - 1) - 2, 60)
+    assert len(shown) == min(2 * (valid - 1) - 2, 36)
 
 
 @pytest.mark.parametrize("poses", ["poses: [{theta: 10}, {theta: 20}]", "sweep: {theta: 20}"])

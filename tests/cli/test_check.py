@@ -86,7 +86,9 @@ requirements: [{result: kinematics.B.q, at_least: 0}, {result: optimize.scores, 
     begin = SLIDER.count("\n")
     done = invoke("check", "slider.yaml", "--no-plots")
     assert done.exit_code == 2
-    told = [line.split(": ")[:2] for line in done.stderr.splitlines()]
+    *lines, words = done.stderr.splitlines()
+    assert words == "(mechdesign docs optimize.maximize optimize.minimize optimize.subject_to)"
+    told = [line.split(": ")[:2] for line in lines]
     assert told == [
         [f"slider.yaml:{begin + 6}:7", "optimize.maximize.1"],
         [f"slider.yaml:{begin + 3}:14", "optimize.minimize.0"],

@@ -24,7 +24,7 @@ def test_every_command_and_parameter_has_help(name, invoke):
 
 
 def test_the_commands_are_those_of_the_study_format():
-    assert set(GROUP.commands) == {*COMMANDS, "run", "check", "new", "schema"}
+    assert set(GROUP.commands) == {*COMMANDS, "run", "check", "new", "docs", "schema"}
 
 
 @pytest.mark.parametrize("name", [*COMMANDS, "run"])
@@ -41,7 +41,7 @@ def test_options_of_check():
     assert known >= {"--out", "--set", "--quiet", "--no-plots"}
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["reliability", "--help"], ["--version"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["reliability", "--help"], ["docs", "--help"], ["--version"]])
 def test_help_imports_nothing_heavy(arguments):
     code = (
         "import sys\nfrom mechdesign.cli.app import main\n"

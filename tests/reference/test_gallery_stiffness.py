@@ -44,3 +44,16 @@ def test_knuckle_press_by_castigliano() -> None:
         assert stiffness == pytest.approx(1 / energy, rel=1e-9)
     assert table["k_y"].max() / table["k_y"].min() > 5.5
     assert abs(table["theta"][np.argmax(table["k_y"])] - 264) < 5
+
+
+def test_stiffness_map_by_the_lines_of_force() -> None:
+    """K = k J' J of three cylinders, rows of J the unit vectors along them and their moments about P."""
+    table = mechdesign.workspace(study_named("stiffness_map", "workspace.at={platform.angle: 30}")).tables["local"]
+    place = (table["x"] + 1j * table["y"])[::97]
+    base = np.array([-300, 300, 520j])
+    pins = np.array([-100 - 58j, 100 - 58j, 115j]) * np.exp(1j * np.radians(30))
+    along = place[:, None] + pins - base
+    along /= np.abs(along)
+    rows = np.stack([along.real, along.imag, (np.conj(pins) * along).imag], axis=2)
+    soft = np.linalg.inv(2e4 * np.einsum("nki,nkj->nij", rows, rows))
+    assert table["k_min"][::97] == pytest.approx(1 / np.linalg.eigvalsh(soft[:, :2, :2])[:, -1], rel=1e-6)

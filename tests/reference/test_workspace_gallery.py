@@ -20,6 +20,10 @@ def test_scara_covers_its_joints_ranges_but_for_the_post() -> None:
     best = np.argmax(local["manipulability"])
     assert local["manipulability"].max() == pytest.approx(250 * 200, rel=1e-3)
     assert np.hypot(local["x"][best], local["y"][best]) == pytest.approx(np.hypot(250, 200), abs=15)
+    # The boundary closes round the post, where rays only touch it, too.
+    edge = tables["boundary"]["x"] + 1j * tables["boundary"]["y"] - (290 + 60j)
+    around = np.sort(np.angle(edge[np.abs(np.abs(edge) - 50) < 1e-6]))
+    assert np.diff(around, append=around[0] + 2 * np.pi).max() < np.radians(10)
 
 
 def test_rrr_platform_at_several_orientations_reaches_three_annuli() -> None:

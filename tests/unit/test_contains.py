@@ -92,6 +92,15 @@ def test_scale_about_a_given_centre(shape: Shape, wanted: float) -> None:
     assert scales(ARM, shape) == pytest.approx([wanted], rel=1e-9)
 
 
+@pytest.mark.parametrize("apart", [0.3, 1.1, 2.57, 6.0])
+def test_a_side_that_just_touches_a_small_hole(apart: float) -> None:
+    """Between two rays the side was 1e-4 of its distance beyond the hole, and places looked at fell beside it."""
+    places = {"upper.length": np.array([74.0]), "fore.length": np.array([74 + apart])}
+    shape = Shape(135.4, 189.04, False, -10.77 + 54.86j)
+    (found,) = scales(ARM, shape, "workspace.scan={about: [88.6, 2.27]}", places=places)
+    assert found == pytest.approx((54.86 - apart) / 94.52, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("to", "centre", "wanted"),
     [(180, 100 + 20j, 2 / 3), (180, -100j, -1.0), (270, 100 + 20j, 2 / 3), (270, 100 - 20j, -2 / 3), (270, 100j, 2.0)],

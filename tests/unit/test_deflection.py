@@ -290,3 +290,34 @@ def test_sobol_indices_know_the_load() -> None:
     table = result.tables["contributions"]
     assert table["sobol_first"] == pytest.approx(table["share"], abs=1e-6)
     assert table["sobol_total"] == pytest.approx(table["share"], abs=1e-6)
+
+
+def test_designs_that_differ_in_what_the_stiffness_section_says() -> None:
+    """Found at once, all of them had the deflections of the study's own beam and load."""
+    text = """
+units: {length: m}
+mechanism:
+  parameters: {height: 0.04, pull: 100}
+  links: {ground: {O: [0, 0]}, upper: [O, E, 0.5], lower: [E, P, 0.4]}
+  drives: {shoulder: {angle: upper}, elbow: {angle: lower}}
+  sketch: {E: [0.4, 0.3], P: [0.6, 0.65]}
+stiffness:
+  {link: lower, at: P, sections: {beam: {E: 200e9, width: 0.02, height: height}}, elastic: {upper: beam, lower: beam},
+   actuators: {shoulder: 1e5, elbow: 1e5}, loads: [[pull, -50, 0]]}
+reliability:
+  dimensions: {upper.length: 1e-5, load.fx: {sigma: 20}}
+  poses: [{shoulder: 30, elbow: 50}]
+  outputs: [P]
+  limits: {P.y: 1e-3}
+  methods: analytic
+"""
+    varied = "height: {from: 0.03, to: 0.05, number: 2}, pull: {from: 80, to: 200, number: 2}"
+    section = (
+        f"optimize={{variables: {{{varied}}}, minimize: reliability.moments.sigma, maximize: reliability.reliability}}"
+    )
+    for row in mechdesign.optimize(study_of(text, section)).tables["designs"]:
+        alone = ask(text, *(f"mechanism.parameters.{name}={float(row[name])!r}" for name in ("height", "pull")))
+        assert row["reliability.moments.sigma"] == pytest.approx(alone.tables["moments"]["sigma"].max(), rel=1e-9)
+        assert row["reliability.reliability"] == pytest.approx(
+            alone.tables["reliability"]["reliability"].min(), rel=1e-9
+        )

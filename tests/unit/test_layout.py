@@ -24,6 +24,8 @@ ORDER = (
     ("mechdesign.analyses.workspace",),
     ("mechdesign.analyses.optimize",),
     ("mechdesign.report",),
+    ("mechdesign.door",),
+    ("mechdesign.reference",),
     ("mechdesign.cli",),
     ("mechdesign.__init__", "mechdesign.__main__"),
 )

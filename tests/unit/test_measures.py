@@ -8,9 +8,11 @@ from helpers.studies import study_of
 
 from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.analyses.optimize.analysis import optimize
+from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.reliability.analysis import reliability
 from mechdesign.analyses.stiffness.analysis import stiffness
 from mechdesign.analyses.workspace.analysis import workspace
+from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import StudyError
 from mechdesign.report.requirements import requirements
 
@@ -133,6 +135,22 @@ workspace: {point: P, at: {reach: 12}, characteristic_length: 5, scan: {rays: 40
     indices = workspace(study).tables["indices"]
     # The wrist F on a circle of 12, P 3 from it.
     assert indices["area"] == pytest.approx(np.pi * (15**2 - 9**2), rel=1e-4)
+
+
+def test_an_expression_is_held_at_a_value_far_from_the_sketchs() -> None:
+    """At the point's place in the sketch the held value cannot be had at all."""
+    study = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, a: [O, E, 10], b: [E, F, 8], c: [F, P, 3]}
+  drives: [a, b, c]
+  sketch: {E: [8, 5], F: [13, 11], P: [16, 11]}
+  measures: {reach: "hypot(F.x, F.y)"}
+workspace: {point: P, at: {reach: 12}, characteristic_length: 5, scan: {about: [0, 0], from: 20, to: 50}}
+""")
+    (question,) = questions(study, 1e-4, ("area",))
+    # The wrist F on a circle of 12, P 3 from it.
+    area = answer(question, {}, 1, BATCH).values["area"]
+    assert area == pytest.approx(np.pi * (15**2 - 9**2) * 30 / 360, rel=1e-4)
 
 
 PARAMETRIC = """

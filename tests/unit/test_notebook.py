@@ -1,13 +1,28 @@
-"""The Python door as a notebook uses it: studies that are no file, tables that convert, short representations."""
+"""The Python door as a notebook uses it: studies that are no file, tables that convert, what a cell shows."""
 
 from __future__ import annotations
 
+import dataclasses
+import doctest
+import json
+import pickle
 import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
 
+import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from typer.testing import CliRunner
 
 import mechdesign
+from mechdesign.cli.app import app
+from mechdesign.door.shown import Answer, ShownStudy
+from mechdesign.errors import Interrupted
+from mechdesign.study import load as load_plain
 from mechdesign.study import template, template_path
 
 DATA = {
@@ -24,6 +39,35 @@ DATA = {
     },
     "kinematics": {"sweep": {"crank": {"from": 0, "to": 360, "step": 90}}},
 }
+ARM = {"mechanism": {"links": {"ground": {"O": [0, 0]}, "arm": ["O", "P", 100]}, "drives": ["arm"]}}
+README = Path(__file__).parents[2] / "README.md"
+PNG = b"\x89PNG\r\n\x1a\n"
+HOSTILE = "<img src=x onerror=alert(1)> & <script>"
+
+
+class Page(HTMLParser):
+    """The elements of a page that is well-formed, with their attributes, and its text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.text, self._open = "", []
+        self.feed(text)
+        assert not self._open
+
+    def handle_starttag(self, tag, attrs):
+        self.found.append((tag, dict(attrs)))
+        if tag not in ("img", "br"):
+            self._open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.found if name == tag]
 
 
 def test_a_study_as_a_mapping_a_text_and_a_file_is_the_same() -> None:
@@ -81,3 +125,187 @@ def test_an_optimum_of_a_mapping_is_written_as_a_study() -> None:
     files = mechdesign.optimize(mechdesign.load(DATA, changes)).files
     assert all(mechdesign.load(text=text).parameters.nominal["a"] in (20, 30) for text in files.values())
     assert files
+
+
+def test_a_study_shows_its_mechanism_and_its_words_stay_text() -> None:
+    mechanism = DATA["mechanism"] | {"parameters": {"a": 30, "unused": 1}}
+    data = DATA | {"name": HOSTILE, "mechanism": mechanism}
+    study = mechdesign.load(data, {"mechanism.parameters.a": 31})
+    html = study._repr_html_()
+    page = Page(html)
+    assert len(html.encode()) < 150_000
+    (image,) = page.all("img")
+    assert str(image["src"]).startswith("data:image/png;base64,")
+    assert HOSTILE in str(image["alt"])
+    for words in (
+        HOSTILE,
+        "crank (O, A; 31 mm)",
+        "revolute B (rod, rocker)",
+        "crank (angle of crank)",
+        "parameters.a=31",
+    ):
+        assert words in page.text
+    assert "mechanism.parameters.unused: " in page.text
+    assert study._repr_png_().startswith(PNG)
+
+
+def test_a_result_shows_what_is_met_and_how_its_main_table_begins() -> None:
+    asked = [{"result": "kinematics.B.x", "at_least": limit} for limit in (0, 70)]
+    study = mechdesign.load(DATA | {"name": HOSTILE, "requirements": asked})
+    result = mechdesign.kinematics(study)
+    html = result._repr_html_()
+    page = Page(html)
+    assert len(html.encode()) < 150_000
+    assert {"script", "style", "link"}.isdisjoint(tag for tag, _ in page.found)
+    assert len(page.all("img")) == 1
+    assert [verdict.met for verdict in result.verdicts] == [True, False]
+    assert "range of B.x: 54 mm (from 50 to 104)" in page.text
+    begins = ("[mm]", "2 more columns", "extremes, 7 rows", "pictures: motion, paths")
+    for words in (HOSTILE, "How does it move?", "1 of 2 met", "✗ not met", *begins):
+        assert words in page.text
+    assert next(head["title"] for head in page.all("th") if "title" in head) == result.main.columns[0].meaning
+    assert "e-1" not in page.text  # what is zero but for rounding
+    assert "1 of 2 requirements met" in repr(result)
+
+
+def test_of_many_requirements_those_that_are_not_met_are_shown() -> None:
+    asked = [{"result": "kinematics.B.x", "at_least": limit} for limit in [*range(60), 99]]
+    page = Page(mechdesign.kinematics(mechdesign.load(DATA | {"requirements": asked}))._repr_html_())
+    assert "at least 99" in page.text
+    assert "21 more requirements" in page.text
+
+
+def test_a_picture_that_fails_is_told_and_costs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*given):
+        raise ValueError("no ink")
+
+    monkeypatch.setattr("mechdesign.report.figures.kinematics.curves_figure", fail)
+    result = mechdesign.kinematics(mechdesign.load(DATA))
+    with pytest.warns(UserWarning, match=r"picture motion could not be drawn: .*no ink"):
+        assert result.figures == ("paths", "mechanism")
+    with pytest.raises(mechdesign.MechdesignError, match="no ink"):
+        result.figure("motion")
+
+
+def test_rows_of_several_quantities_show_their_units() -> None:
+    vary = {"dimensions": {"arm.length": 0.3}, "poses": [{"arm": 0}], "methods": ["analytic"]}
+    page = Page(mechdesign.reliability(mechdesign.load(ARM | {"reliability": vary}))._repr_html_())
+    assert "nominalmeansigmaunit" in page.text
+    assert "P.xposition1001000.1mm" in page.text
+    assert "4 more columns (worst_case, worst_low, worst_high, valid)" in page.text
+
+
+def test_a_requirement_that_names_nothing_does_not_keep_a_result_from_being_shown() -> None:
+    study = mechdesign.load(DATA | {"requirements": [{"result": "kinematics.nothing", "at_least": 0}]})
+    result = mechdesign.kinematics(study)
+    assert "no column 'nothing'" in Page(result._repr_html_()).text
+    assert "no column 'nothing'" in repr(result)
+    with pytest.raises(mechdesign.StudyError, match="no column 'nothing'"):
+        result.save("nowhere")
+
+
+def test_one_picture_by_its_name_whatever_the_settings() -> None:
+    result = mechdesign.kinematics(mechdesign.load(DATA))
+    assert result.figures == ("motion", "paths", "mechanism")
+    usual = result.figure("paths")
+    with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "savefig.dpi": 20}):
+        mine = dict(matplotlib.rcParams)
+        figure = result.figure("paths")
+        shown = figure._repr_png_()
+        assert dict(matplotlib.rcParams) == mine
+    assert isinstance(figure, Figure)
+    assert figure is not usual
+    assert shown == usual._repr_png_()
+    assert shown.startswith(PNG)
+    assert result._repr_png_() == result.figure("motion")._repr_png_()
+    with pytest.raises(mechdesign.StudyError, match=r"'path'; did you mean 'paths'\?; there are motion, paths, mech"):
+        result.figure("path")
+
+
+def test_what_is_saved_is_what_the_command_writes(tmp_path: Path) -> None:
+    sweep = {"arm": {"from": 0, "to": 90, "number": 4}}
+    vary = {"dimensions": {"arm.length": 0.3}, "poses": [{"arm": 30}], "methods": ["monte_carlo"], "samples": 500}
+    file = tmp_path / "study.yaml"
+    file.write_text(json.dumps(ARM | {"kinematics": {"sweep": sweep}, "reliability": vary}))
+    study = mechdesign.load(file)
+    mechdesign.reliability(study, seed=5).save(tmp_path / "here" / "reliability", plots=False)
+    moved = mechdesign.kinematics(study, all_modes=True)
+    saved = moved.save(tmp_path / "here" / "kinematics", formats="svg", animate=True)
+    for command, options in (
+        ("reliability", ["--seed", "5", "--no-plots"]),
+        ("kinematics", ["--all-modes", "--animate", "--format", "SVG"]),
+    ):
+        asked = [command, str(file), "--quiet", "--out", str(tmp_path / "there" / command), *options]
+        assert CliRunner().invoke(app, asked).exit_code == 0
+    here, there = (
+        {path.relative_to(root): path.read_bytes() for path in root.rglob("*.*")}
+        for root in (tmp_path / "here", tmp_path / "there")
+    )
+    assert here == there
+    assert {"motion.csv", "motion.svg", "motion.gif", "manifest.json"} <= {path.name for path in saved.iterdir()}
+    for wrong in ({"formats": "jpg"}, {"plots": False, "formats": "svg"}, {"plots": False, "animate": True}):
+        with pytest.raises(mechdesign.StudyError, match=r"formats takes png|contradict"):
+            moved.save(tmp_path, **wrong)
+    with pytest.raises(mechdesign.StudyError, match="takes a result of kinematics, not of reliability"):
+        mechdesign.reliability(study).save(tmp_path, animate=True)
+
+
+def test_answers_know_their_study_and_its_seed() -> None:
+    study = mechdesign.load(ARM)
+    assert type(dataclasses.replace(study, seed=2)) is ShownStudy
+    result = mechdesign.kinematics(study, seed=7, all_modes=True)
+    assert (result.study.seed, result.study.resolved["seed"], study.seed, result.all_modes) == (7, 7, 0, True)
+    assert type(dataclasses.replace(result, warnings=("new",))) is Answer
+    assert type(mechdesign.kinematics(load_plain(ARM))) is Answer
+    assert pickle.loads(pickle.dumps(mechdesign.kinematics)) is mechdesign.kinematics
+
+
+def test_what_an_interrupted_question_found_is_an_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    study = mechdesign.load(DATA | {"requirements": [{"result": "kinematics.B.x", "at_least": 70}]})
+    part = dataclasses.replace(mechdesign.kinematics(study), interrupted="3 of 5 poses")
+
+    def interrupt(study, **options):
+        raise Interrupted(part)
+
+    monkeypatch.setattr("mechdesign.analyses.kinematics.analysis.kinematics", interrupt)
+    with pytest.raises(Interrupted) as caught:
+        mechdesign.kinematics(study, seed=3)
+    found = caught.value.result
+    assert isinstance(found, Answer)
+    assert (found.study.seed, found.verdicts) == (3, ())
+    assert "3 of 5 poses" in Page(found._repr_html_()).text
+    assert found.figures == ()
+    assert not list(found.save(tmp_path / "part").glob("*.png"))
+
+
+def test_a_table_is_a_data_frame_by_one_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = mechdesign.kinematics(mechdesign.load(DATA)).main
+    pandas = SimpleNamespace(DataFrame=lambda columns: SimpleNamespace(columns=columns, attrs={}))
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    frame = table.to_pandas()
+    assert list(frame.columns) == list(table.names)
+    assert frame.attrs["units"]["A.x"] == "mm"
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pip install pandas"):
+        table.to_pandas()
+
+
+@pytest.mark.parametrize("name", ["", *mechdesign.__all__])
+def test_the_example_of_every_public_name_holds(name: str) -> None:
+    told = getattr(mechdesign, name) if name else mechdesign
+    if name == "__version__":
+        return
+    (test,) = doctest.DocTestFinder(recurse=False).find(told, name or "mechdesign", module=False, globs={})
+    assert len(test.examples) > 1
+    assert not doctest.DocTestRunner().run(test).failed
+
+
+def test_the_readme_says_what_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = README.read_text(encoding="utf-8")
+    blocks = dict(re.findall(r"```(yaml|python)\n(.*?)```", text, re.DOTALL)[:2])
+    Path("study.yaml").write_text(blocks["yaml"])
+    names: dict[str, object] = {}
+    exec(blocks["python"].replace(".to_pandas()", ""), names)
+    assert isinstance(names["result"], Answer)
+    assert Path("results/study/kinematics/manifest.json").exists()

@@ -121,6 +121,26 @@ def test_the_front_is_drawn_with_its_knee() -> None:
     assert "less is better" in axes.get_xlabel()
 
 
+def test_ends_and_knee_of_a_front_stand_side_by_side_in_their_workspaces() -> None:
+    study = study_of(
+        ARM
+        + """optimize:
+  {variables: {a: {from: 30, to: 50}, b: {from: 20, to: 40}}, maximize: [GII], minimize: [area], method: pareto,
+   evaluations: 40}
+"""
+    )
+    with style.context():
+        found = figures(study, mechdesign.optimize(study))
+    panels = found["optimum"].axes
+    titles = [axes.get_title(loc="left").splitlines() for axes in panels]
+    assert [lines[0] for lines in titles][::2] == ["A: best GII", "B: best area"]
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in panels}) == 1
+    for axes, (_, a, b, *_) in zip(panels, titles, strict=True):
+        reach = sum(float(words.replace("\N{NO-BREAK SPACE}", "").partition("=")[2]) for words in (a, b))
+        outline = np.concatenate([line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 9])
+        assert np.hypot(outline[:, 0] - 5, outline[:, 1]).max() == pytest.approx(reach, abs=0.02)
+
+
 def test_scattered_designs_are_dots_over_their_lower_envelope() -> None:
     x, y = np.random.default_rng(0).random((2, 2000))
     cost = Goal("cost", "", "", smallest=True)

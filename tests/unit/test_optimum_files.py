@@ -151,3 +151,28 @@ optimize:
     assert not [warning for warning in result.warnings if "optimum.yaml" in warning]
     assert mechdesign.kinematics(alone).main["A.y"][0] == pytest.approx(result.main["kinematics.A.y"][0], rel=1e-9)
     assert np.isfinite(result.main["kinematics.A.y"][0])
+
+
+@pytest.mark.parametrize("height", [3.0, 5.0])
+def test_a_sketch_in_which_poses_of_the_workspace_would_assemble_otherwise_is_drawn_anew(tmp_path, height):
+    """The base moves until the sketched elbow lies on the line to the point, or beyond it; the drives show neither."""
+    path = tmp_path / "arm.yaml"
+    path.write_text(
+        f"""\
+mechanism:
+  parameters: {{h: 0}}
+  links: {{ground: {{O: [0, h]}}, upper: [O, A, 10], fore: [A, P, 6]}}
+  drives: {{q1: {{angle: upper}}, q2: {{angle: fore, from: upper}}}}
+  limits: [{{drive: q1, min: 0, max: 90}}, {{drive: q2, min: -100, max: -20}}]
+  sketch: {{A: [8, 3], P: [12, 3]}}
+workspace: {{point: P, indices: []}}
+optimize:
+  variables: {{h: {{from: {height}, to: {height}, number: 1}}}}
+  maximize: area
+"""
+    )
+    study = mechdesign.load(path)
+    result = written(study, tmp_path / "out")
+    alone = mechdesign.load(tmp_path / "out" / "optimum.yaml")
+    assert mechdesign.workspace(alone).main["area"] == pytest.approx(result.main["area"], rel=1e-5)
+    assert not any("sketch" in warning for warning in result.warnings)

@@ -256,6 +256,60 @@ def test_optimize_finds_thin_gaps_and_tips() -> None:
             assert together[name][k] == pytest.approx(there, rel=tolerance), (name, k)
 
 
+def design_area(text: str, limit: str, sizes: str) -> float:
+    """Area of a study's only design, in an optimisation from another one."""
+    varied = ", ".join(
+        f"{name}: {{from: {v}, to: {v}, number: 1}}" for name, v in (one.split("=") for one in sizes.split())
+    )
+    study = study_of(
+        text, f"mechanism.limits=[{{measure: m, {limit}}}]", f"optimize={{variables: {{{varied}}}, minimize: area}}"
+    )
+    return float(mechdesign.optimize(study).tables["designs"]["area"][0])
+
+
+def test_breaks_between_alike_rays_do_not_lose_a_piece() -> None:
+    """A bay that opens and ends between two rays: its neighbours were no part of any piece."""
+    text = """
+mechanism:
+  parameters: {l1: 10, l2: 12}
+  links: {ground: {O: [-4, 0], Q: [4, 0]}, one: [O, A, l1], fore_1: [A, P, l2], two: [Q, B, l1], fore_2: [B, P, l2]}
+  drives: {q1: {angle: one}, q2: {angle: two}}
+  sketch: {A: [-10, 8], B: [10, 8], P: [0, 14]}
+  measures: {m: B.x*A.x}
+workspace: {point: P, indices: []}
+"""
+    found = design_area(text, "min: -172.592", "l1=9.564339226156775 l2=9.969322744521554")
+    x = np.linspace(-21, 21, 1500)
+    z, half = x + 1j * x[:, None], 4.0
+    elbows = []
+    with np.errstate(invalid="ignore"):
+        for base, side in ((-half, 1), (half, -1)):
+            k = z - base
+            along = (np.abs(k) ** 2 + 9.564339226156775**2 - 9.969322744521554**2) / (2 * np.abs(k))
+            elbows.append(base + k / np.abs(k) * (along + 1j * side * np.sqrt(9.564339226156775**2 - along**2)))
+        one, two = elbows
+        inside = (one.real * two.real > -172.592) & ((np.conj(z - one) * (z - two)).imag > 0)
+    label, _ = ndimage.label(inside)
+    # The sketch's piece is the largest.
+    assert found == pytest.approx(np.bincount(label.ravel())[1:].max() * (x[1] - x[0]) ** 2, rel=2e-3)
+
+
+def test_an_expression_that_turns_often_along_a_ray() -> None:
+    """Three sectors of an arm, of which the sketch's counts."""
+    text = """
+mechanism:
+  parameters: {l1: 10, l2: 6}
+  links: {ground: {O: [0, 0]}, upper: [O, A, l1], fore: [A, P, l2]}
+  drives: {q1: {angle: upper}, q2: {angle: fore, from: upper}}
+  sketch: {A: [8, 6], P: [8, 12]}
+  measures: {m: cos(3*q1)}
+workspace: {point: P, indices: []}
+"""
+    found = design_area(text, "min: -0.622222", "l1=6.585 l2=7.825")
+    # Each degree of the upper link sweeps as much.
+    assert found == pytest.approx(4 * np.pi * 6.585 * 7.825 * np.arccos(-0.622222) / (3 * np.pi), rel=1e-4)
+
+
 def test_a_design_is_the_same_alone_and_in_a_batch() -> None:
     names = ("workspace.area", "GII", "SUI")
     together = values(names, THIN, FIVE_BAR)

@@ -13,6 +13,7 @@ from matplotlib.path import Path as Outline
 
 import mechdesign
 from mechdesign.analyses.poses import study_poses
+from mechdesign.errors import StudyError
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import number, plane
 from mechdesign.report.figures.reliability import figures
@@ -198,6 +199,23 @@ def test_pictures_of_samples_show_the_pose_that_fails_most_and_say_so() -> None:
         assert set(result.tables[name]["crank"]) == {10}
 
 
+def test_a_study_may_choose_the_pose_whose_samples_are_shown() -> None:
+    found, result = drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", "reliability.methods=[monte_carlo]",
+                          "reliability.shown=1")  # fmt: skip
+    for name in ("histogram", "convergence", "estimate"):
+        assert "at crank = 80 deg" in texts(found[name])
+        assert set(result.tables[name]["crank"]) == {80}
+
+
+@pytest.mark.parametrize(("overrides", "message"), [
+    (["reliability.shown=3"], "there are only 2 poses"),
+    (["reliability.shown=1", "reliability.methods=[analytic]"], "no method draws samples"),
+])  # fmt: skip
+def test_a_pose_that_cannot_be_shown(overrides: list[str], message: str) -> None:
+    with pytest.raises(StudyError, match=message):
+        drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", *overrides)
+
+
 def test_a_far_limit_is_told_in_words() -> None:
     found, _ = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]", "reliability.limits.B.x=5")
     axes = found["histogram"].axes[0]
@@ -359,11 +377,13 @@ def test_patches_of_a_workspace_are_kept_apart() -> None:
     poses = study_poses(study, "reliability")
     over = plane(study, poses)
     assert over is not None
-    assert [patch.stop - patch.start for patch in over.patches] == [3, 30, 30, 3]
-    assert (over.patches[0].start, over.patches[-1].stop) == (0, len(over.x))
+    ((_, sectors),) = over.maps
+    rays = [patch.rays for patch in sectors.patches]
+    assert [patch.stop - patch.start for patch in rays] == [3, 30, 30, 3]
+    assert (rays[0].start, rays[-1].stop) == (0, len(over.x))
     # The ends of the rays of a patch follow one another without jumps.
     z = over.x + 1j * over.y
-    for patch in over.patches:
+    for patch in rays:
         assert np.abs(np.diff(z[patch], axis=0)).max() < 0.4 * np.ptp(over.x)
 
 
@@ -371,7 +391,7 @@ def test_outline_of_a_map_is_the_boundary_of_the_workspace() -> None:
     study = mechdesign.load(Path(__file__).parents[2] / "configs/gallery/five_bar_precision_map.yaml")
     over = plane(study, study_poses(study, "reliability"))
     assert over is not None
-    z = np.concatenate(over.outline)
+    z = np.concatenate(over.maps[0][1].outline)
     # A leg is stretched, or its pin and C are as near as they may be.
     reach = np.abs(z - np.array([[100], [-100]]))
     assert np.abs(reach[..., None] - (140, 340)).min(axis=(0, 2)).max() < 1e-6

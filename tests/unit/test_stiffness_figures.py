@@ -12,7 +12,8 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import mechanism_figure
-from mechdesign.report.figures.stiffness import Coil, figures, quantity, round_down
+from mechdesign.report.figures.panels import plane, quantity, round_down
+from mechdesign.report.figures.stiffness import Coil, figures
 from mechdesign.results import Result
 
 
@@ -130,3 +131,78 @@ def test_stiffness_in_three_digits(value: float, text: str) -> None:
 @pytest.mark.parametrize(("value", "expected"), [(2.0, 2.0), (1.99, 1.0), (730.0, 500.0), (0.01, 0.01), (0.049, 0.02)])
 def test_scales_are_round(value: float, expected: float) -> None:
     assert round_down(value) == pytest.approx(expected)
+
+
+CRANK = """
+mechanism:
+  links: {ground: {O: [0, 0]}, crank: [O, A, 30], rod: [A, B, 90], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: O, point: B}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [85, 0]}
+stiffness:
+  {link: slider, at: B, actuators: {theta: 1e6}, sweep: {theta: {from: 0, to: 350, step: 10}}, loads: [[-10, 0, 0]]}
+"""
+
+
+def test_joint_forces_of_a_slider_crank_are_those_of_its_triangle() -> None:
+    """The rod bears F / cos(phi), the guide F tan(phi), the crank's drive F r sin(theta + phi) / cos(phi)."""
+    study = study_of(CRANK)
+    with style.context():
+        drawn = figures(study, mechdesign.stiffness(study))
+    forces, moments = drawn["joint_forces"].axes
+    theta = np.radians(np.arange(0, 360, 10))
+    phi = np.arcsin(np.sin(theta) / 3)
+    rod, guide, crossing, mark = (np.array(line.get_xydata()) for line in forces.lines)
+    assert rod[:, 1] == pytest.approx(10 / np.cos(phi), rel=1e-9)
+    assert guide[:, 1] == pytest.approx(10 * np.abs(np.tan(phi)), rel=1e-9, abs=1e-4)
+    assert (mark[0, 0], crossing[0, 0]) == (90, 90)
+    assert mark[0, 1] == pytest.approx(10 / np.sqrt(1 - 1 / 9))
+    assert np.abs(moments.lines[0].get_ydata()) == pytest.approx(
+        np.abs(300 * np.sin(theta + phi) / np.cos(phi)), rel=1e-9, abs=1e-3)  # fmt: skip
+    words = [text.get_text() for text in drawn["joint_forces"].legends[0].get_texts()]
+    assert words == ["force in O, A, B", "force in guide", "moment in O"]
+    # On the ground by the crank, from the origin: along the rod, which is in compression.
+    way = np.array(drawn["force_hodographs"].axes[0].lines[2].get_xydata()) @ [1, 1j]
+    assert way == pytest.approx(-10 * (1 - 1j * np.tan(phi)), rel=1e-9, abs=1e-4)
+
+
+def test_forces_that_grow_without_bounds_end_at_the_axis() -> None:
+    """Driven by its slider, the crank jams at its dead centres."""
+    study = study_of(CRANK, "mechanism.drives={s: {slide: guide}}", "stiffness.link=crank", "stiffness.at=A",
+                     "stiffness.actuators={s: 1e6}", "stiffness.loads=[[0, -10, 0]]",
+                     "stiffness.sweep={s: {from: 61, to: 119.9999, step: 0.9833}}")  # fmt: skip
+    with style.context():
+        (forces,) = figures(study, mechdesign.stiffness(study))["joint_forces"].axes
+    most = max(float(np.nanmax(line.get_ydata())) for line in forces.lines[:2])
+    assert forces.get_ylim()[1] < most / 2
+    assert "beyond the axis" in forces.get_title(loc="left")
+    assert forces.lines[-1].get_ydata()[0] == forces.get_ylim()[1]
+
+
+HAND = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, A, 40], lower: [A, B, 30], hand: [B, T, 10]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}, q3: {angle: hand, from: lower}}
+  sketch: {A: [20, 35], B: [48, 28], T: [48, 18]}
+workspace: {point: T, at: {hand.angle: [-90, 0]}, scan: {about: [0, 0]}, characteristic_length: 10}
+stiffness: {at: T, actuators: {q1: 1e5, q2: 1e5, q3: 1e5}, poses: workspace}
+"""
+
+
+def test_held_values_have_a_map_each_up_to_their_boundary() -> None:
+    """With its hand held the arm's tip reaches the ring of its wrist, from 10 to 70, moved by the hand."""
+    study = study_of(HAND)
+    result = mechdesign.stiffness(study)
+    with style.context():
+        panels = [axes for axes in figures(study, result)["stiffness"].axes if axes.get_xlabel()]
+    words = [f"hand.angle = {angle} deg, {name} [N/mm]" for angle in (-90, 0) for name in ("k_min", "k_max")]
+    assert [axes.get_title(loc="left") for axes in panels] == words
+    over = plane(study, result.drawn["poses"])
+    assert over is not None
+    for (_, sectors), hand in zip(over.maps, (-10j, 10), strict=True):
+        for curve in sectors.outline:
+            assert np.abs(np.abs(curve - hand)[:, None] - (10, 70)).min(axis=1) == pytest.approx(0, abs=1e-6)
+        ends = np.concatenate([patch.nodes[:, [0, -1]].ravel() for patch in sectors.patches])
+        assert np.abs(np.abs(ends - hand)[:, None] - (10, 70)).min(axis=1) == pytest.approx(0, abs=1e-3)
+        # Finer than the poses are.
+        assert len(ends) > 2 * sum(patch.rays.stop - patch.rays.start for patch in sectors.patches)

@@ -72,6 +72,8 @@ def test_every_value_of_a_held_coordinate_is_in_the_workspace_and_its_drives() -
     study = study_of(ARM)
     with style.context():
         drawn = figures(study, mechdesign.workspace(study))
+    # More than the place of a point is given.
+    assert "ellipses" not in drawn
     titles = ["hand.angle = -90 deg", "hand.angle = 0 deg", "hand.angle = 60 deg"]
     assert [axes.get_title(loc="left") for axes in drawn["workspace"].axes] == titles
     panels = drawn["drives"].axes
@@ -166,3 +168,37 @@ def test_the_region_over_a_range_is_coloured_by_the_value_that_ends_it() -> None
     assert set(drawn) == {"workspace", "range"}
     assert drawn["range"].axes[1].get_ylabel() == "hand.angle [deg]"
     assert [text.get_text() for text in drawn["workspace"].legends[0].get_texts()] == ["a leg is stretched"]
+
+
+POLAR = """
+mechanism:
+  links: {ground: {O: [0, 0]}, boom: {from: O, to: T, telescopic: true}}
+  drives: {q: {angle: boom}, s: {length: boom}}
+  sketch: {T: [100, 60]}
+  limits: [{drive: q, min: 0, max: 120}, {drive: s, min: 50, max: 200}]
+workspace: {point: T, scan: {about: [0, 0], rays: 60}, characteristic_length: 100}
+"""
+
+
+def test_ellipses_of_a_boom_are_radial_and_tangential() -> None:
+    """Along the boom T moves 1 for 1, across it r / 100 for an arc of 100 mm; forces are the inverse."""
+    study = study_of(POLAR)
+    with style.context():
+        page = figures(study, mechdesign.workspace(study))["ellipses"]
+    (axes,) = page.axes
+    assert axes.get_aspect() == 1
+    edges = [line.get_xydata() @ [1, 1j] for line in axes.lines if len(line.get_xdata()) == 97]
+    places = np.array([edge[:-1].mean() for edge in edges])
+    velocity, force = np.split(places, 2)
+    assert 20 <= len(velocity) <= 40
+    assert velocity == pytest.approx(force)
+    # As the legend says: 10 mm for 2 mm/s, and for 1 N.
+    words = [text.get_text() for text in page.legends[-1].get_texts()]
+    assert "half axis 10 mm long: 2 mm/s" in words[0]
+    assert "half axis 10 mm long: 1 N" in words[1]
+    for kind, of_one in ((0, 10 / 2), (1, 10 / 1)):
+        for edge, place in zip(edges[kind * len(velocity) :], velocity, strict=False):
+            around = (edge - place) * np.conj(place) / abs(place)
+            across = (abs(place) / 100) ** (1 - 2 * kind)
+            assert np.abs(around.real).max() == pytest.approx(of_one, rel=2e-3)
+            assert np.abs(around.imag).max() == pytest.approx(of_one * across, rel=2e-3)

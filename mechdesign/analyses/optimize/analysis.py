@@ -238,8 +238,9 @@ def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> 
         try:
             best = variant(study, numbers)
             judged = [each for each in (*designs.goals, *designs.conditions) if not each.expression]
-            drawings = _drawings(best, dict.fromkeys(each.command for each in judged))
-            while not _assembles_alike(study, best.mechanism, data):
+            commands = tuple(dict.fromkeys(each.command for each in judged))
+            drawings, given = _drawings(best, commands), _given(best, commands)
+            while not _assembles_alike(study, best.mechanism, data, given):
                 pose = next(drawings, None)
                 if pose is None:
                     doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
@@ -254,26 +255,42 @@ def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> 
     return files, doubts
 
 
+def _given(study: Study, commands: Iterable[str]) -> list[tuple[str, ...]]:
+    """Coordinates from which commands find poses, and the drives."""
+    found = [study.mechanism.drives]
+    for command in commands:
+        if command == "workspace" and study.workspace is not None:
+            found.append((f"{study.workspace.point}.x", f"{study.workspace.point}.y", *study.workspace.at))
+        else:
+            found += [tuple(group.names) for group in study_poses(study, command).groups]
+    return found
+
+
 def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:
     """Poses that a design may be drawn in: its sketch as it assembles, or else one that a command asks for."""
     yield study.mechanism.sketch_configuration
     for command in commands:
         poses = workspace_nodes(study) if command == "workspace" else study_poses(study, command)
         for solved in solve_poses(study, poses):
-            valid = np.flatnonzero(solved.configuration.valid)
+            pose = solved.configuration
+            valid = np.flatnonzero(pose.valid)
             if valid.size:
-                # Not the first: a workspace begins at its boundary, where legs are stretched.
-                yield solved.configuration.take(int(valid[valid.size // 2]))
+                # A workspace begins at its boundary, where legs are stretched: the pose that is farthest from that.
+                closures = [np.broadcast_to(each, pose.shape)[valid] for each in pose.closures]
+                farthest = int(np.min(closures, axis=0).argmax()) if closures else valid.size // 2
+                yield pose.take(int(valid[farthest]))
                 break
 
 
-def _assembles_alike(study: Study, mechanism: Mechanism, data: Mapping[str, Any]) -> bool:
-    """Whether the study of this data has the assembly of the mechanism that was evaluated."""
+def _assembles_alike(
+    study: Study, mechanism: Mechanism, data: Mapping[str, Any], given: Iterable[tuple[str, ...]]
+) -> bool:  # fmt: skip
+    """Whether the study of this data has the assemblies of the mechanism that was evaluated, whatever is given."""
     try:
-        alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path)
+        alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path).mechanism
+        return all(alone.plan(names).modes == mechanism.plan(names).modes for names in given)
     except MechdesignError:
         return False
-    return alone.mechanism.forward.modes == mechanism.forward.modes
 
 
 def drawn_design(designs: Designs, numbers: Mapping[str, float]) -> tuple[Study, Result]:

@@ -35,7 +35,9 @@ TABLES: Mapping[str, Collection[str]] = {
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
 # Sections beside a command's own whose numbers it reads.
-ALSO_READ: Mapping[str, str] = {"kinematics": "workspace", "stiffness": "kinematics", "reliability": "kinematics"}
+ALSO_READ: Mapping[str, Collection[str]] = {
+    "kinematics": ("workspace",), "stiffness": ("kinematics",), "reliability": ("kinematics", "stiffness"),
+}  # fmt: skip
 
 
 class Stack(NamedTuple):
@@ -65,7 +67,7 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
     mechanism, section = study.mechanism, getattr(study, command)
     graph, joints, links = mechanism.graph, mechanism.description.joints, mechanism.description.links
     places = study.parameters.moved_places(names)
-    if follows(_without_poses(study), names, (command, ALSO_READ[command])):
+    if follows(_without_poses(study), names, (command, *ALSO_READ[command])):
         return False
     # Angles of slides and clamps in a ring may contradict each other, which is found design by design.
     turned = any(place.rpartition(".")[0] in joints or place.endswith((".x", ".y")) for place in places)
@@ -81,10 +83,10 @@ def possible(study: Study, command: str, names: Collection[str]) -> bool:
         mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
     ):
         return False
-    if command == "reliability":
-        return _first_order(study, names)
-    # The order of the points along an elastic link is found once.
-    elastic = section.elastic if command == "stiffness" and section is not None else ()
+    if command == "reliability" and not _first_order(study, names):
+        return False
+    # The order of the points along an elastic link is found once; loads deflect what is made, too.
+    elastic = study.stiffness.elastic if command != "kinematics" and study.stiffness is not None else ()
     bent = tuple(f"{name}." for name in elastic if len(links[name].points) > 2)
     return not any(place.startswith(bent) for place in places)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -15,21 +14,23 @@ from mechdesign.analyses.region.regions import RAYS, Region, regions
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.poses import PoseGroup, Poses
+from mechdesign.study.poses import PoseGroup, Poses, Sector, Sectors
 
 SLACK = 1e-9
-# Rays of the narrowest panel; and how far inside its ends it is traced where the ends themselves are degenerate.
+# Rays of the narrowest panel; and how far inside its ends it is traced, farther where the ends are still degenerate.
 FEWEST = 25
-BESIDE = 1e-9
+BESIDE = (0.0, 1e-9, 1e-7, 1e-5)
 # Nodes of a map along each ray, from boundary to boundary.
 GRID = 33
 # An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
 INSET = 1e-6
 # Places of a ray's nodes between both curves.
 FRACTIONS = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
-# Poses of all regions together, about (a question may cost much at each), and rays of a patch at least.
+# Poses of all regions together, about (a question may cost much at each), and rays of a patch at least;
 MAX_POSES = 2000
 MIN_RAYS = 3
+# of a region: with fewer a map would not show its levels.
+ENOUGH_RAYS = 36
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,20 +78,26 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
         number = max(FEWEST, round(rays * (high - low) / total) + 1)
         # Denser towards the ends, where cusps are thin and corners sharp.
         theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
-        zero = np.zeros(number, dtype=np.intp)
-        traced = panels.trace(zero, theta, SLACK)
-        if (traced.counts[[0, -1]] != traced.counts[number // 2]).any():
+        steps = np.zeros(2, dtype=np.intp)
+        for attempt in range(len(BESIDE)):
             # At its very ends a panel meets its neighbour, or an interval vanishes.
-            theta = np.clip(theta, low + BESIDE * (high - low), high - BESIDE * (high - low))
-            traced = panels.trace(zero, theta, SLACK)
-        ray, inner, outer, enters, leaves = whole(traced, SAME_ROOT * float(panels.reach[0]))
-        counts = np.bincount(ray, minlength=number)
-        usual = _most(counts)
+            first, last = (high - low) * np.array(BESIDE)[steps]
+            at = np.clip(theta, low + first, high - last)
+            traced = panels.trace(np.zeros(number, dtype=np.intp), at, SLACK)
+            ray, inner, outer, enters, leaves = whole(traced, SAME_ROOT * float(panels.reach[0]))
+            counts = np.bincount(ray, minlength=number)
+            usual = _most(counts)
+            lost = counts[[0, -1]] != usual
+            if attempt == 0:
+                lost |= (traced.counts[[0, -1]] != traced.counts[number // 2]).any()
+            if not lost.any():
+                break
+            steps = np.minimum(steps + lost, len(BESIDE) - 1)
         kept = np.flatnonzero(counts == usual)
-        first = np.searchsorted(ray, kept)
+        begins = np.searchsorted(ray, kept)
         for slot in range(usual):
-            at: Ints = first + slot
-            yield Patch(theta[kept], inner[at], outer[at], _most(enters[at]), _most(leaves[at]))
+            own: Ints = begins + slot
+            yield Patch(at[kept], inner[own], outer[own], _most(enters[own]), _most(leaves[own]))
 
 
 def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:
@@ -134,27 +141,20 @@ def workspace_nodes(study: Study) -> Poses:
     """
     asked = regions(study)
     panels = [(region, found) for region in asked if (found := _panels(region)) is not None]
-    parts = [
-        (region, grid) for region, each in panels for grid in _grids(region, each, MAX_POSES // GRID // len(asked))
-    ]
+    parts: list[Complexes] = []
+    sectors = []
+    for region, each in panels:
+        sectors.append(_sectors(region, each, max(ENOUGH_RAYS, MAX_POSES // GRID // len(asked)), parts))
     if not parts:
         raise AssemblyError("poses: workspace has no node: nothing is reachable")
-    z = np.concatenate([grid.ravel() for _, grid in parts])
-    ends = np.cumsum([0, *(len(grid) for _, grid in parts)]).tolist()
+    z = np.concatenate([grid.ravel() for grid in parts])
     point = study.workspace.point if study.workspace is not None else ""
     values = {f"{point}.x": z.real, f"{point}.y": z.imag}
     for name in asked[0].held:
-        values[name] = np.concatenate([np.full(grid.size, region.held[name]) for region, grid in parts])
+        rows = [GRID * (each.patches[-1].rays.stop - each.patches[0].rays.start) for each in sectors]
+        values[name] = np.repeat([region.held[name] for region, _ in panels], rows)
     group = PoseGroup(tuple(values), values, np.arange(len(z)))
-    spans = tuple(slice(begin, end) for begin, end in pairwise(ends))
-    outline = tuple(
-        region.about + radius * np.exp(1j * patch.theta)
-        for region, each in panels
-        for patch in patches(each, region.rays or RAYS)
-        for radius, margin in ((patch.inner, patch.enters), (patch.outer, patch.leaves))
-        if margin >= 0
-    )
-    return Poses((group,), len(z), False, (len(z) // GRID, GRID), patches=spans, outline=outline)
+    return Poses((group,), len(z), False, (len(z) // GRID, GRID), regions=tuple(sectors))
 
 
 def _panels(region: Region) -> Panels | None:
@@ -165,14 +165,23 @@ def _panels(region: Region) -> Panels | None:
     return panels if panels.closes[0] else None
 
 
-def _grids(region: Region, panels: Panels, most: int) -> list[Complexes]:
-    """Nodes of the patches of one region, shape (rays, GRID), on about `most` rays."""
+def _sectors(region: Region, panels: Panels, most: int, parts: list[Complexes]) -> Sectors:
+    """The patches of one region, whose nodes, shape (rays, GRID), on about `most` rays, are added to `parts`."""
     found = list(patches(panels, min(region.rays or RAYS, most)))
+    finer = list(patches(panels, region.rays or RAYS))
     # Every panel has a fewest number of rays: of too many some are left out, never the ends of a patch: others begin.
     total = sum(float(np.ptp(patch.theta)) for patch in found)
-    grids = []
-    for patch in found:
+    sectors = []
+    for patch, fine in zip(found, finer if len(finer) == len(found) else found, strict=True):
         number = max(MIN_RAYS, round(most * float(np.ptp(patch.theta)) / total))
         kept = np.unique(np.linspace(0, len(patch.theta) - 1, min(number, len(patch.theta))).round().astype(int))
-        grids.append(patch.grid(region.about)[kept])
-    return grids
+        begin = sum(len(grid) for grid in parts)
+        parts.append(patch.grid(region.about)[kept])
+        sectors.append(Sector(slice(begin, begin + len(kept)), region.about, fine.grid(region.about)))
+    outline = (
+        region.about + radius * np.exp(1j * patch.theta)
+        for patch in finer
+        for radius, margin in ((patch.inner, patch.enters), (patch.outer, patch.leaves))
+        if margin >= 0
+    )
+    return Sectors(tuple(sectors), tuple(outline))

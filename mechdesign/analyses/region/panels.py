@@ -22,6 +22,8 @@ DOUBLINGS = 16
 LOOKS = 4
 # A ray inside a panel, not at half of it: by symmetry a single point may divide the ray there.
 MIDDLE = 0.4871
+# Rays of a panel, as parts of it, that have to meet as many intervals: between those that do not is another break.
+PROBES = np.array([0.01, 0.13, 0.31, MIDDLE, 0.69, 0.87, 0.99])
 # Width (radians) below which a panel may hold nothing but a tip.
 NARROW = 1e-3
 
@@ -94,9 +96,34 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
         design, angle = rays.real.astype(np.intp), rays.imag
         reach, intervals = _extent(designs, design, angle, reach, least)
     found, breaks = all_breaks(designs, reach, intervals, design, angle)
-    fixed = np.tile([*scan, *cuts], count)
-    owner = np.concatenate([np.repeat(np.arange(count), 2 + len(cuts)), found])
-    place, firm = np.concatenate([fixed, breaks]), np.arange(len(fixed) + len(breaks)) < len(fixed)
+    every, fixed = np.repeat(np.arange(count), 2 + len(cuts)), np.tile([*scan, *cuts], count)
+    owner, low, high = _between(every, fixed, found, breaks)
+    some = np.arange(len(low))
+    for _ in range(LOOKS):
+        # Two rays may be alike though two breaks lie between them: then others between them are not.
+        of, rays = np.repeat(owner[some], len(PROBES)), (low[some, None] + (high - low)[some, None] * PROBES).ravel()
+        counts = trace(designs, of, rays, reach[of]).counts.reshape(-1, len(PROBES))
+        unlike = (np.ptp(counts, axis=1) > 0) & ((high - low)[some] > NARROW)
+        if not unlike.any():
+            break
+        of, rays = (each.reshape(counts.shape)[unlike].ravel() for each in (of, rays))
+        more, angles = all_breaks(designs, reach, trace(designs, of, rays, reach[of]), of, rays)
+        found, breaks = np.concatenate([found, more]), np.concatenate([breaks, angles])
+        owner, low, high = _between(every, fixed, found, breaks)
+        some = np.flatnonzero(np.isin(owner, more))
+    # A panel is empty where a ray inside it meets nothing; a narrow one may hold a tip that is lost in rounding.
+    middle = low + MIDDLE * (high - low)
+    counts = trace(designs, owner, middle, reach[owner]).counts
+    full = (counts > 0) | (high - low < NARROW)
+    closes = np.bincount(design, intervals.counts, count) > 0
+    area, doubt = raster.area
+    return Panels(designs, owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
+
+
+def _between(every: Ints, fixed: Floats, found: Ints, breaks: Floats) -> tuple[Ints, Floats, Floats]:
+    """Design and ends of the panels between `fixed` ends of the designs `every` and breaks of the designs `found`."""
+    owner, place = np.concatenate([every, found]), np.concatenate([fixed, breaks])
+    firm = np.arange(len(place)) < len(fixed)
     order = np.lexsort((place, owner))
     owner, place, firm = owner[order], place[order], firm[order]
     # Breaks that rounding sets beside each other, or beside the end of the scan, are one.
@@ -106,14 +133,7 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     drop[:-1] |= near & firm[1:] & ~firm[:-1]
     owner, place = owner[~drop], place[~drop]
     keep = owner[1:] == owner[:-1]
-    owner, low, high = owner[:-1][keep], place[:-1][keep], place[1:][keep]
-    # A panel is empty where a ray inside it meets nothing; a narrow one may hold a tip that is lost in rounding.
-    middle = low + MIDDLE * (high - low)
-    counts = trace(designs, owner, middle, reach[owner]).counts
-    full = (counts > 0) | (high - low < NARROW)
-    closes = np.bincount(design, intervals.counts, count) > 0
-    area, doubt = raster.area
-    return Panels(designs, owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
+    return owner[:-1][keep], place[:-1][keep], place[1:][keep]
 
 
 def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats, least: Floats) -> tuple[Floats, Intervals]:

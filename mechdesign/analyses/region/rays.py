@@ -27,6 +27,8 @@ SAME_ROOT = 1e-9
 QUADRATIC = 1e-13
 # Intervals no wider than this part of the reach are rounding's.
 NARROWEST = 1e-10
+# As many samples at least where expressions are limited, which may turn often along a ray.
+OF_EXPRESSIONS = 48
 # First and last sample of an interval, as fractions of it.
 INSET = 1e-10
 FIVE = np.linspace(0.0, 1.0, 5)
@@ -251,7 +253,9 @@ def _others(
     sampled = np.flatnonzero(~np.asarray(known.all(axis=0))[found.ray])
     owner, inner, width = found.ray[sampled], found.inner[sampled], (found.outer - found.inner)[sampled]
     local = {name: value[owner] for name, value in places.items()}
-    fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, designs.effort.samples))), INSET, 1 - INSET)
+    turning = any(bound.coordinate.kind == "expression" for bound in designs.field.mechanism.bounds)
+    number = max(designs.effort.samples, OF_EXPRESSIONS if turning else 0)
+    fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, number))), INSET, 1 - INSET)
     radii = inner + fraction[:, None] * width
     rows = np.flatnonzero(~known.all(axis=1))
 

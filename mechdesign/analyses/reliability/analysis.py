@@ -24,7 +24,7 @@ from mechdesign.analyses.reliability.simulation import Setting, forward_plan
 from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MAX_SAMPLES, MethodResult, Partial, Task
-from mechdesign.errors import Interrupted
+from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism import Reason
 from mechdesign.parallel import keep_freed_memory, one_thread
 from mechdesign.progress import NULL, Progress
@@ -204,7 +204,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     mechanism, pair = task.study.mechanism, task.question.pair
     mean, sigma = task.linear.shift(), task.linear.deviation()
     assembled = np.flatnonzero(task.assembled).tolist()
-    worst = _worst(task)
+    followed = _followed(task)
     settings = []
     for solved, rates in groups:
         given = set(solved.given) == set(mechanism.drives)
@@ -213,7 +213,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                 continue
             pose = solved.configuration.take(k)
             scale = None
-            if pair is not None and task.poses.listed and row in (*assembled[:_DENSITIES], worst):
+            if pair is not None and task.poses.listed and row in (*assembled[:_DENSITIES], followed):
                 one, two = ((float(mean[channel, row]), float(sigma[channel, row])) for channel in pair)
                 scale = (one, two) if one[1] > 0 and two[1] > 0 else None
             settings.append(
@@ -221,16 +221,23 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                     task.question.at(task.nominal[:, row]), row, mechanism,
                     mechanism.forward if given else forward_plan(mechanism, pose), pose, rates.take(k),
                     task.nominal[:, row].tolist(),
-                    None if task.elastic is None else task.elastic.take([row]), scale, row == worst,
+                    None if task.elastic is None else task.elastic.take([row]), scale, row == followed,
                 )
             )  # fmt: skip
     return sorted(settings, key=lambda setting: setting.pose)
 
 
-def _worst(task: Task) -> int:
-    """The pose that fails most by the first order, whose samples are followed; without limits the first; -1: none."""
+def _followed(task: Task) -> int:
+    """The pose whose samples are followed: the one that the study shows, or else the one that fails most by the first
+    order; without limits the first; -1: none."""
     section, assembled = task.study.reliability, np.flatnonzero(task.assembled)
     assert section is not None
+    if section.shown is not None:
+        if section.shown - 1 not in assembled:
+            count = len(task.assembled)
+            why = f"there are only {count} poses" if section.shown > count else "this pose cannot be assembled"
+            raise StudyError((task.study.problem(f"{why}; choose another", "reliability", "shown"),))
+        return section.shown - 1
     if not task.question.limited or len(assembled) < 2 or not any(METHODS[name].sampled for name in section.methods):
         return int(assembled[0]) if len(assembled) else -1
     estimates = methods.run("analytic", task).estimates

@@ -248,7 +248,7 @@ def _index_columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) ->
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Errors of made mechanisms at the pose that fails most (without limits the first), in the study's units.
+    """Errors of made mechanisms at the pose that is shown, in the study's units.
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ def _density(task: Task, sums: Mapping[int, Sums]) -> Table | None:
 
 
 def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
-    """Each output's error at the pose that fails most, beside the normal law of the same mean and deviation."""
+    """Each output's error at the pose that is shown, beside the normal law of the same mean and deviation."""
     row = next((row for row, each in sorted(sums.items()) if each.kept.shape[1] > 1), None)
     if row is None:
         return None
@@ -367,11 +367,11 @@ def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
         Column("normal", normal_, meaning="density of the normal law of the samples' mean and deviation, in 1/`unit`"),
         Column("unit", units[channel], meaning="unit of the error"),
     ]
-    return Table("histogram", tuple(columns), "errors drawn at the pose that fails most, and their normal fit")
+    return Table("histogram", tuple(columns), "errors drawn at the pose that is shown, and their normal fit")
 
 
 def _convergence(task: Task, row: int, sums: Sums) -> Table:
-    """Mean of each output after so many samples, at the pose that fails most [S3, Fig. 4]."""
+    """Mean of each output after so many samples, at the pose that is shown [S3, Fig. 4]."""
     trend = sums.trend[sums.trend[:, 1] > 0]
     means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
     step, channel = (index.ravel() for index in np.indices(means.shape))
@@ -386,7 +386,7 @@ def _convergence(task: Task, row: int, sums: Sums) -> Table:
 
 
 def _estimate(task: Task, row: int, sums: Sums) -> Table:
-    """Share of failures after so many samples, with its interval, at the pose that fails most."""
+    """Share of failures after so many samples, with its interval, at the pose that is shown."""
     samples, failures = (sums.trend[:, k].astype(np.int64) for k in (0, 2))
     interval = np.array([binomial(k, n) for k, n in zip(failures.tolist(), samples.tolist(), strict=True)])
     columns = [

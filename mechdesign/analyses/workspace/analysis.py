@@ -12,6 +12,7 @@ from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.rays import SINGLE, Effort
 from mechdesign.analyses.region.regions import RAYS
+from mechdesign.analyses.workspace.ellipses import ellipses
 from mechdesign.analyses.workspace.index import Local, determinant_power, power_of_length, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.analyses.workspace.point_path import point_path
@@ -42,7 +43,7 @@ from mechdesign.analyses.workspace.tables import (
     where,
 )
 from mechdesign.errors import AssemblyError
-from mechdesign.indices import index
+from mechdesign.indices import REGIONAL, STATISTICS, index
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
@@ -130,7 +131,8 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     empty = sum(not given.panels.closes[0] for given in answers)
     named = {table.name: table for table in tables}
     along = poses_along(study, regions[0][1].held, named["boundary"])
-    return Result("workspace", named, tuple(warnings), {"regions": len(asked), "empty": empty}, drawn={"along": along})
+    drawn = {"along": along, "ellipses": ellipses(regions[0][1], regions[0][2])}
+    return Result("workspace", named, tuple(warnings), {"regions": len(asked), "empty": empty}, drawn=drawn)
 
 
 def _pieces(
@@ -213,18 +215,15 @@ def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluati
 def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str]]:
     """Unit and meaning of each column of the answer."""
     found = {
-        "GII": ("", "mean of the inverse condition number over the region"),
-        "GRI": (index("resistivity").unit(study, question.field), "mean of 1/abs(det J) over the region"),
+        "GII": ("", REGIONAL["GII"].meaning),
+        "GRI": (index("resistivity").unit(study, question.field), REGIONAL["GRI"].meaning),
     }
     found |= {name: (study.units.label(SHARED[name][0]), SHARED[name][1]) for name in ("SUI", "area", "box_area")}
     for name in (name for name in question.wanted if name not in COLUMNS):
         declared, kind = index(split(name)[0]), split(name)[1]
         unit = declared.unit(study, question.field)
-        found[name] = (unit, f"{_STATISTICS[kind]} over the region: {declared.meaning}")
+        found[name] = (unit, f"{STATISTICS[kind]} over the region: {declared.meaning}")
     return found
-
-
-_STATISTICS = {"mean": "mean", "min": "infimum", "max": "supremum", "std": "standard deviation"}
 
 
 def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:

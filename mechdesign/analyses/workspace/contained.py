@@ -17,7 +17,7 @@ from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import SAME_ROOT, Designs, is_turn, trace
 from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.numerics.roots import dips
+from mechdesign.numerics.roots import dips, lowest
 
 # Rays from a shape's centre to places spread along its outline, and the fewest to a side of a rectangle.
 RAYS = 120
@@ -27,6 +27,8 @@ SIDE_RAYS = 6
 CHECKED = 720
 CHECKED_ALONG = 101
 TOUCHING = 1e-7
+# Times that it is looked at, for it shrinks where it lies outside.
+LOOKS = 4
 # Contacts: the lowest local minima of the scales that rays allow, so many at most; and steps to the place of those that
 # are no more than so many times the lowest.
 CONTACTS = 6
@@ -159,13 +161,8 @@ class _View:
         theta = shape.directions()
         lanes, n = np.arange(len(design)), len(theta)
         scales = self.at(np.tile(lanes, n), np.repeat(theta, len(lanes))).reshape(n, -1)
-        low = (scales <= np.roll(scales, 1, axis=0)) & (scales <= np.roll(scales, -1, axis=0)) & np.isfinite(scales)
-        row = np.argsort(np.where(low, scales, np.inf), axis=0, kind="stable")[:CONTACTS]
-        turn = np.concatenate([theta[-1:] - 2 * np.pi, theta, theta[:1] + 2 * np.pi])
-        around = turn[row + np.arange(3)[:, None, None]]
-        beside = scales[(row + np.array([[[-1]], [[0]], [[1]]])) % n, lanes]
-        missing = ~np.take_along_axis(low, row, axis=0)
-        around, beside = self._with_overlooked(around, np.where(missing, np.inf, beside))
+        around, beside = _valleys(theta, scales)
+        around, beside = self._with_overlooked(around, beside)
         contact, lane = np.nonzero(np.isfinite(beside[1]) & (beside[1] <= LOW * beside[1].min(axis=0)))
         self.theta, self.scales = around[1], beside[1]
         place, value = dips(
@@ -173,10 +170,10 @@ class _View:
             np.full(len(lane), -np.inf), STEPS,
         )  # fmt: skip
         self.theta[contact, lane], self.scales[contact, lane] = place, value
-        lowest = self.scales.min(axis=0)
+        least = self.scales.min(axis=0)
         # Where no ray meets the region it is farther than it is wide.
-        lowest = np.where(np.isfinite(lowest), lowest, 2 * self._reach / min(shape.width, shape.height))
-        self.scale = np.where(self._inside, lowest, -lowest)
+        least = np.where(np.isfinite(least), least, 2 * self._reach / min(shape.width, shape.height))
+        self.scale = np.where(self._inside, least, -least)
 
     def _with_overlooked(self, theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
         """Contacts with one more where the lowest place of a margin is a hole between the rays."""
@@ -202,7 +199,7 @@ class _View:
                 det = xx * yy - xy * xy
                 way = (gy * xy - gx * yy) / det + 1j * (gx * xy - gy * xx) / det
                 good = (xx > 0) & (det > 0) & (np.abs(way) < FARTHEST)
-            part = part + np.where(good, step * way, 0.0)
+            part = part + step * np.where(good, way, 0.0)
         way = shape.width * part.real + 1j * shape.height * part.imag
         there = margins(part)[margin, margin, lanes] < -rounding
         nearest = np.where(there, shape.scale_at(way), np.inf)
@@ -215,17 +212,27 @@ class _View:
         return np.concatenate([theta, more[0]], axis=1), np.concatenate([scales, more[1]], axis=1)
 
     def checked(self) -> Floats:
-        """The scale, or less where a place of the outline between two rays lies outside."""
+        """The scale, or less where the outline lies outside between the rays that were traced so far."""
         theta, scale, lanes = self._shape.directions(CHECKED), self.scale.copy(), np.arange(len(self._centre))
-        outline = (1 - TOUCHING) * scale * (self._shape.radius(theta) * np.exp(1j * theta))[:, None]
-        place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
-        found = self.at(lane, theta[place])
-        # Where a ray leaves the region and comes back between two of its samples, places along it tell.
-        passed = np.flatnonzero(found >= scale[lane])
-        along = np.linspace(0, 1, CHECKED_ALONG)[:, None] * outline[place, lane][passed]
-        first = self._designs.inside(self._centre[lane[passed]] + along, lane[passed]).argmin(axis=0)
-        found[passed] = scale[lane[passed]] * np.maximum(first - 1, 0) / (CHECKED_ALONG - 1)
-        np.minimum.at(scale, lane, found)
+        scales = self.at(np.tile(lanes, len(theta)), np.repeat(theta, len(lanes))).reshape(len(theta), -1)
+        around, beside = _valleys(theta, scales)
+        # Of a notch with a corner the lowest place is found by sections, not by parabolas.
+        contact, lane = np.nonzero(self._inside & (beside[1] <= LOW * scale))
+        found = lowest(lambda x: self.at(lane, x), around[0, contact, lane], around[2, contact, lane])[1]
+        np.minimum.at(scale, lane, np.minimum(found, beside[1, contact, lane]))
+        for _ in range(LOOKS):
+            outline = (1 - TOUCHING) * scale * (self._shape.radius(theta) * np.exp(1j * theta))[:, None]
+            place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
+            if not lane.size:
+                break
+            found = self.at(lane, theta[place])
+            # Where a ray leaves the region and comes back between two of its samples, places along it tell.
+            passed = np.flatnonzero(found >= scale[lane])
+            along = np.linspace(0, 1, CHECKED_ALONG)[:, None] * outline[place, lane][passed]
+            first = self._designs.inside(self._centre[lane[passed]] + along, lane[passed]).argmin(axis=0)
+            found[passed] = scale[lane[passed]] * np.maximum(first - 1, 0) / (CHECKED_ALONG - 1)
+            # A smaller outline may pass through what the larger one had left behind.
+            np.minimum.at(scale, lane, found)
         return scale
 
     def at(self, lane: Ints, theta: Floats) -> Floats:
@@ -262,6 +269,19 @@ class _View:
         slope = -self._shape.slope_by(np.where(known, normal / np.where(known, size, 1.0), 1.0 + 0.0j))
         found[contact[known], lane[known]] = slope[known]
         return found
+
+
+def _valleys(theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
+    """Where scales, shape (directions, lanes), are least around: directions with the two beside each, and the scales.
+
+    Both are of shape (3, contacts, lanes); the scales are infinite where there are fewer.
+    """
+    low = (scales <= np.roll(scales, 1, axis=0)) & (scales <= np.roll(scales, -1, axis=0)) & np.isfinite(scales)
+    row = np.argsort(np.where(low, scales, np.inf), axis=0, kind="stable")[:CONTACTS]
+    turn = np.concatenate([theta[-1:] - 2 * np.pi, theta, theta[:1] + 2 * np.pi])
+    beside = scales[(row + np.array([[[-1]], [[0]], [[1]]])) % len(theta), np.arange(scales.shape[1])]
+    missing = ~np.take_along_axis(low, row, axis=0)
+    return turn[row + np.arange(3)[:, None, None]], np.where(missing, np.inf, beside)
 
 
 def _within_scan(designs: Designs, z: Complexes, theta: Floats) -> tuple[Floats, Floats]:

@@ -51,7 +51,7 @@ Evaluate = Callable[[Local], Value]
 
 @dataclass(frozen=True)
 class Index:
-    """A local performance index.
+    """A local performance index; the docstring of its file says what it tells of a mechanism.
 
     Its file is read with the study's schema: what only its computation needs is imported where it is prepared.
 
@@ -66,6 +66,8 @@ class Index:
         What it can never be below or above.
     section : str
         Section of the study that it needs beside the workspace; empty where the Jacobian is enough.
+    formula, source : str
+        How it is computed, where `meaning` does not say that, and where it comes from.
     """
 
     meaning: str
@@ -74,6 +76,8 @@ class Index:
     crossing: float | None = None
     bounds: tuple[float, float] = (0.0, float("inf"))
     section: str = ""
+    formula: str = ""
+    source: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +163,28 @@ def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) 
 
 
 def number(study: Study, where: Field) -> str:
-    """The unit of pure numbers."""
+    """Pure number."""
     return ""
+
+
+def length(study: Study, where: Field) -> str:
+    """That of length."""
+    return study.units.label("length")
+
+
+def stiffness(study: Study, where: Field) -> str:
+    """Force over length."""
+    return study.units.label("stiffness")
+
+
+def determinant(study: Study, where: Field) -> str:
+    """That of det J: lengths of outputs over those of drives, per radian."""
+    return power_of_length(study, determinant_power(where))
+
+
+def inverse_determinant(study: Study, where: Field) -> str:
+    """That of 1/det J."""
+    return power_of_length(study, -determinant_power(where))
 
 
 def power_of_length(study: Study, power: int) -> str:
@@ -177,7 +201,7 @@ def determinant_power(where: Field) -> int:
 
 
 def singular_value_unit(study: Study, where: Field) -> str:
-    """Unit of a singular value: outputs by drives, or none where a characteristic length makes both lengths."""
+    """That of an output over that of a drive, per radian; none with a characteristic length."""
     driven = where.mechanism.forward.structure.given[0].quantity
     power = int(where.outputs[0].quantity == "length") - int(driven == "length")
     return "" if where.length is not None else power_of_length(study, power)

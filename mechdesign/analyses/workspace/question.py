@@ -18,7 +18,7 @@ from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
 from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
 from mechdesign.analyses.workspace.ranged import Every, Some, SomeDesigns
 from mechdesign.errors import Problem, StudyError
-from mechdesign.indices import INDEX_NAMES, USUAL, needed_section
+from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_section
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.roots import dips
 from mechdesign.parallel import keep_freed_memory
@@ -31,10 +31,8 @@ AREA_TOLERANCE = 1e-6
 TOLERANCE, GRID_TOLERANCE = 1e-5, 1e-4
 # Relative accuracy of the smallest and largest values of an index.
 PEAK_TOLERANCE = 1e-5
-# What every workspace has; of the local indices follow their statistics, as ``sigma_min_mean``.
-COLUMNS = ("GII", "GRI", "SUI", "area", "box_area")
+COLUMNS = tuple(REGIONAL)
 MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
-STATISTICS = ("mean", "min", "max", "std")
 # What is answered of a region over a range.
 OF_RANGE = ("SUI", "area", "box_area")
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.

@@ -319,7 +319,7 @@ def draw_mechanism(
     for point in scene.pivots():
         pen.pivot(scene.points[point])
     _draw_guides(pen, scene, colors, travel or {})
-    for rank, (name, body) in enumerate(_bodies(scene)):
+    for rank, (name, body) in enumerate(bodies(scene)):
         if len(body) > 2:
             pen.plate(body, colors[name], rank)
         elif len(body) == 2:
@@ -353,7 +353,7 @@ def draw_ghost(
     if scene is None:
         return
     pen = Pen(axes, alpha=alpha, order=2.0)
-    for _, body in _bodies(scene):
+    for _, body in bodies(scene):
         if len(body) > 1:
             pen.line([*body, *(body[:1] if len(body) > 2 else [])], _GHOST, dashes)
     for link in scene.description.links.values():
@@ -361,10 +361,10 @@ def draw_ghost(
             pen.line([scene.points[end] for end in link.ends], _GHOST, dashes)
     for guide in scene.guides:
         if guide.owner != GROUND:
-            pen.line(_reach(scene, guide, (guide.pin,)), _GHOST, dashes)
+            pen.line(reach(scene, guide, (guide.pin,)), _GHOST, dashes)
 
 
-def _bodies(scene: Scene) -> list[tuple[str, list[complex]]]:
+def bodies(scene: Scene) -> list[tuple[str, list[complex]]]:
     """Outline of each moving rigid link, the largest first so that none hides another."""
     found = []
     for name, link in scene.description.links.items():
@@ -385,14 +385,14 @@ def _draw_guides(pen: Pen, scene: Scene, colors: Mapping[str, str], travel: Trav
         if guide.owner == GROUND:
             pen.rail(start, end)
         else:
-            pen.bar(_reach(scene, guide, (start, end)), colors[guide.owner])
+            pen.bar(reach(scene, guide, (start, end)), colors[guide.owner])
             if guide.slider is None:
                 pen.slot((start, end))
         if guide.slider is not None:
             pen.block(guide.pin, guide.along, colors[guide.slider])
 
 
-def _reach(scene: Scene, guide: Guide, places: Iterable[complex]) -> list[complex]:
+def reach(scene: Scene, guide: Guide, places: Iterable[complex]) -> list[complex]:
     """Ends of the line that a link carries: from its own points to where something slides."""
     own = [scene.points[point] for point in scene.link_points(guide.owner)]
     along = [((place - guide.origin) * guide.along.conjugate()).real for place in (*own, *places)]

@@ -48,7 +48,7 @@ _LEGEND_ROW = 0.19
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
-_PATH_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
+PATH_LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
 # Of the panels of assemblies: their number side by side, inches, and the size of symbols in small ones.
 _MAX_COLUMNS = 4
@@ -59,13 +59,13 @@ _NOTE = 0.3
 _GAP = 0.12
 _SMALL_SYMBOLS = 0.6
 # Of the animation: frames at most, colours, milliseconds, and pixels across.
-FRAMES = 60
-_GIF_COLORS = 128
+FRAMES = 36
+_GIF_COLORS = 32
 _WHITE = 244  # brightness of 255 from which on a colour is white
 _CYCLE = 3600  # of the whole
 _MIN_FRAME = 50
 _MAX_FRAME = 160
-_GIF_WIDTH = 640
+_GIF_WIDTH = 480
 
 
 def figures(study: Study, result: Result) -> Gallery:
@@ -327,7 +327,7 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
             for point in link_points(link):
                 owners.setdefault(point, name)
     for point, path in sweep.traces.items():
-        line, share = _PATH_LOOKS[min(ranked[point] + lift, 2)]
+        line, share = PATH_LOOKS[min(ranked[point] + lift, 2)]
         axes.plot(
             path.real, path.imag, color=colors[owners[point]], linewidth=line * width, alpha=share,
             zorder=2.5 + 0.1 * ranked[point], solid_joinstyle="round",

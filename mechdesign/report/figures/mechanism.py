@@ -17,7 +17,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.reliability.looks import best_probability, worst_in_words
+from mechdesign.report.figures.reliability.looks import best_probability, followed_in_words
 from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -38,8 +38,8 @@ _BEAM_ORDER = 3.3  # above links and slots, below pins and names
 def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -> Figure:
     """The sketch pose, under `title`, and the first pose of the study's kinematics, on one scale.
 
-    Of a reliability it is the pose that fails most. Where the result carries no motion, a few poses of it are solved.
-    Use inside `style.context`.
+    Of a reliability it is the pose that its samples follow. Where the result carries no motion, a few poses of it are
+    solved. Use inside `style.context`.
     """
     mechanism = study.mechanism
     sketch = mechanism.sketch_configuration
@@ -80,7 +80,7 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     samples = result.drawn["samples"]
     row = int(np.nanargmax(failure)) if samples is None else samples.pose
     # A line may be broken between coordinates only.
-    words = worst_in_words(study, poses, row).replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
+    words = followed_in_words(study, poses, row).replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
     return words, solve_pose(study, poses, row)
 
 

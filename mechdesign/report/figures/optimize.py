@@ -23,7 +23,7 @@ from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.optimum import design_figure, designs_figure
 from mechdesign.report.figures.panels import fitting
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.workspace import workspace_figure
+from mechdesign.report.figures.workspace import regions_figure, workspace_figure
 from mechdesign.report.figures.workspace.regions import regions
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -82,7 +82,7 @@ def _marked(designs: Designs, front: Table) -> list[tuple[str, int]]:
 def _optimum(result: Result, designs: Designs) -> Figure:
     """The best design itself: in its workspace where that was judged, in its motion where that was.
 
-    Of a front whose designs move, those that are marked in it, side by side.
+    Of a front those that are marked in it, side by side.
     """
     if "pareto" in result.tables:
         front = result.tables["pareto"]
@@ -91,6 +91,12 @@ def _optimum(result: Result, designs: Designs) -> Figure:
         moving = ("motion" in own.drawn and own.drawn["motion"].configuration.valid.any() for _, _, own in parts)
         if len(parts) > 1 and all(moving):
             return designs_figure(parts)
+        if len(parts) > 1 and all(own.command == "workspace" for _, _, own in parts):
+            found = [(words, design, regions(design, own)[0]) for words, design, own in parts]
+            figure = regions_figure(found, "some designs of the front where they are best conditioned")
+            for axes, (_, _, own) in zip(figure.axes, parts, strict=True):
+                _draw_contained(axes, own)
+            return figure
     best, own = result.drawn["design"](designs.numbers(designs.best))
     words = _listed(designs.numbers(designs.best))
     if own.command == "workspace":
@@ -98,15 +104,20 @@ def _optimum(result: Result, designs: Designs) -> Figure:
         there = f", at {region.title}" if region.title else ""
         dotted = "; dotted: what it contains" if own.drawn["contained"] else ""
         figure = workspace_figure(best, own, region, f"the best design, {words}{there}{dotted}")
-        for shape, centre in own.drawn["contained"]:
-            z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
-            figure.axes[0].plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
+        _draw_contained(figure.axes[0], own)
         return figure
     # A title may be broken between variables only.
     words = f"The best design, {words}".replace(" = ", _UNBROKEN_EQUALS)
     if "motion" in own.tables:
         return design_figure(best, own, words)
     return mechanism_figure(best, own, words)
+
+
+def _draw_contained(axes: Axes, own: Result) -> None:
+    """Outline of what a workspace is to contain."""
+    for shape, centre in own.drawn["contained"]:
+        z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
+        axes.plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
 
 
 def _variables(designs: Designs, front: Table, row: int) -> dict[str, float]:

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
+from mechdesign.study.poses import Poses, Sector, Sectors
 
 # More of them in one picture cannot be told apart.
 MAX_PANELS = 6
@@ -156,6 +156,21 @@ def number(value: float) -> str:
     return f"{value:.3g}" if value == 0 or value >= 1e-3 else style.in_powers(value)
 
 
+def quantity(value: float, unit: str) -> str:
+    """A value with three digits and its unit, ``3.74e+07 N/m`` as 3.74·10⁷ N/m; an infinite stiffness in a word."""
+    if np.isinf(value):
+        return "rigid"
+    if 1e-2 <= value < 1e5:
+        return f"{value:.3g} {style.printed(unit)}" if value < 1e3 else f"{value:.0f} {style.printed(unit)}"
+    return f"{style.in_powers(value)} {style.printed(unit)}"
+
+
+def round_down(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
+
+
 def fitting(labels: Sequence[str], width: float | None = None) -> int:
     """Columns of a legend that a width holds (inches), that of the page if none is given."""
     letters = int(_LEGEND_LETTERS * (style.width() if width is None else width))
@@ -164,83 +179,139 @@ def fitting(labels: Sequence[str], width: float | None = None) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Poses in the plane of the two coordinates that vary, shape (lines, nodes), and the lines that are joined.
+    """Poses in the plane of two coordinates, shape (lines, nodes), a map a value of what is held besides.
 
-    `outline` are the curves of the workspace's boundary where the poses are those of a workspace.
+    Parameters
+    ----------
+    maps : tuple of (str, Sectors)
+        The held values in words, where there are several; the patches of each map, and the workspace's boundary.
     """
 
     names: tuple[str, str]
     x: Floats
     y: Floats
     equal: bool
-    patches: tuple[slice, ...]
-    outline: tuple[Complexes, ...]
+    maps: tuple[tuple[str, Sectors], ...]
 
 
 def plane(study: Study, poses: Poses) -> Plane | None:
-    """The plane of a grid over two coordinates; None for every other choice of poses."""
-    names = moving_names(poses)
+    """The plane of a grid over two coordinates, or of a workspace; None for every other choice of poses."""
+    names = poses.names[:2] if poses.regions else tuple(moving_names(poses))
     if poses.listed or len(poses.grid) != 2 or len(names) != 2 or min(poses.grid) < 3:
         return None
-    x, y = (poses.values[name].reshape(poses.grid) for name in names)
+    values = poses.values
+    x, y = (values[name].reshape(poses.grid) for name in names)
+    maps = [("", region) for region in poses.regions]
+    if len(maps) > 1:
+        rows = [region.patches[0].rays.start * poses.grid[1] for region in poses.regions]
+        units = {name: study.units.label(study.mechanism.quantity(name)) for name in poses.names[2:]}
+        words = [", ".join(f"{name} = {values[name][row]:g} {unit}".rstrip() for name, unit in units.items())
+                 for row in rows]  # fmt: skip
+        maps = list(zip(words, poses.regions, strict=True))
+    whole = Sectors((Sector(slice(0, len(x)), 0j, x + 1j * y),), ())
     quantities = {study.mechanism.quantity(name) for name in names}
-    return Plane((names[0], names[1]), x, y, quantities == {"length"}, poses.patches or (slice(None),),
-                 poses.outline)  # fmt: skip
+    return Plane((names[0], names[1]), x, y, quantities == {"length"}, tuple(maps) or (("", whole),))
 
 
 def map_sheet(
     study: Study, over: Plane, parts: list[tuple[str, Floats]], heading: str, note: str, *, logarithmic: bool = False
 ) -> Figure:
-    """Maps side by side, or two by two, flat ones one below the other; each with its own bar of colours."""
+    """Maps side by side, or two by two, flat ones one below the other; each with its own bar of colours.
+
+    Of several held values a few, spread evenly; the colours of each part mean the same in all of its maps.
+    """
+    most = max(1, MAX_PANELS // len(parts))
+    some = np.unique(np.linspace(0, len(over.maps) - 1, min(len(over.maps), most)).round().astype(int))
+    maps = [over.maps[k] for k in some]
+    panels = [(", ".join(filter(None, (held, name))), sectors, part)
+              for held, sectors in maps for part, (name, _) in enumerate(parts)]  # fmt: skip
     spans = np.ptp(over.x[np.isfinite(over.x)]), np.ptp(over.y[np.isfinite(over.y)])
-    columns = 1 if style.narrow() or (over.equal and spans[1] < _FLAT * spans[0]) else min(len(parts), 2)
-    lines = -(-len(parts) // columns)
+    flat = over.equal and spans[1] < _FLAT * spans[0] and len(panels) < 3
+    columns = 1 if style.narrow() or flat else min(len(panels), 2)
+    lines = -(-len(panels) // columns)
     wide = (style.width() - 0.1) / columns - _MAP_LEFT - _BAR
-    tall = min(_MAX_MAP_HEIGHT / lines, wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
+    tall = min(_MAX_MAP_HEIGHT / min(lines, 2), wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
     tall = max(tall, 1.2)
     # Of equal scales the height decides: the bar stands beside the map.
     slack = max(0.0, wide - tall * float(spans[0] / spans[1])) if over.equal and columns == 1 else 0.0
     wide -= slack
     figure, grid = style.page(
-        len(parts), columns, tall, left=_MAP_LEFT, right=_BAR + 0.1 + slack, top=_MAP_TOP, bottom=_MAP_BELOW,
+        len(panels), columns, tall, left=_MAP_LEFT, right=_BAR + 0.1 + slack, top=_MAP_TOP, bottom=_MAP_BELOW,
         across=_MAP_LEFT + _BAR, down=_MAP_BELOW + _MAP_GAP,
     )  # fmt: skip
     title(figure, heading, note, left=_MAP_LEFT)
-    for axes, (name, values) in zip(grid, parts, strict=True):
+    patches = [patch.rays for _, sectors in maps for patch in sectors.patches]
+    scales = [_levels(over, values, patches, logarithmic) for _, values in parts]
+    for axes, (words, sectors, part) in zip(grid, panels, strict=True):
         bar = axes.inset_axes((1 + 0.12 / wide, 0, 0.14 / wide, 1))
-        _map(figure, axes, bar, over, values, logarithmic)
-        axes.set_title(name, loc="left", fontsize=9.5)
+        _map(figure, axes, bar, over, sectors, parts[part][1], scales[part], logarithmic)
+        axes.set_title(words, loc="left", fontsize=9.5)
         axes.set_xlabel(coordinate_label(study, over.names[0]))
         axes.set_ylabel(coordinate_label(study, over.names[1]))
+        if len(maps) > 1 and over.equal:
+            # One part of the plane in all of them.
+            axes.set_xlim(float(np.nanmin(over.x)), float(np.nanmax(over.x)))
+            axes.set_ylim(float(np.nanmin(over.y)), float(np.nanmax(over.y)))
     return figure
 
 
-def _map(figure: Figure, axes: Axes, bar: Axes, over: Plane, values: Floats, logarithmic: bool) -> None:
-    known = np.isfinite(values) & ((values > 0) | (not logarithmic))
+def _levels(over: Plane, values: Floats, patches: Sequence[slice], logarithmic: bool) -> Floats | None:
+    """Levels of the colours over some patches, or their powers of ten; None where there is no value."""
+    sizes = np.concatenate([node_areas(over.x[patch], over.y[patch]).ravel() for patch in patches])
+    shown = np.concatenate([values[patch].ravel() for patch in patches])
+    known = np.isfinite(shown) & ((shown > 0) | (not logarithmic))
+    if not known.any():
+        return None
+    sizes, shown = sizes[known], shown[known]
+    if logarithmic:
+        return np.asarray(np.log10(_powers(shown, sizes)))
+    return style.levels(float(shown.min()), _quantile(shown, sizes, 0.97), 9)
+
+
+def _map(
+    figure: Figure, axes: Axes, bar: Axes, over: Plane, sectors: Sectors, values: Floats, levels: Floats | None,
+    logarithmic: bool,
+) -> None:  # fmt: skip
     axes.grid(visible=False)
     axes.set_facecolor("#EEEEEE")
     if over.equal:
         axes.set_aspect("equal")
-    if not known.any():
+    if levels is None:
         bar.set_visible(False)
         return
-    sizes = np.concatenate([node_areas(over.x[patch], over.y[patch]) for patch in over.patches])[known]
-    if not logarithmic:
-        levels = style.levels(float(values[known].min()), _quantile(values[known], sizes, 0.97), 9)
-    else:
-        levels = _powers(values[known], sizes)
+    if logarithmic:
         # Between nodes powers are interpolated; below the last level is all that is smaller, even 0.
-        values, levels = np.log10(np.maximum(values, 1e-3 * levels[0])), np.log10(levels)
-    shown = np.ma.masked_invalid(values)
-    norm = style.steps(levels, float(shown.min()), float(shown.max()))
-    for patch in over.patches:
-        style.filled(axes, over.x[patch], over.y[patch], shown[patch], norm, levels)
-    for curve in over.outline:
+        values = np.log10(np.maximum(values, 1e-3 * 10.0 ** levels[0]))
+    known = values[np.isfinite(values)]
+    norm = style.steps(levels, float(known.min()), float(known.max()))
+    for patch in sectors.patches:
+        shown = _between(patch, over.x[patch.rays] + 1j * over.y[patch.rays], values[patch.rays])
+        style.filled(axes, patch.nodes.real, patch.nodes.imag, shown, norm, levels)
+    for curve in sectors.outline:
         axes.plot(curve.real, curve.imag, color=style.INK, linewidth=1.2)
     style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
     if logarithmic:
         bar.set_yticks(levels, [_power(10.0**level) for level in levels])
     bar.tick_params(labelsize=8)
+
+
+def _between(patch: Sector, places: Complexes, values: Floats) -> np.ma.MaskedArray[Any, Any]:
+    """Values at places on the rays of a patch, shape (rays, nodes), at the nodes of its finer map.
+
+    These are on rays between two, and take the values of both at the same distance, or at the end that is nearest.
+    """
+    if len(places) == len(patch.nodes):
+        return np.ma.masked_invalid(values)
+    coarse, fine = (np.unwrap(np.angle(z[:, z.shape[1] // 2] - patch.about)) for z in (places, patch.nodes))
+    fine += 2 * np.pi * np.round((coarse[0] - fine[0]) / (2 * np.pi))
+    below = np.clip(np.searchsorted(coarse, fine, "right") - 1, 0, len(coarse) - 2)
+    share = np.clip((fine - coarse[below]) / (coarse[below + 1] - coarse[below]), 0.0, 1.0)
+    radius, nodes = np.abs(places - patch.about), np.abs(patch.nodes - patch.about)
+    shown = np.array([
+        (1 - part) * np.interp(along, radius[k], values[k]) + part * np.interp(along, radius[k + 1], values[k + 1])
+        for k, part, along in zip(below.tolist(), share.tolist(), nodes, strict=True)
+    ])  # fmt: skip
+    return np.ma.masked_invalid(shown)
 
 
 def node_areas(x: Floats, y: Floats) -> Floats:

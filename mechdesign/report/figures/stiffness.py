@@ -21,8 +21,19 @@ from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import ARC, Pen, draw_mechanism, point_labels
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, TITLE, fit, framed, windows
+from mechdesign.report.figures.joint_forces import joint_force_figures, load_in_words
 from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.panels import Plane, along, fitting, legend_room, map_sheet, plane, tick_abscissa
+from mechdesign.report.figures.panels import (
+    Plane,
+    along,
+    fitting,
+    legend_room,
+    map_sheet,
+    plane,
+    quantity,
+    round_down,
+    tick_abscissa,
+)
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
@@ -61,7 +72,10 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """``springs`` (first pose), ``directions`` (a few poses), and over many poses ``stiffness``, curves or a map."""
+    """``springs`` (first pose), ``directions`` (a few poses), and over many poses ``stiffness``, curves or a map.
+
+    Under loads ``deflections`` (first pose), and along a sweep or path what the joints bear.
+    """
     found = Gallery()
     drawn, poses = result.drawn, result.drawn["poses"]
     if "first" in drawn:
@@ -76,6 +90,8 @@ def figures(study: Study, result: Result) -> Gallery:
             found.add("stiffness", _map, study, result, over)
         if len(poses.grid) == 1:
             found.add("stiffness", _curves, study, result)
+    if "forces" in result.tables:
+        found.add("joint_forces", joint_force_figures, study, result)
     return found
 
 
@@ -312,15 +328,6 @@ class Coil:
         return Label(self.text, anchors, style.VERMILION, 16, heading, 9.5)
 
 
-def quantity(value: float, unit: str) -> str:
-    """A stiffness with three digits: ``3.74e+07 N/m`` as 3.74·10⁷ N/m."""
-    if np.isinf(value):
-        return "rigid"
-    if 1e-2 <= value < 1e5:
-        return f"{value:.3g} {style.printed(unit)}" if value < 1e3 else f"{value:.0f} {style.printed(unit)}"
-    return f"{style.in_powers(value)} {style.printed(unit)}"
-
-
 def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:
     """Coil springs along their lines, each with a hatched anchor, and a dashed line to where the leg ends."""
     for coil in coils:
@@ -385,7 +392,7 @@ def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
         if load[2:] and load[2]:
             pen.arc(moved, -np.pi / 4, np.copysign(1.5 * np.pi, load[2]), ARC, style.VERMILION)
         size, name = abs(shapes[0][1][0, k]), asked.section.at
-        axes.set_title(f"{_in_words(study, tuple(load))} at {name}\n{name} moves {size:.3g} {length}\n"
+        axes.set_title(f"{load_in_words(study, load)} at {name}\n{name} moves {size:.3g} {length}\n"
                        f"drawn {scale:g} times as large", loc="left", fontsize=9)  # fmt: skip
     handles = [Line2D([], [], color=color, linewidth=width, label=words)
                for color, width, words in ((_PALE, 6.0, "without load"), (style.INK, 1.8, "under the load"),
@@ -496,19 +503,3 @@ def free_motion(study: Study, result: Result, drawn: Drawn) -> Figure | None:
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
     axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
     return figure
-
-
-def round_down(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
-
-
-def _in_words(study: Study, load: tuple[float, ...]) -> str:
-    units = [study.units.label(kind) for kind in ("force", "force", "moment")]
-    parts = [
-        f"{name} = {value:g} {style.printed(unit)}"
-        for name, value, unit in zip(("fx", "fy", "mz"), load, units, strict=False)
-        if value
-    ]
-    return ", ".join(parts) or "no load"

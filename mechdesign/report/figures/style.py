@@ -26,6 +26,7 @@ from PIL import Image
 
 from mechdesign.numerics.arrays import Floats
 
+DPI = 120
 # Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 10 ms a picture; 9 takes 40 ms for two hundredths more.
 DEFLATE_LEVEL = 8
 
@@ -43,7 +44,7 @@ _REDUCTION = 0.8  # to type of 8 points
 _NARROW = 6.0  # inches
 LOOKS = {
     # 960 pixels, which a README shows at about 800.
-    "screen": Look(8.0, 120, 1.0),
+    "screen": Look(8.0, DPI, 1.0),
     # 300 dots an inch of paper.
     "paper": Look(_COLUMN / _REDUCTION, 240, _REDUCTION),
 }
@@ -114,9 +115,17 @@ def narrow() -> bool:
     return width() < _NARROW
 
 
+class Picture(Figure):
+    """A figure that notebooks show; of others they show those alone that pyplot manages."""
+
+    def _repr_png_(self) -> bytes:
+        with context():
+            return encoded(self)
+
+
 def new_figure(height: float, *, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
-    figure = Figure(figsize=(width(), height), layout=layout)
+    figure = Picture(figsize=(width(), height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -229,7 +238,12 @@ def printed(unit: str) -> str:
 def in_powers(value: float) -> str:
     """Three digits of a number as it is set in print: 1.66\N{MIDDLE DOT}10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT NINE}."""
     digits, power = f"{value:.2e}".split("e")
-    return f"{digits}\N{MIDDLE DOT}10{str(int(power)).translate(_RAISED)}"
+    return f"{digits}\N{MIDDLE DOT}10{raised(int(power))}"
+
+
+def raised(power: int) -> str:
+    """A whole number as an exponent."""
+    return str(power).translate(_RAISED)
 
 
 def encoded(figure: Figure, kind: str = "png") -> bytes:

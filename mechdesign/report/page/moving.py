@@ -2,23 +2,239 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any
+from xml.etree.ElementTree import tostring
 
-from mechdesign.results import Result
+import numpy as np
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from mechdesign.analyses.kinematics.rates import drive_rates
+from mechdesign.analyses.poses import Shown, SolvedPoses, expand_outputs
+from mechdesign.mechanism import Reason
+from mechdesign.mechanism.derivatives import STALLED, regularity
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.outputs import first
+from mechdesign.numerics.arrays import Floats
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import link_colors
+from mechdesign.report.figures.kinematics import PATH_LOOKS, curves_figure
+from mechdesign.report.figures.panels import abscissa
+from mechdesign.report.figures.scene import Scene, Sweep, pose, ranks
+from mechdesign.report.page.linkage import Sheet, Sketcher, rounded
+from mechdesign.report.page.roaming import roaming
+from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, places
+from mechdesign.report.page.vector import described, inline
+from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
-
-@dataclass(frozen=True)
-class Moving:
-    """A mechanism that moves in a page."""
-
-    drawing: str  # inline SVG in one pose: what is seen without script and in print
-    beside: str  # inline SVG that shows where it is: motion curves, or the map that the pointer moves over
-    data: Mapping[str, Any]  # what the script moves it by, as JSON
+# Of more poses some are left out, evenly.
+MAX_POSES = 721
+_COMMON = 0.9  # part of the velocities that are smaller than the one whose arrow has the usual length
+_FEW_POSES = 24  # that the window shows whole, and in which names keep off the links
+# Seconds that a motion takes on the screen where it has no time of its own, and where its own is too short or long.
+_SECONDS = 5.0
+_SHORTEST, _LONGEST = 2.0, 12.0
+_ASTRAY = 0.05  # part of a step by which the rates may lead elsewhere
+_TIMES = 10_000  # integers in the time of a motion
+_ARROW = 70.0  # length of the arrow of a usual velocity
+_WHY = {
+    Reason.NOT_CLOSED: "cannot be assembled here",
+    Reason.OTHER_ASSEMBLY: "in another assembly only",
+    Reason.LIMIT: "beyond a limit",
+    Reason.NOT_HELD: "does not hold its load here",
+}
+_RATES = ("velocity", "acceleration")
 
 
 def moving(study: Study, result: Result) -> Moving | None:
-    """The mechanism of a result that has poses to move through: a sweep, a path, the grid of a workspace."""
-    return None
+    """The mechanism of a result that has poses to move through: a sweep, a path, the grid of a workspace.
+
+    Of an optimisation it is that of the best design.
+    """
+    name = f"{result.command}-curves"
+    if result.command == "optimize":
+        designs = result.drawn["designs"]
+        study, result = result.drawn["design"](designs.numbers(designs.best))
+    with style.context():
+        if "motion" in result.drawn and result.drawn["poses"].motion:
+            return _motion(study, result, name)
+        return roaming(study, result) if "local" in result.tables else None
+
+
+def _motion(study: Study, result: Result, name: str) -> Moving | None:
+    """The mechanism along its sweep or path, with the curves of its outputs."""
+    whole = Sweep.of(result.drawn["motion"])
+    some = np.unique(np.linspace(0, len(whole.rows) - 1, min(len(whole.rows), MAX_POSES)).round().astype(int))
+    shown = Shown(study, whole.poses, whole.rows[some], whole.configuration.take(some))
+    sweep = Sweep.of(shown)
+    if not len(sweep.valid):
+        return None
+    table, begin = result.tables["motion"], int(sweep.valid[0])
+    few = sweep.valid[np.unique(np.linspace(0, len(sweep.valid) - 1, _FEW_POSES).round().astype(int))]
+    scenes = [scene for index in few.tolist() if (scene := pose(sweep.mechanism, sweep.configuration, index))]
+    # Guides reach farther than points.
+    ends = [end for scene in scenes for guide in scene.guides for end in guide.ends(whole.travel, scene.span)]
+    sheet = Sheet.around(np.append(whole.extent, ends))
+    numbers = Numbers(table, sweep.rows, begin)
+    headings, rows = _rows(table, numbers)
+    data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
+    data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
+    data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
+    data["given"] = [
+        [given, numbers.cell(table.column(given)).unit, numbers.add(table.column(given))]
+        for given in sweep.poses.values if given in table
+    ]  # fmt: skip
+    figure, beside = curves_figure(study, result), ""
+    if figure is not None:
+        beside = inline(figure, name, described(figure))
+        data["curves"] = _curves(study, sweep, figure, table, numbers)
+    data["numbers"] = numbers.tracks
+    drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin))
+    return Moving(drawing, beside, data, sweep.words(begin), headings, rows)
+
+
+def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str) -> str:
+    """The first of some valid poses, with the paths of the points."""
+    scene = scenes[0]
+    root = sheet.root(f"the mechanism at {words}")
+    sketcher = Sketcher(root, sheet, whole.mechanism, scene)
+    ranked, colors = ranks(study), link_colors(whole.mechanism)
+    lift = 2 - max(ranked.values(), default=2)
+    owners: dict[str, str] = {}
+    for name in whole.mechanism.description.links:
+        for point in scene.link_points(name) if name != GROUND else ():
+            owners.setdefault(point, name)
+    for point, path in sorted(whole.traces.items(), key=lambda item: ranked[item[0]]):
+        sketcher.trace(path, colors[owners[point]], *PATH_LOOKS[min(ranked[point] + lift, 2)])
+    sketcher.draw(whole.travel)
+    sketcher.names(scenes)
+    sketcher.ruler(study.units.label("length"))
+    return tostring(root, encoding="unicode")
+
+
+def _gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
+    """Runs of poses that are not valid: the first, the last, why in words."""
+    reason = sweep.configuration.reason
+    ends = np.flatnonzero(np.diff(reason)) + 1
+    runs = zip(np.append(0, ends).tolist(), np.append(ends, len(reason)).tolist(), strict=True)
+    return [(begin, end - 1, _WHY[Reason(int(reason[begin]))]) for begin, end in runs if reason[begin]]
+
+
+def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, list[Cell | None]]]]:
+    """Numbers of a table: a row each output, with its rates beside it, and the speed of points."""
+    columns = {column.name: column for column in table.columns if column.values.dtype.kind == "f"}
+    columns.pop("conditioning", None)
+    kinds = ["", *(rate for rate in _RATES if any(name.endswith(f"_{rate}") for name in columns))]
+    names = [name for name in columns if not any(name.endswith(f"_{rate}") for rate in kinds[1:])]
+    for point in [name[:-2] for name in names if name.endswith(".x")]:
+        for rate in kinds[1:]:
+            parts = [columns.get(f"{point}.{axis}_{rate}") for axis in "xy"]
+            if parts[0] is not None and parts[1] is not None:
+                values = np.hypot(parts[0].values, parts[1].values)
+                columns[f"{point}_{rate}"] = Column(f"{point}_{rate}", values, parts[0].unit)
+                names.append(point)
+    rows = []
+    for name in dict.fromkeys(names):
+        found = [columns.get("_".join(filter(None, (name, kind)))) for kind in kinds]
+        rows.append((name, [None if column is None else numbers.cell(column) for column in found]))
+    return ["value", *kinds[1:]], rows
+
+
+def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, Any]:
+    """When each pose is passed, from the rates of the study where these lead along the motion; else evenly."""
+    section, unit = study.kinematics, study.units.label("time")
+    steps, own = _steps(sweep, table, section.rates if section else {}), None
+    times = np.linspace(0, 1, len(sweep.rows)) if steps is None else np.append(0.0, np.cumsum(np.abs(steps)))
+    if sweep.poses.closed:
+        times = np.append(times, times[-1] + np.diff(times).mean())
+    seconds, note = _SECONDS, ""
+    if steps is not None:
+        own = float(times[-1])
+        seconds = own if unit == "s" and _SHORTEST <= own <= _LONGEST else _SECONDS
+        note = ", as at the study's rates" if seconds == own else f"; at the study's rates {own:.3g} {unit}".rstrip()
+    pace = f"1\N{MULTIPLICATION SIGN}: {seconds:.3g} s {'a round' if returns else 'from end to end'}{note}"
+    return {"times": deltas(times / times[-1], _TIMES), "seconds": round(seconds, 3), "pace": pace,
+            "backwards": steps is not None and bool(steps[0] < 0)}  # fmt: skip
+
+
+def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | None:
+    """Time from each pose to the next, where the rates lead from one to the other; negative where they lead back."""
+    along, square, length = (np.zeros(len(sweep.rows) - 1) for _ in range(3))
+    told = [name for name in table.names if f"{name}_velocity" in table or name in rates]
+    # What is given moves evenly more often than what follows from it.
+    for name in [name for name in told if name in sweep.poses.values] or told:
+        if f"{name}_velocity" in table:
+            rate = table[f"{name}_velocity"][sweep.rows]
+        else:
+            rate = np.full(len(sweep.rows), rates[name])
+        values = table[name][sweep.rows]
+        size = float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else 0.0
+        if not size > 0:
+            continue
+        step, mean = np.diff(values) / size, (rate[1:] + rate[:-1]) / 2 / size
+        known = np.isfinite(step) & np.isfinite(mean)
+        along += np.where(known, step * mean, 0.0)
+        square += np.where(known, mean**2, 0.0)
+        length += np.where(known, step**2, 0.0)
+    known = square > 0
+    if not known.any():
+        return None
+    found = np.where(known, along / np.where(known, square, 1.0), np.nan)
+    # What is left of a step where the rates have had their time.
+    astray = length - 2 * found * along + found**2 * square
+    if np.any(known & ((found * found[known][0] <= 0) | (astray > _ASTRAY * length))):
+        return None
+    return np.where(known, found, np.nanmedian(found))
+
+
+def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
+    """Velocities of the moving points as arrows of the drawing, and how long a round one is; nothing without rates."""
+    section, configuration = study.kinematics, sweep.configuration
+    if section is None or not (section.rates or section.speed):
+        return {}
+    linear = sweep.mechanism.linearize(configuration)
+    solved = SolvedPoses(sweep.rows, sweep.poses.groups[0].names, configuration)
+    velocity = linear.velocity(drive_rates(study, section, sweep.poses, solved, linear).velocities)
+    known = configuration.valid & (regularity(linear) >= STALLED)
+    found = {}
+    for point in sweep.places:
+        x, y = (first(configuration, each, velocity) for each in expand_outputs(study, (point,)))
+        found[point] = np.where(known, x + 1j * y, np.nan)
+    speeds = np.abs(np.concatenate(list(found.values())))
+    speeds = speeds[np.isfinite(speeds)]
+    if not speeds.any():
+        return {}
+    # Near a dead centre some may grow without bounds: their arrows leave the drawing.
+    usual = float(np.quantile(speeds, _COMMON)) or float(speeds.max())
+    scale, length = _ARROW / usual, rounded(usual)
+    unit = style.printed(study.units.label("velocity"))
+    arrows = {point: [deltas(each.real * scale, PLACES), deltas(-each.imag * scale, PLACES)]
+              for point, each in found.items()}  # fmt: skip
+    return {"arrows": arrows, "arrow": [round(length * scale, 1), f"{length:g} {unit}".rstrip()]}
+
+
+def _curves(study: Study, sweep: Sweep, figure: Figure, table: Table, numbers: Numbers) -> dict[str, Any]:
+    """Where the pose is in each panel of the curves: places of the cursor, and of a dot on each curve."""
+    wide, tall = (72 * inches for inches in figure.get_size_inches())
+    over = abscissa(study, sweep.poses).values[sweep.rows]
+    boxes = [axes.get_position() for axes in figure.axes]
+    low, high = figure.axes[0].get_xlim()
+    x = wide * (boxes[0].x0 + boxes[0].width * (over - low) / (high - low))
+    dots = []
+    for axes, box in zip(figure.axes, boxes, strict=True):
+        bottom, top = axes.get_ylim()
+        for line in axes.get_lines():
+            drawn = np.asarray(line.get_ydata(), dtype=float)
+            column = next((each for each in table.columns if each.values.dtype.kind == "f"
+                           and np.array_equal(each.values, drawn, equal_nan=True)), None)  # fmt: skip
+            if column is None or axes.get_yscale() != "linear":
+                continue
+            which = numbers.add(column)
+            slope = -tall * box.height / (top - bottom) * 10.0 ** numbers.found[column.name][2]
+            start = tall * (1 - box.y0) + tall * box.height * bottom / (top - bottom)
+            dots.append([which, slope, round(start, 2), round(tall * (1 - box.y1), 1), round(tall * (1 - box.y0), 1),
+                         to_hex(line.get_color())])  # fmt: skip
+    ends = [round(tall * (1 - max(box.y1 for box in boxes)), 1), round(tall * (1 - min(box.y0 for box in boxes)), 1)]
+    return {"x": deltas(x, CURVES), "ends": ends, "dots": dots}

@@ -21,6 +21,10 @@ from mechdesign.study.text.fields import FILES, Context, StudyNumber, failure, r
 from mechdesign.study.text.units import QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
+_BRANCHES = {
+    "side": "in every pose each joint lies on the side on which the sketch has it",
+    "follow": "a sweep goes on smoothly through change points, where the sides meet",
+}
 TARGET_FORMS = "an expression, a number, {file: path.csv}, a list of numbers, of [x, y] or of [drive, x, y]"
 
 
@@ -43,7 +47,7 @@ TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of(
 
 
 class Link(fields.Model):
-    """A link: binary, telescopic, or its points in its own frame; what is None is measured from the sketch."""
+    """A rigid body: [from, to, length], a telescopic leg, or its points in its own frame, {Q: [0, 0], S: [3, 1]}."""
 
     short = (
         {
@@ -59,12 +63,21 @@ class Link(fields.Model):
         },
     )
     from_: fields.PointName | None = Field(None, alias="from")
+    """First end of a binary link: origin of its frame, whose x axis leads to ``to``."""
     to: fields.PointName | None = None
+    """Second end of a binary link."""
     length: fields.PositiveLengthValue | None = None
+    """Distance from ``from`` to ``to``. Left out: measured from the sketch. Example: 90 Example: 90 mm"""
     telescopic: bool = False
+    """Whether the length is a coordinate, NAME.length: two bodies and a slide. Further points belong to the body at
+    ``from``; ``length`` is left out.
+    """
     points: Annotated[
         dict[fields.PointName, Point | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
+    """Points in the link's own frame, [x, y]; of a binary link those besides its ends. A list of names, or a point
+    without a place, is measured from the sketch. Example: {P: [60, 15]}
+    """
 
     @model_validator(mode="before")
     @classmethod
@@ -114,19 +127,39 @@ def _through(raw: Any) -> Any:
     return raw
 
 
+Line = Annotated[
+    tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort({**fields.NAME_FORM, "title": "point"})
+]
+
+
 class Joint(fields.Model):
-    """A joint that is not a revolute: exactly one of prismatic, slot and fixed."""
+    """A joint that is not a pin: exactly one of ``prismatic``, ``slot`` and ``fixed``."""
 
     one_of = ("a joint is one of prismatic: [a, b], slot: a, fixed: [a, b]", "prismatic", "slot", "fixed")
     prismatic: TwoLinks | None = None
+    """Slide between links [a, b]: ``point`` of b moves along a line of a, and b does not turn against a. Example:
+    [ground, slider]
+    """
     slot: fields.LinkName | None = None
+    """Link with a straight slot in which ``point`` of another link slides and turns. Example: yoke"""
     fixed: TwoLinks | None = None
-    through: (
-        Annotated[tuple[fields.PointName, ...], BeforeValidator(_through), fields.OrShort(fields.NAME_FORM)] | None
-    ) = None
+    """Links [a, b] clamped to each other at a point that both have. Example: [leg_1, platform]"""
+    through: Line | None = None
+    """Point of the first link that the line goes through, where the slide is 0; two points [P, R] give the direction as
+    well. Left out: the origin of the link's frame. Example: G Example: [P, R]
+    """
     direction: fields.AngleValue | None = None
+    """Angle of the line from the first link's x axis, counter-clockwise: the way in which the slide counts. Left out:
+    0, unless ``through`` has two points. Example: 90
+    """
     point: fields.PointName | None = None
+    """The point of the other link that moves along the line; of a clamp the shared point. Left out: the only one there
+    is; a slot needs it. Example: B
+    """
     angle: fields.AngleValue | None = None
+    """Of a slide, angle from the line's direction to b's x axis, which stays (left out: 0). Of a clamp, from a's x axis
+    to b's (left out: measured from the sketch). Example: 90
+    """
 
     @model_validator(mode="after")
     def _fitting(self) -> Joint:
@@ -139,13 +172,17 @@ class Joint(fields.Model):
 
 
 class Drive(fields.Model):
-    """A driven coordinate: exactly one of angle, length and slide."""
+    """A driven coordinate: exactly one of ``angle``, ``length`` and ``slide``."""
 
     one_of = ("a drive is one of angle: link, length: leg, slide: joint", "angle", "length", "slide")
     angle: fields.LinkName | None = None
+    """Link whose angle is driven, from the world's x axis or from the link ``from``. Example: crank"""
     from_: fields.LinkName | None = Field(None, alias="from")
+    """Link from whose x axis the angle counts. Left out: the ground, and so the world. Example: upper_arm"""
     length: fields.LinkName | None = None
+    """Telescopic link whose length is driven. Example: leg_1"""
     slide: fields.JointName | None = None
+    """Joint (slide or slot) whose displacement is driven: from ``through`` along the line. Example: guide"""
 
     @model_validator(mode="after")
     def _of_an_angle(self) -> Drive:
@@ -155,9 +192,9 @@ class Drive(fields.Model):
 
 
 class Measure(fields.Model):
-    """A named quantity: exactly one of angle, distance and expression."""
+    """A named quantity: exactly one of ``angle``, ``distance`` and ``expression``; a text alone is an expression."""
 
-    bare, short = "expression", (fields.NAME_FORM,)
+    bare, short = "expression", ({**fields.NAME_FORM, "title": "expression"},)
     one_of = (
         "a measure is one of {angle: [a, b]}, {distance: [P, Q]} or an expression over coordinates and parameters",
         "angle",
@@ -165,12 +202,15 @@ class Measure(fields.Model):
         "expression",
     )
     angle: TwoLinks | None = None
+    """Angle from the first link's x axis to the second's, [a, b]. Example: [rod, rocker]"""
     distance: TwoPoints | None = None
+    """Distance between two points, [P, Q]. Example: [P, Q]"""
     expression: str | None = None
+    """Expression over coordinates, parameters and the measures above it. Example: B.x - A.x"""
 
 
 class Limit(fields.Model):
-    """Bounds of a distance, a drive, an angle or a measure."""
+    """Bounds of a ``distance``, a ``drive``, an ``angle`` or a ``measure``, whose own unit they have."""
 
     one_of = (
         "a limit is one of distance: [P, Q], drive: name, angle: [a, b], measure: name",
@@ -180,11 +220,19 @@ class Limit(fields.Model):
         "measure",
     )
     distance: TwoPoints | None = None
+    """Two points whose distance is limited. Example: [P, Q]"""
     drive: fields.DriveName | None = None
+    """Drive whose value is limited. Example: crank"""
     angle: TwoLinks | None = None
+    """Links [a, b]: the angle from a's x axis to b's is limited, whole turns aside. It needs both ``min`` and ``max``.
+    Example: [rod, rocker]
+    """
     measure: fields.MeasureName | None = None
+    """Measure whose value is limited. Example: gap"""
     min: fields.AnyValue | None = None
+    """Lowest value. Left out: none. Example: 10"""
     max: fields.AnyValue | None = None
+    """Highest value. Left out: none. Example: 2*r + 10"""
 
     @model_validator(mode="after")
     def _bounded(self) -> Limit:
@@ -211,24 +259,51 @@ def _target(raw: Any, context: Context) -> Wanted:
 
 
 TargetValue = Annotated[
-    Wanted, fields.Read(_target, {"type": ["number", "string", "array", "object"], "description": TARGET_FORMS})
+    Wanted, fields.Read(_target, {"type": ["number", "string", "array", "object"], "title": TARGET_FORMS})
 ]
 
 
 class MechanismSection(fields.Model):
-    """What the study says about the mechanism."""
+    """What the mechanism is: links and the points they share, other joints, drives, and a sketch of the wanted
+    assembly.
+    """
 
     parameters: dict[str, fields.AnyValue] = Field(default_factory=dict)
+    """Numbers with a name for expressions anywhere in the study; each may use those above it. Example: {r: 40, l: 3*r}
+    """
     links: dict[fields.LinkName, Link]
+    """Rigid bodies by name. ``ground`` is required; its frame is the world. A point that two links name is a pin
+    between them. Example: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
+    """
     joints: dict[fields.JointName, Joint] = Field(default_factory=dict)
+    """What is not a pin, by a name of its own: slides, pins in slots, clamps. Example: {guide: {prismatic: [ground,
+    slider], through: G}}
+    """
     drives: Annotated[
-        dict[fields.AnyName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
+        dict[fields.DriveName, Drive | None], BeforeValidator(names_to_mapping), fields.OrShort(fields.NAMES_FORM)
     ] = Field(default_factory=dict)
-    branch: Annotated[str, fields.choice(("side", "follow"))] = "side"
+    """Driven coordinates by name, as many as the mobility. A list names links (their angle), telescopic links (their
+    length) or joints (their slide). Example: [crank] Example: {theta: {angle: crank}}
+    """
+    branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
+    """Which way of assembly a pose has."""
     sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
+    """Rough places of the joints in the wanted assembly, [x, y]; any pose will do. In a dyad only the side on which
+    each joint lies counts; what is left out elsewhere is measured here exactly. Example: {A: [0, 30], B: [75, 55]}
+    """
     measures: dict[fields.MeasureName, Measure] = Field(default_factory=dict)
+    """Named quantities, usable like coordinates: reported where ``outputs`` names them, limited, required, optimised.
+    Example: {mu: {angle: [rod, rocker]}, lead: B.x - A.x}
+    """
     limits: tuple[Limit, ...] = ()
+    """What the motion keeps. A pose outside has valid 0 but keeps its positions; the nominal mechanism is judged.
+    Example: [{distance: [P, Q], min: 10}, {drive: crank, max: 120}]
+    """
     targets: dict[fields.CoordinateName, TargetValue] = Field(default_factory=dict)
+    """What coordinates, measures or points should be; kinematics then reports their errors. An expression; a file;
+    numbers, one a pose; rows [drive, value]; of a point rows [x, y] or [drive, x, y]. Example: {rocker.angle: 67 +
+    0.6*(crank - 40)} Example: {C: {file: path.csv}}
+    """
 
     # What the names mean, whether or not the rest of the section is right.
 
@@ -310,13 +385,19 @@ def _unit_of(kind: str) -> fields.Read:
             raise failure(str(error)) from None
         return raw
 
-    return fields.Read(read, fields.NAME_FORM)
+    return fields.Read(read, {**fields.NAME_FORM, "title": f"unit of {kind}"})
 
 
 class UnitsSection(fields.Model):
-    """Units that bare numbers mean."""
+    """Units that bare numbers mean and that tables have."""
 
     length: Annotated[str, _unit_of("length")] = "mm"
+    """Unit of lengths; ``dimensionless`` where they are multiples of one of them. Example: m"""
     angle: Annotated[str, _unit_of("angle")] = "deg"
+    """Unit of angles, in values, rates and the trigonometry of expressions. Jacobians and stiffnesses are per radian
+    all the same. Example: rad
+    """
     time: Annotated[str, _unit_of("time")] = "s"
+    """Unit of time. Example: min"""
     force: Annotated[str, _unit_of("force")] = "N"
+    """Unit of forces; moments and stresses follow from it and the length. Example: kN"""

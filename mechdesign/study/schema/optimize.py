@@ -11,32 +11,37 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression, ExpressionError
-from mechdesign.indices import INDEX_NAMES, needed_section
+from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
 from mechdesign.study.text.units import QUANTITY
 
-# Results of a workspace that a goal or condition may name without its command.
-INDICES = ("GII", "GRI", "SUI", "area", "box_area")
-# Those of a local index follow its name.
-_STATISTICS = ("mean", "min", "max", "std")
-_RESULT = "a result, such as GII or kinematics.C.y"
 # Commands whose section no default can replace.
 _UNASSUMED = ("reliability", "stiffness")
 
 
-class Variable(fields.Model):
-    """A design variable; its bounds are expressions over parameters and the variables above it.
+_METHODS = {
+    "grid": "every design of the steps of the variables",
+    "search": "global search over continuous variables, for each row of weights",
+    "pareto": "the front between two goals or more, spread evenly",
+}
 
-    The step is that of a grid, and of the sensitivities reported with an optimum.
-    """
+
+class Variable(fields.Model):
+    """Range of a design variable; bounds may be expressions over parameters and the variables above it."""
 
     from_: fields.Bound = Field(alias="from")
+    """Lowest value. Example: l_min + 5"""
     to: fields.Bound
+    """Highest value; on a grid it is taken where a step leads to it. Example: (l_min + R)/2"""
     step: fields.PositiveNumber | None = None
+    """Step of a grid, and of the sensitivities reported with the optimum. Left out: ``number``; a grid needs one of
+    them. Example: 0.03
+    """
     number: Annotated[int, fields.whole(1, 10_000_000)] | None = None
+    """How many values, both ends included, instead of ``step``. Example: 21"""
 
     @model_validator(mode="after")
     def _spacing(self) -> Variable:
@@ -47,7 +52,7 @@ class Variable(fields.Model):
 
 def _known() -> tuple[str, ...]:
     """Results of a workspace that need no command's name."""
-    return (*INDICES, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in _STATISTICS))
+    return (*REGIONAL, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in STATISTICS))
 
 
 def _result(raw: Any, context: Context) -> str | Expression:
@@ -82,12 +87,16 @@ class Judged(fields.Model):
     """A result, and the rows of it that count; or an expression over parameters."""
 
     bare = "result"
-    short: ClassVar[tuple[fields.Form, ...]] = (fields.NAME_FORM,)
+    short: ClassVar[tuple[fields.Form, ...]] = ({**fields.NAME_FORM, "title": "result"},)
     result: Annotated[
         str | Expression,
-        fields.Read(_result, {**fields.NAME_FORM, "description": f"{_RESULT}, or an expression over parameters"}),
+        fields.Read(_result, {**fields.NAME_FORM, "title": "result, or expression over parameters"}),
     ]
+    """A number of the workspace (GII, area, sigma_min_mean), COMMAND.COLUMN or COMMAND.TABLE.COLUMN, whose worst row
+    counts, or an expression over parameters. Example: kinematics.extremes.C.x.range
+    """
     where: dict[str, str | float | int] = Field(default_factory=dict)
+    """Rows that count: those whose columns have these values. Left out: all rows. Example: {method: monte_carlo}"""
 
     @property
     def name(self) -> str:
@@ -108,8 +117,11 @@ class Condition(Judged):
 
     bare, short = "", ()
     abs: bool = False
+    """Whether the absolute value is judged."""
     at_least: fields.Number | None = None
+    """Lowest value, in the result's unit. At least one of ``at_least`` and ``at_most`` is given. Example: 0.35"""
     at_most: fields.Number | None = None
+    """Highest value, in the result's unit. Example: 2.5"""
 
     @model_validator(mode="after")
     def _bounded(self) -> Condition:
@@ -123,7 +135,10 @@ class Condition(Judged):
 class Requirement(Condition):
     """A condition on the result of a command."""
 
-    result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "description": _RESULT})]
+    result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "title": "result"})]
+    """COMMAND.COLUMN or COMMAND.TABLE.COLUMN, with a row's word between where it needs one; the worst row counts, and
+    nan is not met. Example: kinematics.mu Example: kinematics.extremes.C.x.range
+    """
 
 
 _PAIR = fields.pair_of("[width, height]")
@@ -136,16 +151,19 @@ def _centre(raw: Any) -> Any:
 
 
 class Outline(fields.Model):
-    """A circle, or a rectangle with sides along x and y; its centre is None where it may lie anywhere."""
+    """A circle, or a rectangle with sides along x and y."""
 
     one_of = ("a shape is one of rectangle: [width, height], circle: radius", "rectangle", "circle")
     rectangle: Annotated[tuple[fields.PositiveLengthValue, fields.PositiveLengthValue], _PAIR] | None = None
+    """Sides [width, height], along x and y. Example: [200, 100]"""
     circle: fields.PositiveLengthValue | None = None
+    """Radius of a circle. Example: 80"""
     center: Annotated[
         tuple[fields.LengthValue, fields.LengthValue] | None,
         BeforeValidator(_centre),
         fields.OrShort({"const": "free"}),
     ] = None
+    """Centre [x, y]. ``free``, or left out: anywhere in the region. Example: [0, 300]"""
 
     @property
     def numbers(self) -> Mapping[str, tuple[fields.StudyNumber, ...]]:
@@ -205,15 +223,34 @@ Goals = Annotated[tuple[Judged, ...], BeforeValidator(fields.as_list), fields.Or
 
 
 class OptimizeSection(fields.Model):
-    """Which dimensions are best?"""
+    """What may be varied, what is to be best, and what every design must keep."""
 
-    method: Annotated[str, fields.choice(("grid", "search", "pareto"))] = "grid"
-    variables: dict[fields.CoordinateName, Variable]
+    method: Annotated[str, fields.choice(_METHODS, "method of optimization")] = "grid"
+    """How the best designs are looked for."""
+    variables: dict[fields.PlaceName, Variable]
+    """Ranges of parameters or of single dimensions (rod.length). Example: {l_min: {from: 1, to: 5, step: 0.5}, l_a:
+    {from: l_min, to: 2*l_min, number: 9}}
+    """
     maximize: Goals = ()
+    """Results that are to be large; one alone needs no list. Their worst row counts, the smallest. Example: [GII, SUI,
+    {result: reliability.reliability, where: {method: analytic}}]
+    """
     minimize: Goals = ()
+    """Results that are to be small; their largest row counts, of an error the absolute value. Example:
+    kinematics.C.y_error
+    """
     weights: tuple[WeightRow, ...] | None = None
+    """One optimum a row: weights of the goals, first those of ``maximize``, or by their names. Each goal is normalised
+    by its range over the feasible designs. Left out: one row of equal weights. Example: [[1, 0], [1, 1], [2, 1]]
+    """
     subject_to: tuple[AnyCondition, ...] = ()
+    """What a design must keep to be feasible: bounds of results, or a shape that the workspace contains. Example:
+    [{result: workspace.area, at_least: 0.35}, {contains: {circle: 80}}]
+    """
     evaluations: Annotated[int, fields.whole(10, 10_000_000)] | None = None
+    """Most designs that search and pareto evaluate; a search then uses them all. Left out: by the number of variables
+    and goals. Example: 20000
+    """
 
     @model_validator(mode="after")
     def _goals(self) -> OptimizeSection:
@@ -309,7 +346,7 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
         checker.known(command, COMMANDS, "command", path)
     elif required or name not in known:
         names = known if required else (*known, *checker.parameters.nominal)
-        hint = suggestion(name, names) or f"; a result is one of {', '.join(INDICES)} or <command>.<column>"
+        hint = suggestion(name, names) or f"; a result is one of {', '.join(REGIONAL)} or <command>.<column>"
         checker.report(path, f"there is no result {name!r}{hint}")
     if not required:
         column = name.rpartition(".")[2]

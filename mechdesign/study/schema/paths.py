@@ -26,18 +26,9 @@ CIRCLE_POSES = 72
 LINE_POSES = 51
 # Pieces of a spline between two of its points whose lengths are added up.
 SPLINE_PIECES = 64
-_ROWS = {"type": ["array", "string", "number"]}
+_ROWS = {"type": ["array", "string", "number"], "title": "[[x, y], ...] or [number, ...] or file or number"}
 
-Speed = Annotated[
-    float,
-    fields.number("velocity", 0.0, exclusive=True),
-    Field(
-        description="speed of the path's point along it, constant: velocities and accelerations of drives and outputs "
-        "follow from the path's direction and curvature. On a polyline each segment is passed at this speed without "
-        "acceleration; a corner has the direction of the segment that begins there, the last point of an open one "
-        "that of the segment that ends there"
-    ),
-]
+Speed = Annotated[float, fields.number("velocity", 0.0, exclusive=True)]
 Point = Annotated[tuple[fields.Length, fields.Length], fields.pair_of("[x, y]")]
 
 
@@ -45,16 +36,20 @@ def _radians(raw: Any, context: Context) -> float:
     return read_number(raw, context, "angle").nominal * context.units.angle_factor
 
 
-Radians = Annotated[float, fields.Read(_radians, fields.NUMBER_READ)]
+Radians = Annotated[float, fields.Read(_radians, fields.NUMBER_FORM, "angle")]
 
 
 class Circle(fields.Model):
-    """A whole circle, counter-clockwise unless it says otherwise; it ends one step before it closes."""
+    """A whole circle, counter-clockwise unless it says otherwise; the last pose is one step before it closes."""
 
     center: Point
+    """Centre [x, y]. Example: [0, 220]"""
     radius: fields.PositiveLength
+    """Radius of the circle. Example: 40"""
     from_: Radians = Field(0.0, alias="from")
+    """Angle of the first place about the centre, from the x axis. Example: 90"""
     clockwise: bool = False
+    """Whether it is passed clockwise."""
 
     @property
     def to(self) -> float:
@@ -66,9 +61,13 @@ class Arc(fields.Model):
     """Part of a circle between two angles from the x axis, both ends included; clockwise where they fall."""
 
     center: Point
+    """Centre [x, y]. Example: [0, 220]"""
     radius: fields.PositiveLength
+    """Radius of the circle. Example: 40"""
     from_: Radians = Field(alias="from")
+    """Angle of the first place about the centre, from the x axis. Example: 0"""
     to: Radians
+    """Angle of the last place; less than ``from``: clockwise. Example: 180"""
 
     @model_validator(mode="after")
     def _some(self) -> Arc:
@@ -91,19 +90,25 @@ class PathSection(fields.Model):
     short = (_ROWS,)
     one_of = ("a path is one of through, file, circle, arc, line", "through", "file", "circle", "arc", "line")
     through: Annotated[tuple[tuple[float, ...], ...], fields.Read(_through, _ROWS)] | None = None
+    """Places [x, y] of a point, or numbers of a coordinate, one a pose; a list alone means this. Example: [[10, 20],
+    [15, 20], [20, 25]] Example: [0, 5, 20]
+    """
     file: str | None = None
+    """CSV file beside the study with a pose a line: two columns of a point, one of a coordinate; its name alone means
+    this. Example: path.csv
+    """
     circle: Circle | None = None
     arc: Arc | None = None
     line: (
         Annotated[tuple[Point, Point], fields.pair_of("a line from [x, y] to [x, y], as a list of the two")] | None
     ) = None
-    points: Annotated[int, fields.whole(2, 10_000_000)] | None = Field(
-        None,
-        description=f"number of poses, evenly spaced: {CIRCLE_POSES} on a circle, else {LINE_POSES}, where left out",
-    )
-    spline: bool = Field(
-        False, description="whether a smooth curve (a cubic spline) is laid through the points, closed where they are"
-    )
+    """Straight line [[x, y], [x, y]], both ends included. Example: [[0, 0], [50, 0]]"""
+    points: Annotated[int, fields.whole(2, 10_000_000)] | None = None
+    """How many poses, evenly spaced. Left out: |CIRCLE_POSES| on a circle, |LINE_POSES| on an arc or a line, on a
+    spline its own points. Example: 36
+    """
+    spline: bool = False
+    """Whether a smooth curve (cubic spline) is laid through the listed points, closed where they are."""
 
     @property
     def shape(self) -> str | None:

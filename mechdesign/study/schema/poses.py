@@ -27,13 +27,17 @@ def _range(raw: list[Any] | str) -> str:
 
 
 class Sweep(fields.Model):
-    """Values of one coordinate, both ends included; a bare number is held (``number`` 1)."""
+    """Values of one coordinate, both ends included; a number alone is held."""
 
     short = (fields.NUMBER_FORM,)
     from_: fields.Number = Field(alias="from")
+    """First value, in the coordinate's unit. Example: 0"""
     to: fields.Number
+    """Last value; with a ``step`` that does not lead to it, the last one before it. Example: 360"""
     step: fields.Number | None = None
+    """Distance of the values, negative where they fall. Give this or ``number``. Example: 5"""
     number: Annotated[int, fields.whole(1, 10_000_000)] | None = None
+    """How many values, both ends included. Example: 73"""
 
     @model_validator(mode="before")
     @classmethod
@@ -70,8 +74,20 @@ class PoseSection(fields.Model):
 
     command: ClassVar[str]
     poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort({"const": "workspace"})] | None = None
+    """Poses one by one, each with as many coordinates as the mobility: drives, others (C.x, platform.angle) or a mix.
+    ``workspace``: the nodes of the workspace section. Without ``poses``, ``sweep`` and ``path``: those of kinematics,
+    and there a turn of the drive or its limits. Example: [{theta1: 30, theta2: 60}, {C.x: 0.2, C.y: 1.1}] Example:
+    workspace
+    """
     sweep: dict[fields.CoordinateName, Sweep] | None = None
+    """Ranges of coordinates; several make a grid, and a number alone is held. Example: {theta: {from: 0, to: 360, step:
+    5}}
+    """
     path: dict[fields.CoordinateName, PathSection] | None = None
+    """What a point or coordinates pass: places one after the other, a CSV file, a circle, an arc or a line; a number
+    alone is held. Example: {C: [[10, 20], [15, 20], [20, 25]]} Example: {C: {circle: {center: [0, 220], radius: 40}},
+    platform.angle: 0}
+    """
 
     @property
     def at_nodes(self) -> bool:
@@ -111,9 +127,19 @@ class MotionSection(PoseSection):
     """Poses, how the mechanism moves through them, and the coordinates that are asked for."""
 
     outputs: fields.CoordinateNames | None = None
+    """Coordinates, measures and points (their x and y) that are asked for. Left out: every moving point, link and
+    slide; in reliability what is limited, if anything is. Example: [C, rod.angle, mu]
+    """
     rates: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
+    """Velocities of drives, or of all coordinates that the poses give; velocities and accelerations of the outputs (or
+    their errors) follow. A bare number is in the coordinate's unit per unit of time. Example: {theta: 5 rad/s}
+    """
     accelerations: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
+    """Accelerations of what has ``rates``. Left out: 0. Example: {theta: 2 rad/s^2}"""
     speed: Speed | None = None
+    """Constant speed of the path's point along it, instead of ``rates``; those of the drives follow from the path's
+    direction and curvature. On a polyline each segment is passed without acceleration. Example: 100 mm/s
+    """
 
     def checked(self, checker: Checker) -> Self:
         """Check rates, accelerations and the speed as well."""
@@ -202,12 +228,16 @@ def _sets(checker: Checker, section: PoseSection) -> list[set[str]]:
 
 
 class Load(fields.Model):
-    """A force at a point, or a moment on a link."""
+    """A force at a point, a moment on a link, or both."""
 
     at: fields.PointName | None = None
+    """Point that the force acts at. Example: T"""
     force: tuple[fields.Force, fields.Force] | None = None
+    """Force [fx, fy] along the world's axes. Example: [0, -20]"""
     link: fields.LinkName | None = None
+    """Link that the moment acts on. Example: boom"""
     moment: fields.Moment | None = None
+    """Moment, counter-clockwise positive. Example: 3000"""
 
     @model_validator(mode="after")
     def _whole(self) -> Load:
@@ -219,12 +249,21 @@ class Load(fields.Model):
 
 
 class KinematicsSection(MotionSection):
-    """How does it move?"""
+    """Poses of the mechanism, its rates, and what is reported of it."""
 
     command: ClassVar[str] = "kinematics"
     jacobian: fields.CoordinateNames | None = None
+    """Outputs that are the rows of the Jacobian, as many as the drives; a point counts twice. Left out: ``outputs``, if
+    they are as many. Example: [C]
+    """
     loads: tuple[Load, ...] = ()
+    """Forces and moments that act on the mechanism; the efforts of the drives that balance them are reported. Example:
+    [{at: T, force: [0, -20]}, {link: boom, moment: 3}]
+    """
     characteristic_length: fields.PositiveLength | None = None
+    """Length as which a radian counts where the Jacobian mixes lengths and angles. Left out: that of workspace; without
+    one inverse_condition is nan there. Example: 0.1
+    """
 
     def checked(self, checker: Checker) -> Self:
         """Check the outputs as well, and what loads act on."""

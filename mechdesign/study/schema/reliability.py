@@ -42,18 +42,23 @@ def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
 
 
 class ErrorLimit(fields.Model):
-    """What an error may be: within [min, max], or (of a point) within a radius; or what the value itself may be.
-
-    `lsl` and `usl` are the lower and upper specification limit of the value, the same at all poses; an angle between
-    two of them is counted at the turn nearest to them.
+    """Bounds of an error (``min``, ``max``), of the value itself (``lsl``, ``usl``), or of a point's distance from its
+    place (``radius``). A number alone is +- about 0, two are lowest and highest error.
     """
 
     short = (fields.NUMBER_FORM, fields.PAIR_FORM)
     min: fields.Number | None = None
+    """Lowest error. Left out: none. Example: -0.05"""
     max: fields.Number | None = None
+    """Highest error. Left out: none. Example: 0.05"""
     lsl: fields.Number | None = None
+    """Lower specification limit: lowest value of the output itself, at every pose. Example: 99.9"""
     usl: fields.Number | None = None
+    """Upper specification limit: highest value of the output itself. An angle between both is counted at the turn
+    nearest to them. Example: 100.1
+    """
     radius: fields.NonNegative | None = None
+    """Of a point: distance from its nominal place that is allowed. Example: 0.05"""
 
     @model_validator(mode="before")
     @classmethod
@@ -96,10 +101,8 @@ class ErrorLimit(fields.Model):
 
 
 class Precision(fields.Model):
-    """How precise a failure probability is wanted.
-
-    ``relative`` is its coefficient of variation, standard error over value: half of its 99.7 % interval is about three
-    times that. ``half_width`` is half the interval itself.
+    """How precise a probability of failure is wanted: one of ``relative`` and ``half_width``; a number alone is
+    ``relative``.
     """
 
     bare, short = "relative", (fields.NUMBER_FORM,)
@@ -109,29 +112,31 @@ class Precision(fields.Model):
         "half_width",
     )
     relative: fields.Positive | None = None
+    """Coefficient of variation: standard error over probability of failure. Example: 0.05"""
     half_width: fields.Positive | None = None
+    """Half the width of the 99.7 % interval of the probability of failure. Example: 1e-4"""
 
 
 class Cost(fields.Model):
-    """What a tolerance T costs: a/T^exponent.
-
-    T is as the study gives it, in its units: half the width of the tolerance, sigma, or the mean radial clearance.
-    """
+    """What a tolerance T costs: a/T^exponent, T in the study's units; a number alone is ``a``."""
 
     bare, short = "a", (fields.NUMBER_FORM,)
     a: fields.Positive = 1.0
+    """Cost of a tolerance of 1. Example: 2"""
     exponent: fields.Positive = 1.0
+    """How steeply the cost rises as the tolerance falls. Example: 1.5"""
 
 
 class Allocate(fields.Model):
-    """The cheapest tolerances that reach a reliability at every pose, each by itself (not over a cycle).
-
-    All dimensions are allocated, random loads and clearances (radius and its tolerance together) where `cost` names
-    them; what it does not name costs 1/T.
-    """
+    """The cheapest tolerances that reach a reliability at every pose, each by itself (not over a cycle)."""
 
     reliability: fields.Positive
+    """Reliability that every pose must reach, between 0 and 1. Example: 0.999"""
     cost: dict[str, Cost] = Field(default_factory=dict)
+    """Cost of each tolerance, a/T^exponent, T half its width, sigma or the mean radial clearance. Dimensions that are
+    not named cost 1/T; clearances and loads that are not named are held. Example: {r1: 2, rod.length: {a: 1, exponent:
+    2}}
+    """
 
     @model_validator(mode="after")
     def _possible(self) -> Allocate:
@@ -167,22 +172,54 @@ _CORRELATION = {
 }
 
 
+_Method = Annotated[str, fields.choice(METHODS, "method of reliability")]
+
+
 class ReliabilitySection(MotionSection):
-    """How precise is it when it is really made?"""
+    """What varies when the mechanism is made, what its errors may be, and how they are computed."""
 
     command: ClassVar[str] = "reliability"
     dimensions: dict[str, Dimension] = Field(default_factory=dict)
+    """What varies, by the name of a parameter, of one place (rod.length, ground.G.y, guide.direction, slider.B.x;
+    ``*.length`` for all such), of a drive (its positioning error) or of the load (load.fx, load.fy, load.mz).
+    Example: {r1: {tolerance: 0.03, distribution: uniform}, '*.length': 0.02,
+    theta: 0.01}
+    """
     clearances: dict[str, Clearance] = Field(default_factory=dict)
+    """Clearances of pins, by their point, and of slides, by their joint. Example: {E: {radial: 0.03, tolerance: 0.01,
+    pin: normal_in_disc}}
+    """
     correlation: tuple[Annotated[Correlated, fields.Read(_correlation, _CORRELATION)], ...] = ()
+    """Pairs of names in ``dimensions`` and the correlation coefficient of their deviations, between -1 and 1. Left out:
+    independent. Example: [[r1, r2, 0.5]]
+    """
     limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
+    """What errors may be, by coordinate or point; of velocities and accelerations C.x_velocity and so on. The
+    reliability is the chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]} Example: {P: {radius:
+    0.05}}
+    """
     load: tuple[fields.Number, ...] | None = None
-    methods: Annotated[
-        tuple[Annotated[str, fields.choice(METHODS)], ...], BeforeValidator(fields.as_list), fields.OrShort()
-    ] = DEFAULT_METHODS
+    """Mean load [fx, fy, mz] on the stiffness section's point, whose deflection is part of the errors; it varies by
+    ``dimensions``. Left out: none. Example: [0, -60, 0]
+    """
+    methods: Annotated[tuple[_Method, ...], BeforeValidator(fields.as_list), fields.OrShort()] = DEFAULT_METHODS
+    """How errors and reliability are computed; one alone needs no list. Example: [analytic, monte_carlo]"""
     samples: Annotated[int, fields.whole(2, 10**15)] = 40_000
+    """Made mechanisms of each sampling method at each pose; of auto the most. Left out, auto takes at most 2,000,000.
+    Example: 100000
+    """
     precision: Precision | None = None
+    """Precision at which auto ends. Left out: relative 0.05. Example: 0.01"""
     sobol: Annotated[int, fields.whole(0, 10**9)] | None = None
+    """Sample size of the Sobol' indices, at every pose; 0: none. Left out: they are computed at the first listed poses,
+    where a method samples. Example: 4096
+    """
     allocate: Allocate | None = None
+    """Asks for the cheapest tolerances that reach a reliability at every pose. Example: {reliability: 0.999, cost: {r1:
+    2}}
+    """
+    shown: Annotated[int, fields.whole(1, 10**9)] | None = None
+    """The pose, by its number from 1, at which samples are shown; left out, the one that fails most. Example: 1"""
 
     def checked(self, checker: Checker) -> Self:
         """Check what varies and what is limited as well; wildcards and the clearances' links are filled in."""
@@ -215,6 +252,9 @@ class ReliabilitySection(MotionSection):
                     "change gradually; ask for monte_carlo or quasi_monte_carlo, or another pin model"
                 )
                 checker.report(("reliability", "methods", index), message)
+        if self.shown is not None and not any(METHODS[method].sampled for method in self.methods):
+            message = "no method draws samples that could be shown; ask for monte_carlo, say, or leave it out"
+            checker.report(("reliability", "shown"), message, at_key=True)
         if self.allocate is not None:
             _allocate(checker, self, dimensions, clearances)
         load = _load(checker, self, dimensions)

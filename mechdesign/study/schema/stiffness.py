@@ -15,34 +15,36 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number
 
-_ELASTIC = (
-    "The section of each link that bends; links not named are rigid. A link given by its ends is a beam from the first "
-    "to the second, and its other points are brackets: rigid from their foot on the beam, beyond an end from that end. "
-    "A link given by its points alone is beams along them in the order listed. A slide on a link rides on its beams at "
-    "the foot of its current place. A telescopic leg is a cantilever of its current length from its first end."
-)
 # Keys of each kind of section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
 
 class Profile(fields.Model):
-    """A cross-section: a rectangle (its height lies in the plane), a bar or a tube, or its area and inertia.
-
-    ``shear: true`` adds the compliance of shear by Timoshenko's theory, with the factor of the section's form (Cowper
-    1966, with Poisson's ratio 0: 5/6 of a rectangle, 6/7 of a round bar, 1/2 of a thin tube), or a given one.
-    """
+    """A cross-section: {E, width, height}, {E, diameter}, {E, diameter, inner_diameter} or {E, area, inertia}."""
 
     E: fields.PositiveStress
+    """Young's modulus. Example: 200 GPa"""
     G: fields.PositiveStress | None = None
+    """Shear modulus; with ``shear: true``. Example: 80 GPa"""
     width: fields.PositiveLength | None = None
+    """Side of a rectangle across the plane of motion. Example: 20 mm"""
     height: fields.PositiveLength | None = None
+    """Side of a rectangle in the plane of motion, in which it bends. Example: 40 mm"""
     diameter: fields.PositiveLength | None = None
+    """Outer diameter of a round bar or tube. Example: 30 mm"""
     inner_diameter: fields.PositiveLength | None = None
+    """Inner diameter of a tube. Left out: a full bar. Example: 26 mm"""
     area: fields.PositiveArea | None = None
+    """Area of any other section. Example: 800 mm^2"""
     inertia: fields.PositiveInertia | None = None
+    """Second moment of area for bending in the plane. Example: 1e5 mm^4"""
     shear: bool = False
+    """Whether shear gives too (Timoshenko's beam)."""
     shear_factor: fields.Positive | None = None
+    """Shear factor. Left out: that of the form by Cowper (1966), Poisson's ratio 0: 5/6 of a rectangle, 6/7 of a round
+    bar, 1/2 of a thin tube; 5/6 of {area, inertia}. Example: 0.85
+    """
 
     @model_validator(mode="after")
     def _one_form(self) -> Profile:
@@ -74,11 +76,13 @@ class Profile(fields.Model):
 
 
 class Bearing(fields.Model):
-    """Stiffness of a joint itself: across, and of a slide also against turning; what is not given is rigid."""
+    """Stiffness of a joint itself; what is not given is rigid, and a number alone is ``radial``."""
 
     bare, short = "radial", (fields.NUMBER_FORM,)
     radial: fields.PositiveNumber | None = None
+    """Force per displacement: of a pin in any direction, of a slide across its line. Example: 1e5 N/mm"""
     moment: fields.PositiveNumber | None = None
+    """Moment per radian against turning, of a slide. Example: 1e6 N*m/rad"""
 
     @model_validator(mode="after")
     def _some(self) -> Bearing:
@@ -98,25 +102,44 @@ def _series(raw: Any, context: Context) -> float:
     return 1.0 / sum(1.0 / part for part in parts)
 
 
-_SERIES = {
-    "anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}],
-    "description": "a stiffness, or those of what is in series",
-}
+_SERIES = {"anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}]}
 
 
 class StiffnessSection(PoseSection):
-    """How stiff is it?"""
+    """What bends, turns or gives, and the point at which stiffness and deflections are asked."""
 
     command: ClassVar[str] = "stiffness"
     link: fields.LinkName | None = None
-    at: fields.PointName = Field(description="the point whose stiffness is asked")
+    """Link whose stiffness is asked, as a body. Left out: the pin ``at`` alone, which has dx and dy only. Example:
+    platform
+    """
+    at: fields.PointName
+    """The point whose stiffness is asked. Example: P"""
     sections: dict[str, Profile] = Field(default_factory=dict)
-    elastic: dict[fields.LinkName, str] = Field(default_factory=dict, description=_ELASTIC)
-    actuators: dict[fields.AnyName, Annotated[float, fields.Read(_series, _SERIES)]] = Field(default_factory=dict)
-    bearings: dict[fields.AnyName, Bearing] = Field(default_factory=dict)
+    """Cross-sections by name, for ``elastic``. Example: {beam: {E: 200 GPa, width: 20 mm, height: 40 mm}}"""
+    elastic: dict[fields.LinkName, str] = Field(default_factory=dict)
+    """Section of each link that bends; other links are rigid. A link is a beam from ``from`` to ``to``, its other
+    points brackets, rigid from their foot on it; a link of points alone is beams along them as listed; a telescopic one
+    a cantilever from ``from``. Example: {leg_1: beam, leg_2: beam}
+    """
+    actuators: dict[fields.DriveName, Annotated[float, fields.Read(_series, _SERIES)]] = Field(default_factory=dict)
+    """Stiffness of each drive that gives, or a list of those in series; other drives are rigid. A bare one of an angle
+    is moment per radian. Example: {l1: 5e7, theta1: 1e5 N*m/rad} Example: {theta: [3e4 N*m/rad, 1.5e4 N*m/rad]}
+    """
+    bearings: dict[fields.BearingName, Bearing] = Field(default_factory=dict)
+    """Stiffness of pins (by their point) and slides (by their joint or telescopic link); others are rigid. Example: {B:
+    1e5 N/mm, guide: {radial: 2e5 N/mm, moment: 1e6 N*m/rad}}
+    """
     direction: fields.Angle | None = None
+    """Angle from the world's x axis of the direction whose stiffness is k_direction. Left out: that column is not
+    there. Example: 90
+    """
     loads: tuple[tuple[fields.Number, ...], ...] = ()
+    """Loads on the point, [fx, fy, mz]; their deflections are reported. Without ``link`` [fx, fy] is enough. Example:
+    [[100, 0, 0], [0, 100, 0]]
+    """
     characteristic_length: fields.PositiveLength | None = None
+    """Length as which a radian counts; then the eigen-stiffnesses of ``link`` are reported. Example: 0.1"""
 
     def checked(self, checker: Checker) -> Self:
         """Check what is named as well, and the units of stiffnesses; loads get three numbers."""

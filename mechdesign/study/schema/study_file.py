@@ -6,8 +6,6 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from pydantic import Field
-
 from mechdesign.errors import Problem, StudyError, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement
@@ -17,27 +15,35 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, read
+from mechdesign.study.text.forms import Generator, name_forms
 from mechdesign.study.text.reporter import LIST_FORM, schema_fields
 
 
 class StudyFile(fields.Model):
-    """The whole study file."""
+    """A design study: a mechanism, and the questions asked of it."""
 
     name: str | None = None
+    """Name in titles and of the folder of results. Left out: the file's name. Example: Offset slider-crank"""
     units: UnitsSection = UnitsSection()
     seed: Annotated[int, fields.whole(0)] = 0
+    """Seed of the random numbers; ``--seed`` goes before. Example: 1"""
     mechanism: MechanismSection
     kinematics: KinematicsSection | None = None
     workspace: WorkspaceSection | None = None
     optimize: OptimizeSection | None = None
     reliability: ReliabilitySection | None = None
     stiffness: StiffnessSection | None = None
-    requirements: tuple[Requirement, ...] = Field((), description="the gate: the worst row of each result counts")
+    requirements: tuple[Requirement, ...] = ()
+    """The gate: results that must keep bounds, or the exit code is 1. The worst row of each counts. Example: [{result:
+    kinematics.mu, abs: true, at_least: 40}, {result: reliability.reliability, where: {method: monte_carlo}, at_least:
+    0.99}]
+    """
 
 
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of a study file, with which editors complete and check."""
-    found = StudyFile.model_json_schema(by_alias=True, mode="validation")
+    found = StudyFile.model_json_schema(by_alias=True, schema_generator=Generator, mode="validation")
+    name_forms(found)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "mechdesign study"}
     return head | {key: value for key, value in found.items() if key not in head}
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
@@ -24,11 +24,27 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.units import QuantityError
 
-DISTRIBUTIONS = ("normal", "truncated_normal", "uniform", "triangular", "lognormal")
+DISTRIBUTIONS = {
+    "normal": "normal; the tolerance is three standard deviations",
+    "truncated_normal": "as normal, and cut at the ends of the tolerance",
+    "uniform": "equally likely over the whole tolerance",
+    "triangular": "over the tolerance, most likely at the nominal value",
+    "lognormal": "mean and deviation of normal; the value itself is lognormal and stays positive",
+}
 BETA = "beta"
+_OF_DIMENSIONS = {**DISTRIBUTIONS, BETA: "beta over the tolerance, with two shape parameters, 'shape'"}
 # Least number of measured values.
 MIN_MEASURED = 10
-PIN_MODELS = ("normal", "normal_in_disc", "uniform", "contact")
+PIN_MODELS = {
+    "normal": "x and y of the pin normal, the clearance three standard deviations; of a slider each end",
+    "normal_in_disc": "as normal, and cut at the circle of the clearance; of a slider at its walls",
+    "uniform": "anywhere in the circle of the clearance alike; of a slider each end between its walls",
+    "contact": "pin at the hole's wall, in any direction alike; of a slider each end at one wall or the other",
+}
+_EFFECTS = {
+    "offset": "moves the joint's point in the link's frame, by x and y",
+    "length": "changes the length r of a binary link alone, to sqrt((r + x)^2 + y^2)",
+}
 # A lowest clearance so little below zero counts as zero.
 CLEARANCE_ROUNDING = 1e-9
 
@@ -87,12 +103,9 @@ def _tolerance(raw: Any, context: Context) -> tuple[float, float]:
     return low, high
 
 
-_TOLERANCE = {
-    "anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM],
-    "description": "a half-width, or the lowest and highest deviation",
-}
+_TOLERANCE = {"anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM]}
 Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
-_CLASSED = {**_TOLERANCE, "description": "a half-width, the lowest and highest deviation, or a class: js9, ISO 2768-m"}
+_CLASSED = {"anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM, {**fields.NAME_FORM, "title": "tolerance class"}]}
 
 
 class Fit(NamedTuple):
@@ -123,34 +136,40 @@ def _fit(raw: Any, context: Context) -> Fit:
     return Fit(raw, 0.5 * (least + most) * millimetre, *halves)
 
 
-_FIT = {**fields.NAME_FORM, "description": "such as 20 H7/g6"}
+_FIT = {**fields.NAME_FORM, "title": "fit"}
 
 
 class Dimension(fields.Model):
-    """A dimension's variation: nominal +- tolerance, its standard deviation, or measured values.
-
-    Of a tolerance ``normal`` makes three standard deviations, ``truncated_normal`` the same and cuts there; ``uniform``
-    fills it, ``triangular`` peaks at the nominal value, ``lognormal`` has the mean and the deviation of ``normal``,
-    ``beta`` has two shape parameters between its ends. A class, ``h7`` of ISO 286-1 or ``ISO 2768-m``, gives the
-    deviations for the dimension's nominal size; for an angle by the length of its shorter `leg`.
-
-    `measured` is a file of measured values of the dimension, in the study's units: one a line, or a `column`. What they
-    deviate from is the dimension's own nominal value (of a drive or a load 0), or `nominal`. What is sampled is drawn
-    from their interpolated distribution, beyond whose ends nothing lies.
+    """How a dimension varies: one of ``tolerance``, ``sigma`` and ``measured``; a number or two alone are a tolerance,
+    normal.
     """
 
     bare, short = "tolerance", (fields.NUMBER_FORM, fields.PAIR_FORM)
     one_of = ("a dimension needs either 'tolerance', 'sigma' or 'measured'", "tolerance", "sigma", "measured")
     tolerance: Annotated[tuple[float, float] | ToleranceClass, fields.Read(_tolerance_or_class, _CLASSED)] | None = None
+    """Half-width of the deviations; two numbers, the lowest and the highest; or a class of ISO 286 or ISO 2768 for the
+    dimension's nominal size. Example: 0.03 Example: [-0.1, 0.3] Example: js9 Example: ISO 2768-m
+    """
     sigma: fields.NonNegative | None = None
-    distribution: Annotated[str, fields.choice((*DISTRIBUTIONS, BETA))] = "normal"
+    """Standard deviation, in place of a tolerance. Example: 0.01"""
+    distribution: Annotated[str, fields.choice(_OF_DIMENSIONS, "distribution")] = "normal"
+    """Distribution of the deviations."""
     shape: (
         Annotated[tuple[fields.Positive, fields.Positive], fields.pair_of("two shape parameters such as [2, 5]")] | None
-    ) = Field(None, description="shape parameters of a beta distribution over the tolerance")
+    ) = None
+    """The two shape parameters of a beta distribution. Example: [2, 5]"""
     leg: fields.PositiveLength | None = None
-    measured: str | None = Field(None, description="a file of measured values, one a line or a column")
-    column: str | None = Field(None, description="the column of measured values, by its name in the first line")
-    nominal: fields.Number | None = Field(None, description="what measured values deviate from; 0 of deviations")
+    """Length of an angle's shorter leg, by which ISO 2768 gives its tolerance. Example: 50 mm"""
+    measured: str | None = None
+    """CSV file beside the study with measured values of the dimension, in the study's units, |MIN_MEASURED| or more:
+    one a line or a ``column``. Samples follow their distribution. Example: lengths.csv
+    """
+    column: str | None = None
+    """Column of measured values, by its name in the first line. Left out: the file's only one. Example: L1"""
+    nominal: fields.Number | None = None
+    """What measured values deviate from; 0 where they are deviations. Left out: the dimension's own nominal value (of a
+    drive or load 0). Example: 0
+    """
 
     @model_validator(mode="after")
     def _fitting(self) -> Self:
@@ -193,11 +212,13 @@ class Dimension(fields.Model):
 
 
 class PinModel(fields.Model):
-    """How a pin lies in its hole, for each method."""
+    """How a pin lies in its hole, for each kind of method; a word alone is for both."""
 
-    short = ({"enum": list(PIN_MODELS)},)
-    analytic: Annotated[str, fields.choice(PIN_MODELS)] = "normal"
-    monte_carlo: Annotated[str, fields.choice(PIN_MODELS)] = "normal"
+    short = ({"enum": list(PIN_MODELS), "title": "pin model"},)
+    analytic: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
+    """Model of the methods that compute: analytic, second_order."""
+    monte_carlo: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
+    """Model of the methods that sample, and of form."""
 
     @model_validator(mode="before")
     @classmethod
@@ -206,25 +227,34 @@ class PinModel(fields.Model):
 
 
 class Clearance(fields.Model):
-    """The clearance of a pin joint or a slide; exactly one of radial and diametral, to which the tolerance belongs, or
-    a fit of ISO 286-1, which has the tolerances of its hole and shaft.
-
-    The pin moves in `link` (left out, the last link of the joint that no output is said to be of); the coordinates of
-    its point are those of the other links. An output or a limit may name the link that it is about: ``coupler.P.x``.
-    A slider of a `length`, centred on the joint's point, shifts and tilts: each end lies within the radial clearance
-    across the line. A pin in a slot shifts only.
+    """Clearance of a pin or slide: one of ``radial``, ``diametral`` and ``fit``. Coordinates of a pin's point are those
+    of the links in which it does not move; an output may name its link, coupler.P.x.
     """
 
     one_of = ("a clearance needs either 'radial' or 'diametral', or a 'fit'", "radial", "diametral", "fit")
     radial: fields.NonNegativeLength | None = None
+    """Mean radial clearance: half the difference of the diameters; of a slide its play on either side. Example: 0.03"""
     diametral: fields.NonNegativeLength | None = None
+    """Mean difference of the diameters of hole and pin. Example: 0.06"""
     fit: Annotated[Fit, fields.Read(_fit, _FIT)] | None = None
+    """Fit of ISO 286-1 with its size in mm; tolerances of hole and shaft follow. Example: 20 H7/g6"""
     tolerance: Tolerance = (0.0, 0.0)
-    distribution: Annotated[str, fields.choice(DISTRIBUTIONS)] = "normal"
+    """How far the clearance given (radial or diametral) deviates: a half-width, or the lowest and highest. A fit has
+    its own. Example: 0.01
+    """
+    distribution: Annotated[str, fields.choice(DISTRIBUTIONS, "distribution")] = "normal"
+    """Distribution of the clearance over its tolerance; of a fit normal or uniform."""
     pin: PinModel = PinModel()
     link: fields.LinkName | None = None
-    effect: Annotated[str, fields.choice(("offset", "length"))] = "offset"
+    """Link in which the pin moves. Left out: the last link at the joint that no output is said to be of. Example:
+    forearm
+    """
+    effect: Annotated[str, fields.choice(_EFFECTS, "effect of a clearance")] = "offset"
+    """What the pin's place changes."""
     length: fields.PositiveLength | None = None
+    """Length of a slider in its guide, centred on the joint's point: it shifts and tilts. Prismatic joints need it; no
+    others have it. Example: 40
+    """
 
     @property
     def radius(self) -> float:

@@ -15,15 +15,30 @@ from mechdesign.study.text.fields import failure
 
 # A turn written with few digits (6.2832 rad) is one, as far as so small a part of it.
 WHOLE = 3e-6
+_RULES = {
+    "gauss": "adaptive, to a tolerance, with an error estimate",
+    "midpoint": "so many rays and nodes, at the middles of equal steps, weighted by area; for comparison",
+    "sector_mean": "plain mean of equally spaced nodes along each ray, rays weighted by their sectors' area [S1]",
+}
+_ASSEMBLIES = {
+    "same": "at singularities, where another assembly begins; of several pieces that of the sketch counts",
+    "any": "nowhere else: places reached in the other assembly count as well",
+}
 
 
 class Scan(fields.Model):
-    """Rays about a point; angles in the study's unit."""
+    """Rays that the region is looked at along; left out, all round the point's place in the sketch."""
 
     about: tuple[fields.Length, fields.Length] | None = None
+    """Centre of the rays, [x, y]. Left out: the point's place in the sketch. Example: [0, 0]"""
     from_: fields.Angle | None = Field(None, alias="from")
+    """Angle of the first ray, from the x axis, together with ``to``. Left out: all round. Example: 0"""
     to: fields.Angle | None = None
+    """Angle of the last ray, at most a turn beyond ``from``. Example: 180"""
     rays: Annotated[int, fields.whole(2, 1_000_000)] | None = None
+    """How many rays the tables have, and the rules midpoint and sector_mean. Left out: 181 in the tables, 300 of
+    midpoint, 101 of sector_mean. Example: 241
+    """
 
     @field_validator("to")
     @classmethod
@@ -40,11 +55,14 @@ class Scan(fields.Model):
 
 
 class Integrate(fields.Model):
-    """The rule of integration over the workspace."""
+    """The rule by which means over the workspace are integrated."""
 
-    rule: Annotated[str, fields.choice(("gauss", "midpoint", "sector_mean"))] = "gauss"
+    rule: Annotated[str, fields.choice(_RULES, "rule of integration")] = "gauss"
+    """How means over the region are integrated."""
     tolerance: fields.Positive = 1e-5
+    """Relative error of gauss. Left out, each design of optimize has 1e-4. Example: 1e-6"""
     nodes: Annotated[int, fields.whole(1, 100_000)] | None = None
+    """Nodes along each ray, of midpoint and sector_mean. Left out: 200 and 49. Example: 49"""
 
     @model_validator(mode="after")
     def _fitting(self) -> Integrate:
@@ -54,11 +72,16 @@ class Integrate(fields.Model):
 
 
 class Over(fields.Model):
-    """A range of a held coordinate: the region in which some value of it is reached, or every one."""
+    """A range of a held coordinate: the places reached at some value of it, or at every one. It gives areas, no
+    indices.
+    """
 
     from_: fields.Number = Field(alias="from")
+    """Lowest value, in the coordinate's unit. Example: -20"""
     to: fields.Number
+    """Highest value. Example: 20"""
     all: bool = False
+    """Whether every value of the range must be reached, rather than some value."""
 
 
 def _form(raw: Any) -> str:
@@ -68,19 +91,31 @@ def _form(raw: Any) -> str:
 At = Annotated[Annotated[Over, Tag("over")] | Annotated[fields.Numbers, Tag("values")], Discriminator(_form)]
 
 
+_Index = Annotated[str, fields.choice(INDEX_NAMES, "local index")]
+
+
 class WorkspaceSection(fields.Model):
-    """Where can it work?"""
+    """The region that a point can reach, and indices of how well the mechanism works there."""
 
     point: fields.PointName
+    """Point whose region is asked for; the mechanism has two degrees of freedom or more. Example: C"""
     at: dict[fields.CoordinateName, At] = Field(default_factory=dict)
+    """Coordinates that are held where the mobility is beyond two, as many as it is beyond: one value, a list (a region
+    each) or a range {from, to}. Example: {platform.angle: [0, 15]} Example: {platform.angle: {from: -20, to: 20, all:
+    true}}
+    """
     scan: Scan = Field(default_factory=lambda: Scan.model_validate({}))
     integrate: Integrate = Integrate()
     margin: fields.NonNegativeAngle = 0.0
-    assembly: Annotated[str, fields.choice(("same", "any"))] = "same"
+    """Angle at both ends of the scan that the means leave out. Example: 0.5"""
+    assembly: Annotated[str, fields.choice(_ASSEMBLIES, "assembly")] = "same"
+    """Where the region ends besides the reach and the limits."""
     characteristic_length: fields.PositiveLength | None = None
-    indices: (
-        Annotated[tuple[Annotated[str, fields.choice(INDEX_NAMES)], ...], BeforeValidator(fields.as_list)] | None
-    ) = None
+    """Length as which a radian counts. Needed where the Jacobian mixes lengths and angles. Example: 0.1"""
+    indices: Annotated[tuple[_Index, ...], BeforeValidator(fields.as_list), fields.OrShort()] | None = None
+    """Local indices that are evaluated; one alone needs no list. Left out: the usual ones, of the Jacobian. Example:
+    [inverse_condition, k_min]
+    """
 
     def checked(self, checker: Checker) -> Self:
         """Check names, units and ranges against the mechanism."""

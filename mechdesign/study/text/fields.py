@@ -6,25 +6,32 @@ reader gets a `Context` and raises with a message for a designer; its JSON Schem
 
 from __future__ import annotations
 
+import ast
+import inspect
 import math
 import re
+import sys
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Self
+from functools import cache
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.study.text.document import read
 from mechdesign.study.text.units import QUANTITY, QuantityError, Units
 
 Form = dict[str, Any]
-"""JSON Schema of a part of the study."""
-NAME_FORM: Form = {"type": "string"}
+"""JSON Schema of a part of the study; a title says in words what is accepted."""
+NAME_FORM: Form = {"type": "string", "title": "name"}
 NAMES_FORM: Form = {"type": "array", "items": NAME_FORM}
-NUMBER_FORM: Form = {"type": ["number", "string"]}
+NUMBER_FORM: Form = {"type": ["number", "string"], "title": "number"}
 PAIR_FORM: Form = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxItems": 2}
 
 NAME = re.compile(r"[^\W\d]\w*")
@@ -186,10 +193,17 @@ def pair_of(what: str) -> BeforeValidator:
 
 @dataclass(frozen=True, eq=False)
 class Read:
-    """Annotation of a value that a function reads, and the JSON Schema of what it accepts."""
+    """Annotation of a value that a function reads, and the JSON Schema of what it accepts.
+
+    Of a number `kind` is that of `units.KINDS`, if it is the same everywhere; of a word out of a list `words` are its
+    meanings, and `what` is what they are.
+    """
 
     function: Callable[[Any, Context], Any]
     accepted: Form | Callable[[], Form]
+    kind: str = ""
+    words: Mapping[str, Any] | None = None
+    what: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_plain_validator_function(
@@ -198,9 +212,6 @@ class Read:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         return self.accepted() if callable(self.accepted) else dict(self.accepted)
-
-
-NUMBER_READ: Form = {**NUMBER_FORM, "description": "a number, a quantity or an expression"}
 
 
 def number(
@@ -222,7 +233,7 @@ def number(
             raise failure(f"must be {what}, not {size:g}")
         return found if value else size
 
-    return Read(read, NUMBER_READ)
+    return Read(read, NUMBER_FORM, kind or "")
 
 
 def whole(minimum: int = 0, maximum: int | None = None) -> Read:
@@ -244,7 +255,8 @@ def whole(minimum: int = 0, maximum: int | None = None) -> Read:
             raise failure(f"must be at most {maximum}, not {shown(found)}")
         return found
 
-    return Read(read, {"type": ["integer", "number", "string"], "minimum": minimum})
+    form = {"type": ["integer", "number", "string"], "minimum": minimum, "title": "whole number"}
+    return Read(read, form, "none")
 
 
 def name_of(what: str, pattern: re.Pattern[str] = NAME) -> Read:
@@ -256,11 +268,11 @@ def name_of(what: str, pattern: re.Pattern[str] = NAME) -> Read:
         rule = "; a name is letters, digits and underscores, with a letter first" if isinstance(raw, str) else ""
         raise failure(f"expected the name of {what}, not {shown(raw)}{rule}")
 
-    return Read(read, {**NAME_FORM, "description": f"the name of {what}"})
+    return Read(read, {**NAME_FORM, "title": what.partition(" ")[2].partition(" (")[0]})
 
 
-def choice(words: Collection[str]) -> Read:
-    """Annotation of a word out of a list."""
+def choice(words: Mapping[str, Any], what: str) -> Read:
+    """Annotation of a word out of a list, each with its meaning (or what has one); `what` is what they are."""
 
     def read(raw: Any, context: Context) -> str:
         if isinstance(raw, str) and raw in words:
@@ -268,7 +280,15 @@ def choice(words: Collection[str]) -> Read:
         hint = suggestion(raw, words) if isinstance(raw, str) else ""
         raise failure(f"expected one of {', '.join(words)}, not {shown(raw)}{hint}")
 
-    return Read(read, lambda: {"enum": list(words)})
+    def form() -> Form:
+        return {"title": what, "enum": list(words), "enumDescriptions": [meaning(words[word]) for word in words]}
+
+    return Read(read, form, words=words, what=what)
+
+
+def meaning(declared: Any) -> str:
+    """The meaning of a word that is declared with one."""
+    return declared if isinstance(declared, str) else str(declared.meaning)
 
 
 class OrShort:
@@ -285,8 +305,47 @@ class OrShort:
         return {"anyOf": [found, *(self.forms or [found["items"]])]}
 
 
+class KeyText(NamedTuple):
+    """What the docstring under an attribute of a model says: text in one line, and examples as a study writes them."""
+
+    text: str
+    examples: tuple[str, ...] = ()
+
+
+_CONSTANT = re.compile(r"\|([A-Z_]+)\|")
+_EXAMPLE = " Example: "
+
+
+@cache
+def _texts(module: str) -> Mapping[tuple[str, str], KeyText]:
+    """Docstrings under the attributes of a module's models, by class and attribute; ``|NAME|`` is a constant of it.
+
+    They are read where a reference or a JSON Schema is asked for only: pydantic would read them at every start.
+    """
+    found = {}
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    for holder in (each for each in tree.body if isinstance(each, ast.ClassDef)):
+        for key, below in pairwise(holder.body):
+            if not isinstance(key, ast.AnnAssign) or not isinstance(key.target, ast.Name):
+                continue
+            if not isinstance(below, ast.Expr) or not isinstance(below.value, ast.Constant):
+                continue
+            text, *examples = " ".join(str(below.value.value).split()).split(_EXAMPLE)
+            text = _CONSTANT.sub(lambda name: str(getattr(sys.modules[module], name[1])), text)
+            found[holder.name, key.target.id] = KeyText(quoted(text), tuple(examples))
+    return found
+
+
+def quoted(text: str) -> str:
+    """A text of a docstring as messages have it: ``from`` is 'from'."""
+    return text.replace("``", "'")
+
+
 class Model(BaseModel):
-    """Base of all sections: frozen, unknown keys are errors, values come in study units."""
+    """Base of all sections: frozen, unknown keys are errors, values come in study units.
+
+    The docstring under an attribute is the description of its key; after it ``Example:`` may stand, also repeatedly.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
     bare: ClassVar[str] = ""  # key of a value that is written alone, instead of a mapping
@@ -315,9 +374,32 @@ class Model(BaseModel):
         return self.given(*self.one_of[1:])[0]
 
     @classmethod
+    def said_of_all(cls) -> str:
+        """What the section is, in one line."""
+        return quoted(" ".join((cls.__doc__ or "").split()))
+
+    @classmethod
+    def fields_by_key(cls) -> dict[str, FieldInfo]:
+        """Fields by their keys in the text."""
+        return {field.alias or name: field for name, field in cls.model_fields.items()}
+
+    @classmethod
+    def said(cls, key: str) -> KeyText:
+        """What is said of a key; nothing where there is nothing."""
+        name = next((name for name, field in cls.model_fields.items() if (field.alias or name) == key), key)
+        texts = (_texts(holder.__module__).get((holder.__name__, name)) for holder in cls.__mro__[:-1])
+        return next(filter(None, texts), KeyText(""))
+
+    @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         found = handler(schema)
-        return {"anyOf": [dict(handler.resolve_ref_schema(found)), *cls.short]} if cls.short else found
+        form = handler.resolve_ref_schema(found)
+        form["description"] = cls.said_of_all()
+        for key in cls.fields_by_key():
+            text, examples = cls.said(key)
+            told = {"description": text, "examples": [read(each.encode(), key).data for each in examples]}
+            form["properties"][key].update({name: value for name, value in told.items() if value})
+        return {"anyOf": [dict(form), *cls.short]} if cls.short else found
 
 
 Number = Annotated[float, number()]
@@ -340,14 +422,15 @@ LengthValue = Annotated[StudyNumber, number("length", value=True)]
 PositiveLengthValue = Annotated[StudyNumber, number("length", 0.0, exclusive=True, value=True)]
 AngleValue = Annotated[StudyNumber, number("angle", value=True)]
 AnyValue = Annotated[StudyNumber, number(value=True)]
-Bound = Annotated[Expression, Read(read_expression, NUMBER_READ)]
+Bound = Annotated[Expression, Read(read_expression, NUMBER_FORM)]
 
 LinkName = Annotated[str, name_of("a link")]
 PointName = Annotated[str, name_of("a point")]
 JointName = Annotated[str, name_of("a joint")]
 DriveName = Annotated[str, name_of("a drive")]
 MeasureName = Annotated[str, name_of("a measure")]
-AnyName = Annotated[str, name_of("a link, leg or joint")]
+BearingName = Annotated[str, name_of("a point, joint or leg")]
 CoordinateName = Annotated[str, name_of("a coordinate (such as C.x or rod.angle)", COORDINATE)]
+PlaceName = Annotated[str, name_of("a parameter or dimension", COORDINATE)]
 CoordinateNames = Annotated[tuple[CoordinateName, ...], BeforeValidator(as_list), OrShort()]
 Numbers = Annotated[tuple[Number, ...], BeforeValidator(as_list), OrShort()]

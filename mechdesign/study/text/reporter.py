@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, Tag, ValidationError
+from pydantic import Tag, ValidationError
 from pydantic.fields import FieldInfo
 
 from mechdesign.errors import Problem, StudyError, nearest, suggestion
 from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
-from mechdesign.study.text.fields import LOST, shown
+from mechdesign.study.text.fields import LOST, Model, shown
 from mechdesign.study.text.units import QUANTITY, QuantityError, measure
 
 # A link written as a list has its keys at these places.
@@ -149,7 +149,7 @@ class Reporter:
                 found.append(segment)
         return tuple(found)
 
-    def report_validation(self, error: ValidationError, root: type[BaseModel], prefix: KeyPath) -> None:
+    def report_validation(self, error: ValidationError, root: type[Model], prefix: KeyPath) -> None:
         """Note every error of the validation of the part at `prefix`, in words."""
         for item in error.errors(include_url=False):
             location = (*prefix, *item["loc"])
@@ -161,9 +161,7 @@ class Reporter:
                 known = schema_fields(root, location[:-1])
                 self.report(location, unknown_key(str(location[-1]), known), at_key=True)
             elif kind == "missing":
-                field = schema_fields(root, location[:-1]).get(str(location[-1]))
-                meaning = f": {field.description}" if field is not None and field.description else ""
-                self.report(location, f"is missing{meaning}", at_key=True)
+                self.report(location, f"is missing{_meaning(root, location)}", at_key=True)
             else:
                 message = item["msg"] if kind == "study" else f"expected {_EXPECTED[kind]}, not {shown(item['input'])}"
                 if kind in _MAPPINGS and isinstance(item["input"], str) and ":" in item["input"]:
@@ -173,7 +171,7 @@ class Reporter:
                 location = location if has(self.raw(holder), last) else tuple(holder)
                 self.report(location, message, at_key=at_key)
 
-    def mended(self, error: ValidationError, root: type[BaseModel], key: str, raw: Any) -> Any:
+    def mended(self, error: ValidationError, root: type[Model], key: str, raw: Any) -> Any:
         """The data of a top-level part with the mistakes of a validation taken out, as far as that is possible.
 
         Wrong numbers are lost, unknown keys take the name that they resemble or are left out.
@@ -195,8 +193,22 @@ class Reporter:
         return part
 
 
-def schema_fields(root: type[BaseModel], location: Sequence[str | int]) -> dict[str, FieldInfo]:
+def _meaning(root: type[Model], location: Sequence[str | int]) -> str:
+    """The first sentence about the key at a location of the schema, to stand in a message."""
+    model = _model(root, location[:-1])
+    text = "" if model is None else model.said(str(location[-1])).text
+    sentence = text.partition(". ")[0].removesuffix(".")
+    return f": {sentence[0].lower()}{sentence[1:]}" if sentence else ""
+
+
+def schema_fields(root: type[Model], location: Sequence[str | int]) -> dict[str, FieldInfo]:
     """Fields, by their keys in the text, of the model at a location of the schema; none where there is no model."""
+    model = _model(root, location)
+    return {} if model is None else model.fields_by_key()
+
+
+def _model(root: type[Model], location: Sequence[str | int]) -> type[Model] | None:
+    """The model at a location of the schema, None where there is none."""
     current: Any = root
     for segment in (*location, None):
         tagged = False
@@ -207,12 +219,12 @@ def schema_fields(root: type[BaseModel], location: Sequence[str | int]) -> dict[
             current, tagged = (named or arms)[0], bool(named)
         if tagged:
             continue
-        model = isinstance(current, type) and issubclass(current, BaseModel)
-        fields = {field.alias or name: field for name, field in current.model_fields.items()} if model else {}
+        model = current if isinstance(current, type) and issubclass(current, Model) else None
         if segment is None:
-            return fields
+            return model
         if get_origin(current) in (dict, tuple):
             current = get_args(current)[-1 if get_origin(current) is dict else 0]
         else:
-            current = fields[str(segment)].annotation if segment in fields else None
-    return {}
+            field = None if model is None else model.fields_by_key().get(str(segment))
+            current = None if field is None else field.annotation
+    return None

@@ -100,6 +100,12 @@ joule = newton * meter = J
 _MEANT = {"u/min": "rpm", "upm": "rpm", "tr/min": "rpm", "rev/min": "rpm", "grad": "deg", "sek": "s", "zoll": "in"}
 
 
+def listed() -> dict[str, tuple[str, tuple[str, ...]]]:
+    """Units and prefixes (``kilo-``) by name: what each is, and the other ways to write it."""
+    lines = [[part.strip() for part in line.split(" = ")] for line in _DEFINITIONS.strip().splitlines()]
+    return {name: (meaning.replace(" ** ", "^"), tuple(others)) for name, meaning, *others in lines}
+
+
 class QuantityError(ValueError):
     """A quantity that cannot be read or converted; the message says why."""
 

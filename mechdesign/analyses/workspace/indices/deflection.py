@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechdesign.analyses.workspace.index import Evaluate, Index, of_compliance
+from mechdesign.analyses.workspace.index import Evaluate, Index, length, of_compliance
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
 
@@ -37,5 +37,5 @@ def prepare(study: Study) -> Evaluate:
 
 INDEX = Index(
     "largest displacement of the stiffness section's point under its loads", prepare,
-    lambda study, field: study.units.label("length"), crossing=float("inf"), section="stiffness",
+    length, crossing=float("inf"), section="stiffness",
 )  # fmt: skip

@@ -2,8 +2,7 @@
 
 from mechdesign.analyses.workspace.index import Index, number, of_jacobian
 
-# sigma_min/sigma_max [S1, eq. 23].
 INDEX = Index(
     "smallest over largest singular value of the Jacobian", of_jacobian(lambda local: local.inverse_condition),
-    number, crossing=0.0, bounds=(0.0, 1.0),
+    number, crossing=0.0, bounds=(0.0, 1.0), formula="sigma_min/sigma_max", source="S1, eq. 23",
 )  # fmt: skip

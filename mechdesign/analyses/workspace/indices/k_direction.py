@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mechdesign.analyses.stiffness.compliance import directional
-from mechdesign.analyses.workspace.index import Evaluate, Index, of_compliance
+from mechdesign.analyses.workspace.index import Evaluate, Index, of_compliance, stiffness
 from mechdesign.errors import StudyError
 
 if TYPE_CHECKING:
@@ -31,5 +31,5 @@ def prepare(study: Study) -> Evaluate:
 
 INDEX = Index(
     "stiffness to a force in the stiffness section's direction, at its point", prepare,
-    lambda study, field: study.units.label("stiffness"), crossing=0.0, section="stiffness",
+    stiffness, crossing=0.0, section="stiffness", formula="1/(d^T C d)",
 )  # fmt: skip

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from mechdesign.analyses.workspace.index import Index, determinant_power, of_jacobian, power_of_length
+from mechdesign.analyses.workspace.index import Index, determinant, of_jacobian
 
-# sqrt(det(J J^T)), which is |det J| of a square Jacobian [Yoshikawa 1985].
 INDEX = Index(
     "abs(det J)", of_jacobian(lambda local: np.abs(local.determinant)),
-    lambda study, field: power_of_length(study, determinant_power(field)), crossing=float("inf"),
+    determinant, crossing=float("inf"), formula="sqrt(det(J J^T))", source="Yoshikawa 1985",
 )  # fmt: skip

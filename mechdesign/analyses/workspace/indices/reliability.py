@@ -50,5 +50,10 @@ def prepare(study: Study) -> Evaluate:
 
 
 INDEX = Index(
-    "probability that first-order errors keep the limits", prepare, number, bounds=(0.0, 1.0), section="reliability"
+    "probability that first-order errors keep the limits",
+    prepare,
+    number,
+    bounds=(0.0, 1.0),
+    section="reliability",
+    source="S2, eqs. 10, 11",
 )

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from mechdesign.analyses.workspace.index import Index, determinant_power, of_jacobian, power_of_length
+from mechdesign.analyses.workspace.index import Index, inverse_determinant, of_jacobian
 
-# [S1, eq. 25]
 INDEX = Index(
     "1/abs(det J)", of_jacobian(lambda local: 1 / np.abs(local.determinant)),
-    lambda study, field: power_of_length(study, -determinant_power(field)), crossing=0.0,
+    inverse_determinant, crossing=0.0, source="S1, eq. 25",
 )  # fmt: skip

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechdesign.analyses.workspace.index import Evaluate, Index, of_configurations
+from mechdesign.analyses.workspace.index import Evaluate, Index, length, of_configurations
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Floats
 
@@ -37,5 +37,5 @@ def prepare(study: Study) -> Evaluate:
 
 INDEX = Index(
     "sqrt(sigma_x^2 + sigma_y^2) of the point's first-order error", prepare,
-    lambda study, field: study.units.label("length"), crossing=float("inf"), section="reliability",
+    length, crossing=float("inf"), section="reliability", source="S2, eq. 9",
 )  # fmt: skip

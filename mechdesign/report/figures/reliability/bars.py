@@ -13,7 +13,7 @@ from mechdesign.analyses.poses import pose_in_words
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import MAX_PANELS, legend_below, number, title
-from mechdesign.report.figures.reliability.looks import best_probability, heading, worst_in_words
+from mechdesign.report.figures.reliability.looks import best_probability, followed_in_words, heading
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -52,7 +52,7 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         section, pose = study.reliability, sobol or 0
         assert section is not None
         fails_most = pose == worst and bool(section.limits)
-        where = f"at {worst_in_words(study, poses, pose) if fails_most else pose_in_words(study, poses, pose)}"
+        where = f"at {followed_in_words(study, poses, pose) if fails_most else pose_in_words(study, poses, pose)}"
     notes = []
     if any((bar < -1.0).any() for bar in bars):
         notes.append("correlated sources make up for each other: negative shares, and others above 100 %")

@@ -40,7 +40,7 @@ class Sampled(NamedTuple):
     def where(self) -> str:
         """The pose in words, and among several why it is shown."""
         limited = self.samples.bands or self.samples.discs
-        in_words = worst_in_words if limited else pose_in_words
+        in_words = followed_in_words if limited else pose_in_words
         return f"at {in_words(self.study, self.poses, self.samples.pose)}"
 
     def rows(self, table: str) -> Flags:
@@ -52,9 +52,10 @@ class Sampled(NamedTuple):
         return found
 
 
-def worst_in_words(study: Study, poses: Poses, pose: int) -> str:
-    """The pose that fails most, in words."""
-    return "the pose that fails most, " * (poses.count > 1) + pose_in_words(study, poses, pose)
+def followed_in_words(study: Study, poses: Poses, pose: int) -> str:
+    """The pose whose samples are shown, in words, and that it fails most unless the study chose it."""
+    chosen = study.reliability is not None and study.reliability.shown is not None
+    return "the pose that fails most, " * (poses.count > 1 and not chosen) + pose_in_words(study, poses, pose)
 
 
 def methods(table: Table) -> list[str]:

@@ -36,6 +36,7 @@ from mechdesign.report.figures.panels import (
     tick_abscissa,
 )
 from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.workspace.ellipses import ellipses_figure
 from mechdesign.report.figures.workspace.regions import (
     MAX_REGIONS,
     PALE,
@@ -91,6 +92,7 @@ def figures(study: Study, result: Result) -> Mapping[str, Figure]:
     drawn.add("of indices", map_figures, study, found)
     if len(found) == 1:
         drawn.add("workspace", workspace_figure, study, result, found[0])
+        drawn.add("ellipses", ellipses_figure, study, found[0], result.drawn["ellipses"])
     else:
         drawn.add("workspace", _side_by_side, study, found, known(result.drawn))
     drawn.add("inscribed", inscribed_figure, study, result, found)
@@ -161,17 +163,23 @@ def _sketch(study: Study) -> Complexes:
 
 def _side_by_side(study: Study, found: Sequence[Region], before: Before | None) -> Figure:
     """The region and its boundary for several values of held coordinates, each with the mechanism in a pose there."""
-    section, mechanism, shown = study.workspace, study.mechanism, some(found)
-    assert section is not None
-    poses = [_pose_inside(study, region) for region in shown]
-    reached = [np.ravel(each.point(point)) for each in poses for point in mechanism.points]
+    title = "the mechanism where it is best conditioned"
+    return regions_figure([(region.title, study, region) for region in some(found)], title, before)
+
+
+def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, before: Before | None = None) -> Figure:
+    """Regions of some studies side by side on one scale, each under its words with the mechanism in a pose there."""
+    study, shown = parts[0][1], [region for _, _, region in parts]
+    assert study.workspace is not None
+    poses = [_pose_inside(own, region) for _, own, region in parts]
+    reached = [np.ravel(each.point(point)) for each in poses for point in study.mechanism.points]
     places = np.concatenate([*(region.places() for region in shown), *(z[np.isfinite(z)] for z in reached),
                              _places_before(before)])  # fmt: skip
-    title = f"workspace of point {section.point}, the mechanism where it is best conditioned"
-    page = sheet(study, places, [region.title for region in shown], title, bar=False, pad=ROOM)
-    for axes, region, configuration in zip(page.axes, shown, poses, strict=True):
+    title = f"workspace of point {study.workspace.point}, {title}"
+    page = sheet(study, places, [words for words, _, _ in parts], title, bar=False, pad=ROOM)
+    for axes, (_, own, region), configuration in zip(page.axes, parts, poses, strict=True):
         fill(axes, region.local)
-        draw_mechanism(axes, mechanism, configuration, faint=True, size=_SMALL_SYMBOLS)
+        draw_mechanism(axes, own.mechanism, configuration, faint=True, size=_SMALL_SYMBOLS)
         if before is not None:
             _draw_before(axes, before, region.held)
     page.ends(shown)
@@ -448,7 +456,7 @@ def index_columns(region: Region) -> list[str]:
 
 
 def _index_map(study: Study, found: Sequence[Region], column: str) -> Figure:
-    norm = _norm(found, column)
+    norm = index_norm(found, column)
     told = found[0].local.column(column)
     places = np.concatenate([region.places() for region in found])
     point = study.workspace.point if study.workspace else ""
@@ -518,7 +526,7 @@ def _nearest(places: Complexes, others: Complexes) -> Floats:
     return np.asarray(np.abs(places[:, None] - others[None, :]).min(axis=1))
 
 
-def _norm(found: Sequence[Region], column: str) -> BoundaryNorm:
+def index_norm(found: Sequence[Region], column: str) -> BoundaryNorm:
     """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
     patches = [patch for region in found for patch in grids(region.local, column)]
     values = np.concatenate([z.ravel() for _, _, z in patches])

@@ -48,6 +48,7 @@ ROOM = 0.07
 _BAR = 0.95  # of a bar of colours with its numbers
 _LEGEND = 0.24
 _PANEL_TITLE = 0.34
+_TITLE_LINE = 0.17  # more of it
 _TITLE = 0.4
 _ROW_GAP = 0.28
 _BESIDE = 0.15  # of a panel without labels of its own
@@ -224,8 +225,15 @@ class Sheet:
         style.color_bar(self.figure, drawn, label, cax=self.bar, **options)
 
 
-def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD) -> Sheet:
-    """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all."""
+def sheet(
+    study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD,
+    below: float = 0.0,
+) -> Sheet:  # fmt: skip
+    """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all.
+
+    Titles of panels may have several lines.
+    So many inches more than a legend of what ends the region needs are left `below`.
+    """
     number = len(titles)
     columns = number if number < 4 else 2 if number == 4 else 3
     if style.narrow():
@@ -241,11 +249,11 @@ def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *,
     window, above, down = Window(middle, scale, scale * wide, scale * tall), 0.0, _ROW_GAP
     if number > 1:
         titles = [style.folded(words, 9.5, inside - 0.15) if style.narrow() else words for words in titles]
-        above = _PANEL_TITLE + style.line(9.5) * max(words.count("\n") for words in titles)
+        above = _PANEL_TITLE + _TITLE_LINE * max(name.count("\n") for name in titles)
         down = above + _ROW_GAP
     figure, panels = windows(
         window, study.units.label("length"), number, columns, gap=pitch - window.width, above=down,
-        top=_TITLE + style.line(11.0) * title.count("\n") + above - down, below=BELOW + _LEGEND,
+        top=_TITLE + style.line(11.0) * title.count("\n") + above - down, below=BELOW + _LEGEND + below,
     )  # fmt: skip
     outer = figure.get_figheight()
     for axes, name in zip(panels, titles, strict=True):
@@ -256,8 +264,7 @@ def sheet(study: Study, places: Complexes, titles: Sequence[str], title: str, *,
     if bar:
         edge = (LEFT + window.width if number == 1 else room) + 0.15
         every = rows * window.height + (rows - 1) * down
-        long, middle_up = min(every, 4.0), BELOW + _LEGEND + every / 2
-        colors = figure.add_axes(
-            (edge / style.width(), (middle_up - long / 2) / outer, 0.16 / style.width(), long / outer)
-        )
+        long, middle_up = min(every, 4.0), BELOW + _LEGEND + below + every / 2
+        low = (middle_up - long / 2) / outer
+        colors = figure.add_axes((edge / style.width(), low, 0.16 / style.width(), long / outer))
     return Sheet(figure, tuple(panels), colors)

@@ -1,0 +1,346 @@
+"use strict";
+(() => {
+  const SVG = "http://www.w3.org/2000/svg";
+  const PLACES = 20, TURNS = 100, CURVES = 10, TIMES = 10000; // integers in a unit, as the page writes them
+  const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
+  const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+
+  // A list of steps as values; null where there is none, the last value to the end.
+  function decode(steps, count, unit) {
+    const values = new Array(count);
+    let last = 0;
+    for (let k = 0; k < count; k++) {
+      const step = k < steps.length ? steps[k] : 0;
+      if (step !== null) last += step;
+      values[k] = step === null ? NaN : last / unit;
+    }
+    return values;
+  }
+
+  // The value at a pose, or between two; behind the last comes the first again, where a turn has so many units.
+  function between(values, at, turn) {
+    const k = Math.floor(at), part = at - k;
+    if (!part) return values[k];
+    const step = values[(k + 1) % values.length] - values[k];
+    return values[k] + part * (turn ? step - turn * Math.round(step / turn) : step);
+  }
+
+  function make(name, attributes, parent) {
+    const element = document.createElementNS(SVG, name);
+    for (const key in attributes) element.setAttribute(key, attributes[key]);
+    parent.append(element);
+    return element;
+  }
+
+  function html(name, properties, ...children) {
+    const element = Object.assign(document.createElement(name), properties);
+    element.append(...children);
+    return element;
+  }
+
+  // A number in words that are not broken into lines.
+  const said = (name, text, unit) => `${name} = ${text} ${unit}`.trim().replaceAll(" ", "\u00a0");
+
+  // A place of the pointer in the units of a drawing.
+  function within(drawing, event) {
+    const box = drawing.getBoundingClientRect(), size = drawing.viewBox.baseVal;
+    return [(event.clientX - box.left) / box.width * size.width, (event.clientY - box.top) / box.height * size.height];
+  }
+
+  // Calls back with the places over which the pointer is drawn.
+  function follow(drawing, hovering, call) {
+    const told = event => {
+      if (event.type === "pointerdown") drawing.setPointerCapture(event.pointerId);
+      if (event.type === "pointerdown" || hovering || event.buttons) call(...within(drawing, event));
+    };
+    drawing.addEventListener("pointerdown", told);
+    drawing.addEventListener("pointermove", told);
+  }
+
+  // The drawing of a mechanism: shows it at a pose, or between two.
+  function linkage(drawing, data) {
+    const track = (group, unit) => {
+      const found = {};
+      for (const name in group) found[name] = decode(group[name], data.poses, unit);
+      return found;
+    };
+    const x = track(data.x, PLACES), y = track(data.y, PLACES), turn = track(data.turn, TURNS);
+    const parts = [...drawing.querySelectorAll("[data-at]")].map(group => {
+      const {at, turn: link, offset} = group.dataset;
+      return [group, x[at], y[at], link === undefined ? null : turn[link], offset && offset.split(" ").map(Number)];
+    });
+    const legs = [...drawing.querySelectorAll("[data-from]")].map(line => {
+      const {from, to, part} = line.dataset;
+      return [line, x[from], y[from], x[to], y[to], ...part.split(" ").map(Number)];
+    });
+    return {
+      x, y,
+      show(at) {
+        for (const [group, x, y, turn, offset] of parts) {
+          let px = between(x, at), py = between(y, at);
+          const known = isFinite(px), angle = turn ? between(turn, at, 360) : 0;
+          group.classList.toggle("moving-gone", !known);
+          if (!known) continue;
+          if (offset) {
+            const [cos, sin] = [Math.cos(angle * Math.PI / 180), Math.sin(angle * Math.PI / 180)];
+            px += cos * offset[0] - sin * offset[1];
+            py += sin * offset[0] + cos * offset[1];
+          }
+          const place = `translate(${px.toFixed(2)} ${py.toFixed(2)})`;
+          group.setAttribute("transform", turn && !offset ? `${place} rotate(${angle.toFixed(3)})` : place);
+        }
+        for (const [line, x1, y1, x2, y2, first, last] of legs) {
+          const from = [between(x1, at), between(y1, at)], to = [between(x2, at), between(y2, at)];
+          const known = isFinite(from[0]) && isFinite(to[0]);
+          line.classList.toggle("moving-gone", !known);
+          if (!known) continue;
+          [[1, first], [2, last]].forEach(([end, share]) => {
+            line.setAttribute(`x${end}`, (from[0] + share * (to[0] - from[0])).toFixed(2));
+            line.setAttribute(`y${end}`, (from[1] + share * (to[1] - from[1])).toFixed(2));
+          });
+        }
+      },
+    };
+  }
+
+  // The numbers beside the drawing: their texts at a pose.
+  function numbers(figure, data) {
+    const tracks = data.numbers.map(([decimals, steps]) => [decimals, decode(steps, data.poses, 10 ** decimals)]);
+    const cells = [...figure.querySelectorAll("[data-number]")].map(cell => [cell, ...tracks[cell.dataset.number]]);
+    const text = (decimals, value) => isFinite(value) ? value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "") : "\u2013";
+    return {
+      tracks,
+      text: (which, at) => text(tracks[which][0], tracks[which][1][at]),
+      show(at) {
+        for (const [cell, decimals, values] of cells) cell.textContent = text(decimals, values[at]);
+      },
+    };
+  }
+
+  // Arrows of velocities at points, and one that says how long they are.
+  function arrows(drawing, data, moved) {
+    const layer = make("g", {class: "moving-off", stroke: "#D55E00", "stroke-width": 2}, drawing);
+    const way = (x, y) => {
+      const length = Math.hypot(x, y), back = Math.min(9, length) / (length || 1);
+      return `l${x.toFixed(1)} ${y.toFixed(1)}l${(-back * (x + 0.45 * y)).toFixed(1)} ${(-back * (y - 0.45 * x)).toFixed(1)}` +
+        `m${(back * 0.9 * y).toFixed(1)} ${(-back * 0.9 * x).toFixed(1)}L`;
+    };
+    const found = Object.entries(data.arrows || {}).map(([point, parts]) =>
+      [moved.x[point], moved.y[point], ...parts.map(part => decode(part, data.poses, PLACES)), make("path", {}, layer)]);
+    if (found.length) {
+      const size = drawing.viewBox.baseVal, [length, words] = data.arrow;
+      make("path", {d: `M${size.width - 14 - length} ${size.height - 12}h${length}m-8 -4l8 4l-8 4`}, layer);
+      const text = make("text", {x: size.width - 14, y: size.height - 20, "text-anchor": "end", "font-size": 10,
+        fill: "#D55E00", stroke: "none"}, layer);
+      text.textContent = words;
+    }
+    return {
+      layer, any: found.length > 0,
+      show(at) {
+        for (const [...parts] of found) {
+          const path = parts.pop(), [px, py, x, y] = parts.map(values => between(values, at));
+          const known = isFinite(x + y + px + py);
+          path.classList.toggle("moving-gone", !known);
+          if (known) path.setAttribute("d", `M${px} ${py}${way(x, y)}${px + x} ${py + y}`);
+        }
+      },
+    };
+  }
+
+  // The cursor and the dots in the motion curves; a click or a drag there chooses a pose.
+  function curves(drawing, data, told, choose) {
+    if (!drawing || !data.curves) return () => {};
+    const x = decode(data.curves.x, data.poses, CURVES), [top, bottom] = data.curves.ends;
+    const cursor = make("line", {y1: top, y2: bottom, stroke: "#222222", "stroke-width": 1, class: "moving-cursor"}, drawing);
+    const dots = data.curves.dots.map(([which, slope, start, high, low, color]) =>
+      [told.tracks[which][1], slope, start, high, low, make("circle", {r: 3.6, fill: color, stroke: "white"}, drawing)]);
+    drawing.classList.add("moving-curves");
+    follow(drawing, false, place => {
+      let best = 0;
+      x.forEach((at, k) => { if (Math.abs(at - place) < Math.abs(x[best] - place)) best = k; });
+      choose(best);
+    });
+    return at => {
+      const place = between(x, at);
+      cursor.setAttribute("x1", place);
+      cursor.setAttribute("x2", place);
+      for (const [values, slope, start, high, low, dot] of dots) {
+        const y = start + slope * between(values, at);
+        const known = y >= high - 0.5 && y <= low + 0.5;
+        dot.classList.toggle("moving-gone", !known);
+        if (known) { dot.setAttribute("cx", place); dot.setAttribute("cy", y.toFixed(2)); }
+      }
+    };
+  }
+
+  // A box that shows or hides some layers.
+  function check(text, layers, on) {
+    const box = html("input", {type: "checkbox", checked: on});
+    const set = () => layers.forEach(layer => layer.classList.toggle("moving-off", !box.checked));
+    box.addEventListener("change", set);
+    set();
+    return html("label", {}, box, text);
+  }
+
+  // A motion: a slider, play and pause, speed, and what may be shown.
+  function motion(figure, data) {
+    const [drawing, other] = figure.querySelectorAll("svg");
+    const moved = linkage(drawing, data), told = numbers(figure, data);
+    const rates = arrows(drawing, data, moved), words = figure.querySelector(".moving-words");
+    const point = curves(other, data, told, pose => { stop(); show(pose); });
+    const slider = html("input", {type: "range", min: 0, max: data.poses - 1, step: 1, value: data.first});
+    slider.setAttribute("aria-label", "pose of the motion");
+    const button = html("button", {type: "button", textContent: "Play"});
+    const speed = html("select", {}, ...[[0.25, "\u00bc\u00d7"], [0.5, "\u00bd\u00d7"], [1, "1\u00d7"], [2, "2\u00d7"], [4, "4\u00d7"]]
+      .map(([value, text]) => html("option", {value, textContent: text, selected: value === 1})));
+    const controls = figure.querySelector(".moving-controls");
+    controls.append(slider, button, html("label", {}, "Speed", speed),
+      check("Paths", [...drawing.querySelectorAll(".moving-trace")], true),
+      check("Link names", [...drawing.querySelectorAll(".moving-name")], false),
+      ...(rates.any ? [check("Velocities", [rates.layer], false)] : []),
+      html("span", {className: "moving-pace", textContent: data.pace}));
+    controls.hidden = false;
+
+    const times = decode(data.times, data.poses + 1, TIMES), last = data.poses - 1;
+    const whole = Math.max(times[data.poses], times[last]);
+    const gap = pose => data.gaps.find(([first, end]) => first <= pose && pose <= end);
+    let at = data.first, forward = data.backwards ? -1 : 1, playing = 0, clock = 0;
+
+    function show(pose) {
+      at = pose;
+      const near = Math.round(pose) % data.poses, broken = gap(near);
+      moved.show(pose); told.show(near); rates.show(pose); point(Math.min(pose, last));
+      const text = data.given.map(([name, unit, which]) => said(name, told.text(which, near), unit)).join(", ") +
+        (broken ? `: ${broken[2]}` : "");
+      words.textContent = text;
+      slider.value = near;
+      slider.setAttribute("aria-valuetext", text);
+    }
+
+    // The pose of a time of the motion, between two where it is between two.
+    function pose(time) {
+      let low = 0, high = times[data.poses] > times[last] ? data.poses : last;
+      while (high - low > 1) {
+        const middle = (low + high) >> 1;
+        if (times[middle] <= time) low = middle; else high = middle;
+      }
+      return low + Math.max(0, Math.min(1, (time - times[low]) / (times[high] - times[low] || 1)));
+    }
+
+    // Where the motion is after a time: round where it closes, back from its ends and from what cannot be assembled.
+    function ahead(spent) {
+      let time = times[Math.floor(at)];
+      if (at % 1) time += (at % 1) * (times[Math.floor(at) + 1] - time);
+      time += forward * spent;
+      if (data.returns) time = ((time % whole) + whole) % whole;
+      else if (time < 0 || time > times[last]) { forward = -forward; time = Math.max(0, Math.min(times[last], time)); }
+      const next = pose(time);
+      if (gap(Math.floor(next)) || gap(Math.ceil(next) % data.poses)) { forward = -forward; return Math.round(at); }
+      return next;
+    }
+
+    function frame(now) {
+      const spent = Math.min(now - clock, 100) / 1000 / data.seconds * speed.value * whole;
+      if (!calm.matches) { clock = now; show(ahead(spent)); }
+      else if (now - clock >= SLOW_PAUSE / speed.value) { clock = now; show(Math.round(ahead(whole / SLOW_STEPS)) % data.poses); }
+      playing = requestAnimationFrame(frame);
+    }
+
+    function stop() {
+      cancelAnimationFrame(playing);
+      playing = 0;
+      button.textContent = "Play";
+      button.setAttribute("aria-pressed", "false");
+      if (at % 1) show(Math.round(at) % data.poses);
+    }
+
+    function play() {
+      if (gap(Math.round(at))) show(data.first);
+      clock = performance.now();
+      button.textContent = "Pause";
+      button.setAttribute("aria-pressed", "true");
+      playing = requestAnimationFrame(frame);
+    }
+
+    button.addEventListener("click", () => playing ? stop() : play());
+    slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
+    figure.addEventListener("keydown", event => {
+      if (event.key === " " && !event.target.matches("button, select, input[type=checkbox]")) {
+        event.preventDefault();
+        if (playing) stop(); else play();
+      }
+    });
+    show(data.first);
+  }
+
+  // A workspace: the mechanism follows the pointer, or the arrow keys, from pose to pose.
+  function workspace(figure, data) {
+    const drawing = figure.querySelector("svg"), words = figure.querySelector(".moving-words");
+    const layers = [...drawing.querySelectorAll(".moving-region")];
+    const choices = data.choices.map(each => ({...each, moved: linkage(drawing, each), told: numbers(figure, each)}));
+    const controls = figure.querySelector(".moving-controls");
+    let chosen = choices[0], at = chosen.first;
+
+    function show(pose) {
+      at = pose;
+      chosen.moved.show(at);
+      chosen.told.show(at);
+      words.textContent = [chosen.title, ...["x", "y"].map((axis, k) =>
+        said(`${data.point}.${axis}`, chosen.told.text(k, at), data.unit))].filter(Boolean).join(", ");
+    }
+
+    // The nearest pose to a place; with a direction the nearest on that side.
+    function nearest(x, y, toward) {
+      const {x: xs, y: ys} = chosen.moved, px = xs[data.point], py = ys[data.point];
+      let best = -1, least = Infinity;
+      px.forEach((value, k) => {
+        if (toward && toward[0] * (value - px[at]) + toward[1] * (py[k] - py[at]) <= 1) return;
+        const far = Math.hypot(value - x, py[k] - y);
+        if (far < least) { least = far; best = k; }
+      });
+      return best < 0 ? at : best;
+    }
+
+    follow(drawing, true, (x, y) => { words.removeAttribute("aria-live"); show(nearest(x, y)); });
+    drawing.classList.add("moving-map");
+    drawing.setAttribute("tabindex", "0");
+    drawing.setAttribute("role", "application");
+    drawing.setAttribute("aria-label", `${drawing.getAttribute("aria-label")}; arrow keys move it`);
+    drawing.addEventListener("pointerdown", () => drawing.focus({preventScroll: true}));
+    const keys = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
+    drawing.addEventListener("keydown", event => {
+      const toward = keys[event.key], step = chosen.step * (event.shiftKey ? 5 : 1);
+      if (event.key === "Home") show(chosen.first);
+      else if (toward) {
+        const {x, y} = chosen.moved;
+        show(nearest(x[data.point][at] + step * toward[0], y[data.point][at] + step * toward[1], toward));
+      } else return;
+      words.setAttribute("aria-live", "polite");
+      event.preventDefault();
+    });
+    if (choices.length > 1) {
+      const select = html("select", {}, ...choices.map((each, k) => html("option", {value: k, textContent: each.title})));
+      select.addEventListener("change", () => {
+        const {x, y} = chosen.moved, place = [x[data.point][at], y[data.point][at]];
+        chosen = choices[select.value];
+        layers.forEach((layer, k) => layer.classList.toggle("moving-off", k !== Number(select.value)));
+        show(nearest(...place));
+      });
+      controls.append(html("label", {}, "At", select));
+    }
+    controls.append(check("Link names", [...drawing.querySelectorAll(".moving-name")], false));
+    controls.append(html("span", {className: "moving-pace", textContent: "Move over the region, or use the arrow keys."}));
+    controls.hidden = false;
+    show(at);
+  }
+
+  function start() {
+    for (const figure of document.querySelectorAll("figure.moving")) {
+      const data = JSON.parse(figure.querySelector("script").textContent);
+      if (data.choices) workspace(figure, data); else motion(figure, data);
+    }
+  }
+
+  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
+  else start();
+})();

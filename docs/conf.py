@@ -1,0 +1,35 @@
+"""The site: Sphinx with Furo, Markdown by MyST, formulas by MathJax from a package; nothing is fetched."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import mechdesign
+
+project = "mechdesign"
+author = "the developers of mechdesign"
+copyright = author
+release = version = mechdesign.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
+    "sphinxcontrib.typer",
+    "pages",
+]
+exclude_patterns = ["_run", "_build"]
+nitpicky = True
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
+myst_heading_anchors = 3
+
+html_theme = "furo"
+html_title = "mechdesign"
+html_copy_source = False
+html_show_sphinx = False
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False

@@ -1,0 +1,202 @@
+"""What the pages show is run: files that they write, commands with their output, Python, in a folder a page.
+
+In a page
+- a block of YAML with a caption is a file of that name; a caption "NAME, continued" adds to it; it must pass `check`;
+- a block of YAML without one is a part of a study: laid over the page's last file, it must pass `check`;
+- a `console` block holds commands after `$ `, each with what a terminal shows; a line `...` stands for any lines;
+- a `python` block runs with those before it; what it prints stands in the `text` block that follows, if there is one.
+
+    python docs/examples.py [PAGE...]     writes what the commands print now into the pages
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import pty
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import mechdesign
+from mechdesign.errors import MechdesignError
+
+ROOT = Path(__file__).parent
+FOLDERS = ("tutorials", "howto", "theory", "reference", "contributing")
+# Where the examples of a page were run: its pictures come from there.
+RUN = ROOT / "_run"
+ANY = "..."
+_FENCE = re.compile(r"(?ms)^(?P<fence>`{3,})(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=fence)[ ]*$")
+_CAPTION = re.compile(r":caption: (?P<name>\S+?)(?P<more>, continued)?\n")
+
+
+@dataclass
+class Page:
+    """A page of the site as its examples go: its folder, its files, what is wrong with it."""
+
+    path: Path
+    folder: Path
+    study: str = ""
+    names: dict[str, Any] = field(default_factory=dict)
+    printed: str = ""
+    wrong: list[str] = field(default_factory=list)
+
+    def fail(self, where: int, words: str) -> None:
+        """Note what is wrong at a place of the text."""
+        line = self.path.read_text(encoding="utf-8").count("\n", 0, where) + 1
+        self.wrong.append(f"{self.path.relative_to(ROOT)}:{line}: {words}")
+
+
+def merged(base: Any, part: Any) -> Any:
+    """A part of a study laid over another: mappings key by key, anything else as a whole."""
+    if isinstance(base, dict) and isinstance(part, dict):
+        return base | {key: merged(base[key], value) if key in base else value for key, value in part.items()}
+    return part
+
+
+def terminal(command: str, folder: Path) -> str:
+    """What a terminal shows of a command: first what goes to standard output, then the messages."""
+    ours, theirs = pty.openpty()
+    tools = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    settings = os.environ | {"TERM": "dumb", "PATH": tools, "NO_COLOR": "1"}
+    with subprocess.Popen(
+        command, shell=True, cwd=folder, env=settings, stdin=subprocess.DEVNULL, stdout=theirs, stderr=subprocess.PIPE
+    ) as process:
+        os.close(theirs)
+        with ThreadPoolExecutor(1) as pool:
+            shown = pool.submit(_read, ours)
+            assert process.stderr is not None
+            messages = process.stderr.read()
+            text = shown.result().replace(b"\r\n", b"\n") + messages
+    os.close(ours)
+    lines = text.decode().splitlines() + ([f"(exit code {process.returncode})"] if process.returncode else [])
+    return "".join(f"{line.rstrip()}\n" for line in lines)
+
+
+def _read(terminal: int) -> bytes:
+    blocks = []
+    # A terminal whose other end is closed is an error to read from, on Linux.
+    with contextlib.suppress(OSError):
+        while block := os.read(terminal, 65536):
+            blocks.append(block)
+    return b"".join(blocks)
+
+
+def agree(told: str, shown: str) -> bool:
+    """Whether an output is the one in the page, whose lines `...` stand for any lines."""
+    parts = [re.escape(line) if line.strip() != ANY else None for line in told.splitlines()]
+    pattern = "".join(r"(?:.*\n)*?" if part is None else rf"{part}\n" for part in parts)
+    return re.fullmatch(pattern, shown) is not None
+
+
+def _commands(body: str) -> Iterator[tuple[str, str]]:
+    """The commands of a console block, each with the output in the page."""
+    for part in re.split(r"(?m)^\$ ", body)[1:]:
+        lines = part.split("\n")
+        count = 1
+        while lines[count - 1].endswith("\\"):
+            count += 1
+        yield "\n".join(lines[:count]), "\n".join(lines[count:])
+
+
+def _console(page: Page, body: str, where: int) -> str:
+    found = []
+    for command, told in _commands(body):
+        shown = terminal(command, page.folder)
+        if not agree(told, shown):
+            page.fail(where, f"$ {command}\nshows\n{shown}where the page has\n{told}")
+            told = shown
+        found.append(f"$ {command}\n{told}")
+    return "".join(found)
+
+
+def _yaml(page: Page, body: str, where: int) -> None:
+    caption = _CAPTION.match(body)
+    text = body[caption.end() :].lstrip("\n") if caption else body
+    try:
+        if caption:
+            file = page.folder / caption["name"]
+            page.study = (page.study if caption["more"] else "") + text
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(page.study, encoding="utf-8")
+            if file.suffix == ".yaml" and "mechanism:" in page.study:
+                mechdesign.load(file)
+        else:
+            (page.folder / "part.yaml").write_text(
+                yaml.safe_dump(merged(yaml.safe_load(page.study) or {}, yaml.safe_load(text))), encoding="utf-8"
+            )
+            mechdesign.load(page.folder / "part.yaml")
+    except (MechdesignError, yaml.YAMLError) as error:
+        page.fail(where, str(error))
+
+
+def _python(page: Page, body: str, where: int) -> None:
+    stream = io.StringIO()
+    before = Path.cwd()
+    try:
+        os.chdir(page.folder)
+        with contextlib.redirect_stdout(stream):
+            exec(compile(body, str(page.path), "exec"), page.names)
+    except Exception as error:
+        page.fail(where, f"{type(error).__name__}: {error}")
+    finally:
+        os.chdir(before)
+    page.printed = stream.getvalue()
+
+
+def _run(path: Path) -> tuple[str, list[str]]:
+    """The text of a page as it would be true, and what is wrong with it as it is."""
+    folder = RUN / path.relative_to(ROOT).with_suffix("")
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.yaml"):
+        old.unlink()
+    page = Page(path, folder)
+
+    def block(found: re.Match[str]) -> str:
+        kind, body = found["kind"].strip(), found["body"]
+        if kind == "console":
+            body = _console(page, body, found.start())
+        elif kind in ("yaml", "{code-block} yaml"):
+            _yaml(page, body, found.start())
+        elif kind == "python":
+            _python(page, body, found.start())
+        elif kind == "text" and page.printed:
+            if not agree(body, page.printed):
+                page.fail(found.start(), f"prints\n{page.printed}where the page has\n{body}")
+                body = page.printed
+            page.printed = ""
+        return f"{found['fence']}{found['kind']}\n{body}{found['fence']}"
+
+    return _FENCE.sub(block, path.read_text(encoding="utf-8")), page.wrong
+
+
+def pages(names: Iterable[str] = ()) -> list[Path]:
+    """Pages with examples: those named, or all."""
+    return [Path(name).resolve() for name in names] or [
+        path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.md"))
+    ]
+
+
+def wrong(paths: Iterable[Path]) -> list[str]:
+    """Run the examples of these pages; what is wrong with them, in words."""
+    return [words for path in paths for words in _run(path)[1]]
+
+
+def main() -> None:
+    """Write into the pages what their commands print now."""
+    for path in pages(sys.argv[1:]):
+        text, told = _run(path)
+        path.write_text(text, encoding="utf-8")
+        print(*told, sep="\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,125 @@
+"""`mechdesign docs`: the reference in the terminal, and which words of it a study's mistakes are about."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import typer
+
+from mechdesign.cli.terminal import emit
+from mechdesign.errors import StudyError, explain
+from mechdesign.reference import Entry, below, entries, find, near, place
+
+_INDENT = "  "
+# Words of mistakes that are named to be looked up.
+_NAMED = 3
+_NO_WRAPPING = 10_000
+_OVERVIEW = (
+    "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
+    "part (sweep), a command, an option, or one of the words below. Wherever a study takes a number there may be a "
+    "number, one with its unit (40 mm, 600 rpm), or an expression over parameters (2*r + 10)."
+)
+
+
+def show(words: Sequence[str], commands: Mapping[str, Any]) -> None:
+    """Print what words mean; without any an overview.
+
+    Raises
+    ------
+    StudyError
+        If a word is not known; the message names the nearest.
+    """
+    known = entries(_commands(commands))
+    found = [(word, find(known, word)) for word in words]
+    for word, hits in found:
+        if not hits:
+            close = near(known, word)
+            cure = f"; did you mean {close!r}?" if close else "; 'mechdesign docs' lists what there is"
+            raise StudyError(f"the reference has no {word!r}{cure}")
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else _NO_WRAPPING
+    texts = [_told(known, hits) for _, hits in found] or [_overview(known)]
+    emit("\n".join(_wrapped(line, width) for text in texts for line in text).rstrip("\n") + "\n")
+
+
+def explained(error: Exception) -> tuple[int, str]:
+    """Exit code and message of an exception; after the mistakes of a study how to look up what they are about."""
+    code, message = explain(error)
+    keys = [problem.key for problem in error.problems] if isinstance(error, StudyError) else []
+    words = list(dict.fromkeys(filter(None, map(place, keys))))[:_NAMED]
+    return code, f"{message}\n(mechdesign docs {' '.join(words)})" if words else message
+
+
+def _commands(commands: Mapping[str, Any]) -> Iterator[Entry]:
+    """Commands and their options, as Typer has them."""
+    options: dict[tuple[str, str], Entry] = {}
+    for name, command in commands.items():
+        for given in command.params:
+            flags = [*given.opts, *given.secondary_opts] if given.param_type_name == "option" else []
+            for flag in flags:
+                before = options[flag, given.help].where if (flag, given.help) in options else ()
+                takes = "" if given.is_flag else f"{flag} {given.metavar or given.type.name.upper()}"
+                options[flag, given.help] = Entry(flag, "option", given.help, takes=takes, where=(*before, name))
+        usage = " ".join(["mechdesign", name, *(each.metavar for each in command.params if each.metavar
+                          and each.param_type_name == "argument"), "[OPTIONS]"])  # fmt: skip
+        yield Entry(name, "command", " ".join(command.help.split()), takes=usage)
+    yield from options.values()
+
+
+def _told(known: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
+    """Entries with the same to say are told together; of a single one also the keys below it."""
+    alike: dict[Entry, list[Entry]] = {}
+    for hit in hits:
+        alike.setdefault(replace(hit, word=""), []).append(hit)
+    for entry, same in alike.items():
+        for each in same:
+            yield f"{typer.style(each.word, bold=True) if sys.stdout.isatty() else each.word} ({each.kind})"
+        yield from (_INDENT + line for line in _body(entry, same[0].last))
+        keys = below(known, same[0]) if len([each for each in alike if each.kind == entry.kind]) == 1 else []
+        if keys:
+            yield f"{_INDENT}keys:"
+            yield from (f"{2 * _INDENT}{key.last}: {key.text}" for key in keys)
+        yield ""
+
+
+def _body(entry: Entry, name: str) -> Iterator[str]:
+    yield entry.text
+    told = {
+        "takes": entry.takes,
+        "mapping": entry.mapping,
+        "unit": entry.unit,
+        "formula": entry.formula,
+        "source": entry.source,
+        "left out": entry.default,
+        "stands in": ", ".join(entry.where),
+    }
+    yield from (f"{what}: {text}" for what, text in told.items() if text)
+    yield from (f"{_INDENT}{word}: {meaning}" for word, meaning in entry.words)
+    yield from (f"example: {name}: {example}" for example in entry.examples)
+
+
+def _overview(known: Sequence[Entry]) -> Iterator[str]:
+    yield _OVERVIEW
+    yield ""
+    sections = [entry for entry in known if entry.kind == "key" and "." not in entry.word]
+    yield f"study: {', '.join(entry.word for entry in sections)}"
+    for section in sections:
+        if keys := below(known, section):
+            yield f"{section.word}: {', '.join(key.last for key in keys)}"
+    yield ""
+    kinds: dict[str, list[str]] = {}
+    for entry in known:
+        kinds.setdefault(entry.kind, []).append(entry.word)
+    for kind, words in kinds.items():
+        if kind != "key":
+            yield f"{kind}: {', '.join(dict.fromkeys(words))}"
+
+
+def _wrapped(line: str, width: int) -> str:
+    """A line no longer than the terminal is wide, its rest below it, indented further."""
+    indent = " " * (len(line) - len(line.lstrip())) + _INDENT
+    return textwrap.fill(line, width, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)

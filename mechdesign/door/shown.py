@@ -1,0 +1,215 @@
+"""A study and an answer as a notebook holds them: they show themselves, draw their pictures and save their files."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mechdesign.commands import COMMANDS
+from mechdesign.errors import MechdesignError, StudyError, counted, explain, suggestion
+from mechdesign.files import formats_of
+from mechdesign.report import writer
+from mechdesign.report.manifest import Extras
+from mechdesign.report.requirements import Verdict, requirements
+from mechdesign.results import Result
+from mechdesign.study import Study
+from mechdesign.study.text.fields import shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from mechdesign.report.figures.rendering import Gallery
+
+
+class ShownStudy(Study):
+    """A study that shows its mechanism in a notebook."""
+
+    @classmethod
+    def of(cls, study: Study) -> ShownStudy:
+        """The same study."""
+        return cls(**{field.name: getattr(study, field.name) for field in dataclasses.fields(Study)})
+
+    def __repr__(self) -> str:
+        mechanism = self.mechanism
+        words = ", ".join((
+            counted(len(mechanism.description.links), "link"), f"mobility {mechanism.mobility}",
+            f"driven by {', '.join(mechanism.drives) or 'nothing'}",
+        ))  # fmt: skip
+        warned = f"; {counted(len(self.warnings), 'warning')}" if self.warnings else ""
+        return f"<Study {shown(self.name)}: {words}\n  asks {', '.join(self.questions) or 'no question'}{warned}>"
+
+    def _repr_html_(self) -> str:
+        from mechdesign.door.html import study_html
+
+        return study_html(self, self._repr_png_())
+
+    def _repr_png_(self) -> bytes | None:
+        return self._picture
+
+    @cached_property
+    def _picture(self) -> bytes | None:
+        """The sketch as it is assembled; None where it cannot be drawn."""
+        try:
+            return writer.sketch(self)
+        except Exception as error:
+            _undrawn(writer.MECHANISM, explain(error)[1])
+            return None
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Answer(Result):
+    """The result of one command that knows its study."""
+
+    study: Study  # with the seed that was computed with
+    all_modes: bool = False  # whether every assembly mode was asked
+
+    @classmethod
+    def of(cls, study: Study, result: Result, seed: int | None = None, *, all_modes: bool = False) -> Answer:
+        """The answer that a result is, computed with a seed in place of the study's."""
+        if seed is not None:
+            study = dataclasses.replace(study, seed=seed, resolved=study.resolved | {"seed": seed})
+        values = {field.name: getattr(result, field.name) for field in dataclasses.fields(Result)}
+        return cls(**values, study=study, all_modes=all_modes)
+
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """What became of those requirements of the study that concern this result; none where it was interrupted.
+
+        Raises
+        ------
+        StudyError
+            If a requirement names what the result has not.
+        """
+        return () if self.interrupted else requirements(self.study, self)
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Names of its pictures, in the order in which they are best read."""
+        return self._seen[0]
+
+    def figure(self, name: str) -> Figure:
+        """One of its pictures, made anew and yours to change: Matplotlib's, in inches, without pyplot.
+
+        In a notebook it shows itself; Matplotlib's settings stay as they are.
+
+        Raises
+        ------
+        StudyError
+            If there is none of that name; the message lists those there are.
+        MechdesignError
+            If it could not be drawn.
+        """
+        drawn = self._drawn()
+        if name in drawn:
+            return drawn[name]
+        if name in drawn.failed:
+            raise MechdesignError(f"picture {name} could not be drawn: {drawn.failed[name]}")
+        there = f"there are {', '.join(drawn)}" if drawn else "there are none"
+        failed = "".join(f"; pictures {what} could not be drawn: {why}" for what, why in drawn.failed.items())
+        raise StudyError(f"{self.command} has no picture {shown(name)}{suggestion(name, drawn)}; {there}{failed}")
+
+    def save(
+        self,
+        directory: str | os.PathLike[str],
+        *,
+        plots: bool = True,
+        formats: str | None = None,
+        animate: bool = False,
+    ) -> Path:
+        """Write the files that the command writes with ``--out DIRECTORY``, to the byte, and return their folder.
+
+        Parameters
+        ----------
+        directory : path
+            Is made where it is not there. Files of an older result in it that this one does not have are removed.
+        plots : bool
+            Whether to draw pictures; those that cannot be drawn are Python warnings, and stand in the manifest.
+        formats : str
+            Of the pictures: png, svg, pdf, or several with commas between; png by default.
+        animate : bool
+            Whether to draw the motion of a sweep or path as well, ``motion.gif``.
+
+        Raises
+        ------
+        StudyError
+            If a requirement names what the result has not, or formats or the animation are asked amiss.
+        OutputError
+            If the files cannot be written.
+        """
+        if animate and self.command != "kinematics":
+            raise StudyError(f"animate=True takes a result of kinematics, not of {self.command}")
+        if not plots and (animate or formats is not None):
+            raise StudyError("plots=False and animate=True or formats contradict each other")
+        asked = Extras(plots, formats_of(formats, "formats"), animate, self.all_modes)
+        folder = Path(directory)
+        writer.check_writable(folder)
+        for warning in writer.write(folder, self.study, self, self.verdicts, asked):
+            warnings.warn(warning, stacklevel=2)
+        return folder
+
+    def __repr__(self) -> str:
+        lines = [f"<{self.command} of {shown(self.study.name)}: {COMMANDS[self.command].question}"]
+        lines.append(", ".join(f"{name} ({counted(len(table), 'row')})" for name, table in self.tables.items()))
+        judged = self._judged()
+        if isinstance(judged, str):
+            lines.append(f"requirements: {judged}")
+        elif judged:
+            met = sum(verdict.met for verdict in judged)
+            lines.append(f"{met} of {counted(len(judged), 'requirement')} met")
+        lines += [text for text in (self.interrupted, self.failed) if text]
+        lines.append(counted(len(self.warnings), "warning") if self.warnings else "no warnings")
+        return "\n  ".join(lines) + ">"
+
+    def _repr_html_(self) -> str:
+        from mechdesign.door.html import answer_html
+
+        return answer_html(self.study, self, self._judged(), *self._seen)
+
+    def _repr_png_(self) -> bytes | None:
+        return self._seen[1]
+
+    def _judged(self) -> tuple[Verdict, ...] | str:
+        """The verdicts, or why there are none: what shows a result must not fail."""
+        try:
+            return self.verdicts
+        except MechdesignError as error:
+            return str(error)
+
+    @cached_property
+    def _seen(self) -> tuple[tuple[str, ...], bytes | None]:
+        """Names of its pictures, and the first of them as a PNG; None where there is none."""
+        from mechdesign.report.figures import style
+
+        drawn = self._drawn()
+        for name, why in drawn.failed.items():
+            _undrawn(name, why)
+        for name, figure in drawn.items():
+            try:
+                with style.context():
+                    return tuple(drawn), style.encoded(figure)
+            except Exception as error:
+                _undrawn(name, explain(error)[1])
+        return tuple(drawn), None
+
+    def _drawn(self) -> Gallery:
+        """All its pictures, and last the mechanism; none of an interrupted computation."""
+        from mechdesign.report.figures import style
+        from mechdesign.report.figures.mechanism import mechanism_figure
+        from mechdesign.report.figures.rendering import Gallery
+
+        if self.interrupted:
+            return Gallery()
+        with style.context():
+            drawn = writer.figures(self.study, self)
+            drawn.add(writer.MECHANISM, mechanism_figure, self.study, self)
+        return drawn
+
+
+def _undrawn(name: str, why: str) -> None:
+    """Say that a picture could not be drawn."""
+    warnings.warn(f"picture {name} could not be drawn: {why}", stacklevel=2)

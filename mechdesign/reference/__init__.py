@@ -1,0 +1,8 @@
+"""The reference: every word that a study, a command or a result knows, from where the code declares it."""
+
+from mechdesign.reference.entries import Entry
+from mechdesign.reference.keys import place
+from mechdesign.reference.lookup import below, find, near
+from mechdesign.reference.sources import entries
+
+__all__ = ["Entry", "below", "entries", "find", "near", "place"]

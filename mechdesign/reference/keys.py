@@ -1,0 +1,131 @@
+"""Keys of the study format, from its models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from fnmatch import fnmatchcase
+from functools import cache
+from typing import Any, NamedTuple, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from mechdesign.reference.entries import Entry
+from mechdesign.study import Units, schema
+from mechdesign.study.schema.study_file import StudyFile
+from mechdesign.study.text.fields import Model, Read, meaning
+from mechdesign.study.text.forms import properties
+
+KIND = "key"
+
+
+class Key(NamedTuple):
+    """A key at its path."""
+
+    path: str
+    model: type[Model]
+    name: str
+    field: FieldInfo
+
+
+@cache
+def keys() -> tuple[Key, ...]:
+    """Every key of the study format, a section's keys after it."""
+    return tuple(_walk(StudyFile, ""))
+
+
+def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
+    for name, field in model.fields_by_key().items():
+        yield Key(prefix + name, model, name, field)
+        for inner, stars in _models(field.annotation):
+            yield from _walk(inner, f"{prefix}{name}{stars}.")
+
+
+def _models(annotation: Any) -> Iterator[tuple[type[Model], str]]:
+    """Models in an annotation, each with a ``.*`` for every mapping of names or list around it."""
+    if isinstance(annotation, type) and issubclass(annotation, Model):
+        yield annotation, ""
+    star = ".*" if get_origin(annotation) in (dict, tuple) else ""
+    for part in get_args(annotation):
+        for model, stars in _models(part):
+            yield model, star + stars
+
+
+def _reads(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Read]:
+    """What reads the values in an annotation, outside of other models."""
+    for each in (*metadata, *get_args(annotation)):
+        if isinstance(each, Read):
+            yield each
+        elif get_args(each):
+            yield from _reads(each)
+
+
+def entries() -> Iterator[Entry]:
+    """An entry for each key, and one for each word that a key chooses out of a list."""
+    forms = schema()
+    chosen: dict[tuple[str, str], Entry] = {}
+    for key in keys():
+        said = key.model.said(key.name)
+        inner = list(_models(key.field.annotation))
+        model = forms if key.model is StudyFile else forms["$defs"][key.model.__name__]
+        reads = list(_reads(key.field.annotation, key.field.metadata))
+        words = _words(reads)
+        about = " ".join(dict.fromkeys(model.said_of_all() for model, _ in inner))
+        for what, word, text in words:
+            before = chosen[what, word].where if (what, word) in chosen else ()
+            chosen[what, word] = Entry(word, what, text, where=(*before, key.path.replace(".*", "")))
+        yield Entry(
+            word=key.path,
+            kind=KIND,
+            text=said.text or about,
+            takes=properties(model)[key.name]["title"],
+            mapping=about if said.text else "",
+            unit=_unit(reads),
+            default=_default(key.field),
+            examples=said.examples,
+            words=tuple(dict.fromkeys((word, text) for _, word, text in (*words, *_within(inner)))),
+        )
+    yield from chosen.values()
+
+
+def _words(reads: Iterable[Read]) -> list[tuple[str, str, str]]:
+    """What they are, words and meanings of what is chosen out of a list."""
+    return [(read.what, word, meaning(each)) for read in reads for word, each in (read.words or {}).items()]
+
+
+def _within(models: Iterable[tuple[type[Model], str]]) -> Iterator[tuple[str, str, str]]:
+    """Words that a section which stands alone may be written as, instead of a mapping."""
+    for model, stars in models:
+        for field in model.model_fields.values() if model.short and not stars else ():
+            yield from _words(_reads(field.annotation, field.metadata))
+
+
+def _unit(reads: Sequence[Read]) -> str:
+    kinds = {read.kind for read in reads if read.kind}
+    if len(kinds) != 1 or kinds == {"none"}:
+        return ""
+    kind = kinds.pop()
+    return f"{kind.replace('_', ' ')} ({Units().label(kind)} where the study says no units)"
+
+
+def _default(field: FieldInfo) -> str:
+    """The value that is taken where a key is left out, as a study writes it."""
+    value = field.get_default(call_default_factory=True, validated_data={})
+    if value is PydanticUndefined:
+        return "an error: it is required"
+    if value is None or value in ((), {}) or isinstance(value, Model):
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"[{', '.join(map(str, value))}]" if isinstance(value, tuple) else str(value)
+
+
+def place(path: str) -> str:
+    """The key of the format at a path of a study, as one may type it; the nearest above it where there is none."""
+    known = {key.path: key.path.replace(".*", "") for key in keys()}
+    while path:
+        for each, plain in known.items():
+            if fnmatchcase(path, each):
+                return plain
+        path = path.rpartition(".")[0]
+    return ""

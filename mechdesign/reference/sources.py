@@ -1,0 +1,73 @@
+"""Where entries come from: one function for each kind of word, which reads what the code declares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from importlib import import_module
+from inspect import getdoc
+from itertools import chain
+
+from mechdesign.errors import EXIT_CODES
+from mechdesign.expressions import CONSTANTS, FUNCTIONS, meanings
+from mechdesign.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
+from mechdesign.reference import keys
+from mechdesign.reference.entries import Entry
+from mechdesign.study.text.fields import quoted
+from mechdesign.study.text.units import listed
+
+
+def indices() -> Iterator[Entry]:
+    """Local indices, with their formulas, units and sources."""
+    for name, index in INDEX_NAMES.items():
+        text = quoted((import_module(f"{FOLDER}.{name}").__doc__ or "").partition("\n")[0])
+        formula = f"{index.formula}: {index.meaning}" if index.formula else index.meaning
+        needs = f" It needs the section {index.section}." if index.section else ""
+        unit = (getdoc(index.unit) or "").partition("\n")[0].removesuffix(".")
+        yield Entry(name, "local index", text + needs, unit=unit, formula=formula, source=index.source,
+                    where=("workspace.indices",))  # fmt: skip
+
+
+def results() -> Iterator[Entry]:
+    """Numbers of a workspace: those of every one, and the statistics of the local indices."""
+    where = ("optimize.maximize", "optimize.minimize", "optimize.subject_to.result")
+    for name, regional in REGIONAL.items():
+        yield Entry(name, "result of workspace", f"{regional.name}: {regional.meaning}", source=regional.source,
+                    where=where)  # fmt: skip
+    for name, meaning in STATISTICS.items():
+        text = f"{meaning} of a local index over the region, after the index's name: sigma_min_{name}"
+        yield Entry(f"*_{name}", "result of workspace", text, where=where)
+
+
+def expressions() -> Iterator[Entry]:
+    """Functions, operators and constants of expressions."""
+    for name, (written, meaning) in meanings().items():
+        kind = "function" if name in FUNCTIONS else "constant" if name in CONSTANTS else "operator"
+        yield Entry(name, kind, meaning, takes=written if written != name else "")
+
+
+def units() -> Iterator[Entry]:
+    """Units of numbers in a study, and the prefixes that they may have."""
+    for name, (meaning, others) in listed().items():
+        kind = "prefix of units" if name.endswith("-") else "unit"
+        for written in (name, *others):
+            also = [each for each in (name, *others) if each != written]
+            text = f"{meaning.strip('[]')}; also written {', '.join(also)}" if also else meaning
+            yield Entry(written, kind, text, where=("units",) if meaning.startswith("[") else ())
+
+
+def exit_codes() -> Iterator[Entry]:
+    """Exit codes of the command."""
+    for code, meaning in EXIT_CODES.items():
+        yield Entry(str(code), "exit code", meaning)
+
+
+# A further kind of word is one more function here.
+SOURCES: tuple[Callable[[], Iterable[Entry]], ...] = (keys.entries, indices, results, expressions, units, exit_codes)
+
+
+def entries(*more: Iterable[Entry]) -> tuple[Entry, ...]:
+    """All entries, and `more` that others declare; what two sources say of a word is told by the one that says more."""
+    found: dict[tuple[str, str], Entry] = {}
+    for entry in chain(*(source() for source in SOURCES), *more):
+        found[entry.word, entry.kind] = entry
+    return tuple(found.values())

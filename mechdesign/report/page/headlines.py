@@ -1,0 +1,158 @@
+"""The few numbers of a result that a person asks for first, found by what its columns are called and mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any, Literal
+
+import numpy as np
+
+from mechdesign.report.figures.style import printed
+from mechdesign.report.requirements import unit_of
+from mechdesign.results import Column, Result, Table
+
+# Most numbers of a question.
+MOST = 8
+# Meanings of the columns that make a pose.
+_POSE = ("drive", "given", "held coordinate")
+_DIGITS = 4
+_SMALL, _LARGE = 1e-3, 1e7
+_RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
+_MINUS = "\N{MINUS SIGN}"
+_TOGETHER = "\N{NO-BREAK SPACE}"
+_NARROW = "\N{NARROW NO-BREAK SPACE}"
+
+
+@dataclass(frozen=True)
+class Headline:
+    """A number with its unit, and under which name it stands."""
+
+    label: str
+    value: str
+    unit: str = ""
+    note: str = ""  # where it is so, or within which bounds
+
+
+@dataclass(frozen=True)
+class _Rule:
+    """Which columns give a number, and of which row."""
+
+    table: str
+    column: str  # a pattern of names
+    label: str  # with the words of the row, the column's `name` and its `meaning`
+    row: Literal["first", "each", "largest", "smallest", "size"] = "each"  # size: the largest, whatever its sign
+    meaning: str = "*"  # a pattern of meanings
+    by: tuple[str, ...] = ()  # columns of words of which each value counts by itself
+    bounds: tuple[str, str] | None = None  # columns of the ends between which it lies
+    interval: str = "from {low} to {high}"
+
+
+_RULES: dict[str, tuple[_Rule, ...]] = {
+    "kinematics": (
+        _Rule("extremes", "range", "range of {output}", bounds=("min", "max")),
+        _Rule("motion", "*_velocity", "largest {meaning}", "size", "velocity of *"),
+        _Rule("motion", "*_effort", "largest effort of {name}", "size"),
+        _Rule("motion", "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
+    ),
+    "workspace": (
+        _Rule("indices", "area", "area of the region", "largest"),
+        _Rule("indices", "SUI", "area over that of the rectangle around it", "largest"),
+        _Rule("indices", "circle_radius", "radius of the largest circle inside", "largest"),
+        _Rule("indices", "*_mean", "mean {name}", "largest", "mean over *"),
+    ),
+    "optimize": (
+        _Rule("optimum", "*", "best {name}", "first", "design variable"),
+        _Rule("optimum", "*", "{name} of the best", "first"),
+    ),
+    "reliability": (
+        _Rule("reliability", "failure", "failure probability, {method}", "largest", by=("method",),
+              bounds=("failure_low", "failure_high"), interval="99.7 % between {low} and {high}"),
+        _Rule("moments", "sigma", "standard deviation of {output}, {order}", "largest", by=("output", "order")),
+        _Rule("capability", "cpk", "smallest Cpk of {output}", "smallest", by=("output",)),
+    ),
+    "stiffness": (
+        _Rule("stiffness", "k_min", "smallest stiffness", "smallest"),
+        _Rule("stiffness", "k_max", "largest stiffness", "largest"),
+        _Rule("deflections", "d[xy]", "largest deflection {name}", "size"),
+    ),
+}  # fmt: skip
+
+
+def shown(value: float) -> str:
+    """A number for people: four digits, thousands apart, a power of ten where it is very small or large."""
+    value = float(value)
+    if not np.isfinite(value):
+        return "none" if np.isnan(value) else "infinite" if value > 0 else f"{_MINUS}infinite"
+    if value and not _SMALL <= abs(value) < _LARGE:
+        mantissa, power = f"{value:.{_DIGITS - 1}e}".split("e")
+        mantissa = mantissa.rstrip("0").rstrip(".").replace("-", _MINUS)
+        return f"{mantissa}\N{MIDDLE DOT}10{str(int(power)).translate(_RAISED)}"
+    places = max(0, _DIGITS - 1 - int(np.floor(np.log10(abs(value)))) if value else 0)
+    text = f"{value:,.{places}f}".replace(",", _NARROW).replace("-", _MINUS)
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def headlines(result: Result) -> list[Headline]:
+    """The first numbers of a result, at most `MOST`, each of a name once."""
+    found: dict[str, Headline] = {}
+    for rule in _RULES[result.command]:
+        table = result.tables.get(rule.table)
+        if table is None or not len(table):
+            continue
+        for column in table.columns:
+            if column.numeric and fnmatchcase(column.name, rule.column) and fnmatchcase(column.meaning, rule.meaning):
+                if not _asked(result, rule, column):
+                    continue
+                for each in _of(rule, table, column):
+                    found.setdefault(each.label, each)
+    return list(found.values())[:MOST]
+
+
+def _asked(result: Result, rule: _Rule, column: Column) -> bool:
+    """Whether a column is one that the study asked for: the rate of an output, a goal with a weight."""
+    if rule.column == "*_velocity" and "extremes" in result.tables:
+        return column.name.removesuffix("_velocity") in result.tables["extremes"]["output"]
+    if rule.table == "optimum" and rule.meaning == "*":
+        return f"w_{column.name}" in result.tables["optimum"]
+    return True
+
+
+def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
+    values = np.asarray(column.values, dtype=float)
+    if rule.row == "size":
+        values = np.abs(values)
+    groups = list(zip(*(table[name].tolist() for name in rule.by), strict=True)) or [()] * len(table)
+    finite = np.flatnonzero(np.isfinite(values)).tolist()
+    if rule.row in ("first", "each"):
+        rows = finite[: 1 if rule.row == "first" else None]
+    else:
+        sign = -1.0 if rule.row == "smallest" else 1.0
+        best: dict[tuple[Any, ...], int] = {}
+        for row in sorted(finite, key=lambda row: -sign * values[row]):
+            best.setdefault(groups[row], row)
+        rows = [best[group] for group in dict.fromkeys(groups) if group in best]
+    for row in rows:
+        words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
+        unit = unit_of(table, column.name, row)
+        name = column.name.removesuffix("_effort").removesuffix("_mean")
+        label = rule.label.format(**words, name=name, meaning=column.meaning)
+        low, high = (float(table[each][row]) for each in rule.bounds or (column.name, column.name))
+        if rule.table == "extremes" and low == high:
+            # Of a motion of one pose.
+            yield Headline(words["output"], shown(low), unit)
+        else:
+            notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
+            if rule.row not in ("first", "each") and (place := _pose(table, row)):
+                notes.append(f"at {place}")
+            yield Headline(label, shown(values[row]), unit, "; ".join(notes))
+
+
+def _pose(table: Table, row: int) -> str:
+    """The pose of a row, or what is held in it; nothing where all rows have the same."""
+    leading = [column for column in table.columns if column.meaning in _POSE]
+    if all(len(np.unique(column.values)) == 1 for column in leading):
+        return ""
+    values = (f"{column.name} = {shown(column.values[row])} {printed(column.unit)}" for column in leading)
+    return ", ".join(value.strip().replace(" ", _TOGETHER) for value in values)

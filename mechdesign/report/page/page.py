@@ -1,0 +1,217 @@
+"""The report of a study as one HTML file that asks for nothing else, and the index of several."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from mechdesign.commands import COMMANDS
+from mechdesign.errors import counted, explain
+from mechdesign.mechanism.describe import describe
+from mechdesign.report.figures import style
+from mechdesign.report.manifest import computed_from
+from mechdesign.report.page.headlines import shown
+from mechdesign.report.page.pages import GENERATOR
+from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.study import Study
+from mechdesign.study.schema.optimize import Requirement
+from mechdesign.study.schema.reliability import in_words
+
+# Pixels of the drawings in an index, twice as many as they are wide on the page, and their colours.
+_THUMBNAIL = (240, 180)
+_FEW_COLORS = 32
+
+
+@dataclass(frozen=True)
+class Answered:
+    """What became of one question."""
+
+    command: str
+    outcome: str  # in words
+    exit_code: int
+    failed: str = ""
+    verdicts: Sequence[Verdict] = ()
+    section: Mapping[str, Any] | None = None  # see `mechdesign.report.page.section`; None where nothing came out
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A study in an index."""
+
+    name: str
+    label: str
+    answers: Sequence[tuple[str, str, int]]  # command, outcome in words and exit code
+    met: int = 0
+    required: int = 0
+    warnings: int = 0
+    drawing: str = ""  # an image as a data URI
+    link: str = ""  # to its report; empty where there is none
+    failed: str = ""  # why there is none
+
+
+def report(study: Study, answers: Sequence[Answered], *, below: bool) -> bytes:
+    """The page of a study.
+
+    Parameters
+    ----------
+    below : bool
+        Whether the files of each question stand in a folder of its name below that of the page, or else beside it.
+    """
+    sections = [each.section for each in answers if each.section is not None]
+    warnings = [(f"{problem.key}: {problem.message}", "") for problem in study.warnings]
+    warnings += [(warning, each["command"]) for each in sections for warning in each["warnings"]]
+    moving = any(each["moving"] is not None for each in sections)
+    required = _requirements(study, answers)
+    return _page(
+        "report.html.j2",
+        moving=moving,
+        study=study,
+        about=_about(study),
+        drawing=next((each["mechanism"] for each in sections if each["mechanism"]), ""),
+        plots=all(each["plots"] for each in sections),
+        answers=answers,
+        questions=COMMANDS,
+        required=required,
+        met=sum(each["met"] for each in required),
+        warnings=warnings,
+        below=below,
+        made=computed_from(study, ""),
+    )
+
+
+def index(entries: Sequence[Entry]) -> bytes:
+    """The page of several studies, a row each."""
+    return _page("index.html.j2", moving=False, entries=entries, version=version("mechdesign"))
+
+
+def thumbnail(study: Study) -> str:
+    """A small drawing of a study's mechanism as a data URI; empty where it cannot be drawn."""
+    import io
+
+    from PIL import Image
+
+    from mechdesign.report.figures.drawing import draw_mechanism
+    from mechdesign.report.figures.framing import fit
+    from mechdesign.report.figures.scene import pose
+
+    try:
+        with style.context():
+            mechanism = study.mechanism
+            scene = pose(mechanism, mechanism.sketch_configuration)
+            assert scene is not None
+            width, height = (pixels / style.DPI for pixels in _THUMBNAIL)
+            window = fit(scene.points.values(), width, height, 0.25)
+            figure = style.new_figure(height, layout=None)
+            figure.set_size_inches(width, height)
+            axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+            axes.set_axis_off()
+            half = complex(width, height) / 2 / window.scale
+            axes.set_xlim(window.middle.real - half.real, window.middle.real + half.real)
+            axes.set_ylim(window.middle.imag - half.imag, window.middle.imag + half.imag)
+            draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=False, drives=False, size=0.7)
+            drawn = Image.open(io.BytesIO(style.encoded(figure))).convert("RGB")
+    except Exception:
+        return ""
+    stream = io.BytesIO()
+    drawn.quantize(_FEW_COLORS, dither=Image.Dither.NONE).save(stream, format="png", compress_level=style.DEFLATE_LEVEL)
+    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
+
+
+def _page(template: str, *, moving: bool, **content: Any) -> bytes:
+    environment = Environment(
+        loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
+    styles = _text("page.css") + (_text("moving.css") if moving else "")
+    script = _text("moving.js") if moving else ""
+    policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]
+    policy += [f"script-src {_hash(script)}"] if script else []
+    text = environment.get_template(template).render(
+        **content,
+        generator=Markup(GENERATOR),
+        policy="; ".join([*policy, "base-uri 'none'", "form-action 'none'"]),
+        # They are the package's own, and hold no end of their elements.
+        styles=Markup(styles),
+        script=Markup(script),
+    )
+    return text.encode()
+
+
+def _text(name: str) -> str:
+    return files("mechdesign.report.page").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, Any]]:
+    """The requirements of the questions that were asked, in the order of the study, each with its verdict."""
+    by_command = {each.command: each for each in answers}
+    verdicts = {command: iter(each.verdicts) for command, each in by_command.items()}
+    rows: list[dict[str, Any]] = []
+    for requirement in study.requirements:
+        command = command_of(requirement)
+        if command in by_command:
+            verdict = next(verdicts[command], None)
+            met = verdict is not None and verdict.met
+            rows.append({"command": command, "verdict": verdict, "met": met, **_in_words(requirement)})
+    return rows
+
+
+def _in_words(requirement: Requirement) -> dict[str, str]:
+    path = requirement.result.partition(".")[2]
+    bounds = ("\N{GREATER-THAN OR EQUAL TO}", requirement.at_least), ("\N{LESS-THAN OR EQUAL TO}", requirement.at_most)
+    return {
+        "what": f"|{path}|" if requirement.abs else path,
+        "where": ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items()),
+        "limit": ", ".join(f"{sign} {shown(bound)}" for sign, bound in bounds if bound is not None),
+    }
+
+
+def _about(study: Study) -> dict[str, Any]:
+    """The mechanism in words, and its numbers."""
+    mechanism, units = study.mechanism, study.units
+    description, graph = mechanism.description, mechanism.graph
+    try:
+        lines = [*describe(mechanism).splitlines(), *in_words(study.reliability, graph)]
+    except Exception as error:
+        lines = [explain(error)[1]]
+    told: dict[str, list[str]] = {"joint": [], "limit": [], "measure": [], "clearance": []}
+    rest = []
+    for line in lines:
+        kind, _, words = line.partition(": ")
+        if kind in told:
+            told[kind].append(words)
+        elif kind not in ("links", "mobility"):
+            rest.append(line.strip())
+    places = description.places
+    links = [
+        {
+            "name": name,
+            "kind": "telescopic leg" if link.telescopic else "link",
+            "points": ", ".join([*link.points, *(end for end in link.ends or () if end not in link.points)]),
+            "length": shown(places[f"{name}.length"].nominal) if f"{name}.length" in places else "",
+        }
+        for name, link in description.links.items()
+    ]
+    drives = [
+        f"{name}, the {drive.kind} of {drive.target}"
+        + (f" to {drive.reference}" if drive.reference != "ground" else "")
+        for name, drive in description.drives.items()
+    ]
+    parameters = [(name, shown(value), study.unit_of(name) or "") for name, value in study.parameters.nominal.items()]
+    loops = len(graph.edges) - len(graph.nodes) + 1
+    return {
+        "links": links, "drives": drives, "parameters": parameters, "told": told, "solution": rest, "loops": loops,
+        "mobility": mechanism.mobility, "length_unit": units.label("length"),
+    }  # fmt: skip

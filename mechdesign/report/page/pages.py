@@ -1,0 +1,26 @@
+"""The files of reports, and how they are known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+REPORT = "report.html"
+INDEX = "index.html"
+# By this a file is known as one of these pages, in its first bytes.
+GENERATOR = '<meta name="generator" content="mechdesign">'
+_HEAD = 2000
+
+
+def remove(path: Path) -> None:
+    """Remove a page of an older result; a file of that name that is not by mechdesign stays.
+
+    Raises
+    ------
+    OSError
+        If it cannot be removed.
+    """
+    if path.is_file():
+        with path.open("rb") as stream:
+            ours = GENERATOR.encode() in stream.read(_HEAD)
+        if ours:
+            path.unlink()

@@ -1,0 +1,195 @@
+"""A mechanism that follows the pointer over its workspace: poses at places that cover the region evenly."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from xml.etree.ElementTree import Element, tostring
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import BoundaryNorm, to_hex
+from matplotlib.figure import Figure
+from PIL import Image
+
+from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.workspace.tables import curves
+from mechdesign.mechanism import Configuration
+from mechdesign.numerics.arrays import Ints
+from mechdesign.report.figures import style
+from mechdesign.report.figures.scene import pose, travels
+from mechdesign.report.figures.workspace import contours, index_columns, index_norm
+from mechdesign.report.figures.workspace.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
+from mechdesign.report.page.linkage import Sheet, Sketcher, add
+from mechdesign.report.page.tracks import Moving, Numbers, places
+from mechdesign.results import Column, Result, Table
+from mechdesign.study import Study
+
+# Cells of the region's larger side with one pose each at most, of a single region and of each of several.
+CELLS = 60
+FEW_CELLS = 32
+_DPI = 96  # of the map of an index
+_SWATCH = 16.0  # width of a colour in the legend
+_NAMED_POSES = 12  # in which names keep off the links
+_LINE = 17.0  # height of a line of the legend, in the drawing's units
+_ENTRY = 170.0  # width of an entry
+_COLORS = 64  # of the map
+
+
+def roaming(study: Study, result: Result) -> Moving | None:
+    """The mechanism in its workspace, for each of a few values of held coordinates."""
+    found = some(regions(study, result))
+    section, mechanism = study.workspace, study.mechanism
+    if not found or section is None:
+        return None
+    cells = CELLS if len(found) == 1 else FEW_CELLS
+    solved = [_solved(study, region, cells) for region in found]
+    reached = [np.ravel(configuration.point(point)) for _, configuration in solved for point in mechanism.points]
+    everywhere = np.concatenate([*(region.places() for region in found), *reached])
+    sheet = Sheet.around(everywhere[np.isfinite(everywhere)])
+    choices, drawn, alike = [], [], None
+    for region, (rows, configuration) in zip(found, solved, strict=True):
+        table = _table(study, region, rows, configuration)
+        begin = int(np.argmax(np.nan_to_num(table["inverse_condition"], nan=-1.0)))
+        numbers = Numbers(table, np.arange(len(rows)), begin, alike)
+        alike = alike or numbers
+        told = [(column.name, [numbers.cell(column)]) for column in table.columns]
+        links = mechanism.description.links
+        step = sheet.scale * max(np.ptp(table[f"{section.point}.{axis}"]) for axis in "xy") / cells
+        choice = {"title": region.title, "poses": len(rows), "first": begin, "step": round(step, 1)}
+        choices.append(choice | {"numbers": numbers.tracks} | places(sheet, configuration, links))
+        drawn.append((begin, told))
+    (begin, told), (rows, configuration) = drawn[0], solved[0]
+    scene = pose(mechanism, configuration, begin)
+    assert scene is not None
+    root = sheet.root(f"the mechanism in the workspace of point {section.point}")
+    index = next((name for name in index_columns(found[0])
+                  if all(np.isfinite(region.local[name]).any() for region in found)), "")  # fmt: skip
+    norm = index_norm(found, index) if index else None
+    for k, region in enumerate(found):
+        layer = add(root, "g", **{"class": "moving-region" if k == 0 else "moving-region moving-off"})
+        _region(layer, sheet, region)
+        if norm is not None:
+            _map(layer, sheet, region, index, norm)
+        _boundary(layer, sheet, region)
+    sketcher = Sketcher(root, sheet, mechanism, scene)
+    few = np.unique(np.linspace(0, len(rows) - 1, _NAMED_POSES).round().astype(int)).tolist()
+    scenes = list(filter(None, (pose(mechanism, configuration, index) for index in few)))
+    sketcher.draw(travels([scene, *scenes]))
+    sketcher.names([scene, *scenes])
+    sketcher.ruler(study.units.label("length"))
+    _legend(root, sheet, found, found[0].local.column(index) if index else None, norm)
+    data = {"choices": choices, "point": section.point, "unit": study.units.label("length")}
+    words = f"point {section.point} in its workspace" + (f", at {found[0].title}" if found[0].title else "")
+    return Moving(tostring(root, encoding="unicode"), "", data, words, ["value"], told)
+
+
+def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configuration]:
+    """Rows of the region's grid, at most one in each of even cells, and the poses there."""
+    assert study.workspace is not None
+    point, local = study.workspace.point, region.local
+    given = {f"{point}.x": local["x"], f"{point}.y": local["y"], **region.held}
+    plan = study.mechanism.plan(tuple(given))
+    values = [radians(study, study.mechanism.coordinate(name), value) for name, value in given.items()]
+    configuration = plan.solve(np.broadcast_arrays(*values), limits=False)
+    z = local["x"] + 1j * local["y"]
+    known = np.flatnonzero(configuration.valid)
+    z, corner = z[known], complex(z.real.min(), z.imag.min())
+    size = max(np.ptp(z.real), np.ptp(z.imag)) / cells
+    steps = (z - corner) / size
+    column, row = np.floor(steps.real).astype(int), np.floor(steps.imag).astype(int)
+    far = np.abs(steps - column - 0.5 - 1j * (row + 0.5))
+    order = np.lexsort((far, column, row))
+    cell = row[order] * (cells + 2) + column[order]
+    nearest = known[order[np.append(True, np.diff(cell) > 0)]]
+    return nearest, configuration.take(nearest)
+
+
+def _table(study: Study, region: Region, rows: Ints, configuration: Configuration) -> Table:
+    """Place, drives and local indices at some rows of the region's grid."""
+    assert study.workspace is not None
+    columns = [Column(f"{study.workspace.point}.{axis}", region.local[axis][rows], region.local.column(axis).unit)
+               for axis in "xy"]  # fmt: skip
+    for name in study.mechanism.drives:
+        drive = study.mechanism.coordinate(name)
+        values = np.asarray(in_study_units(study, drive, configuration.value(drive)))
+        columns.append(Column(name, np.broadcast_to(values, len(rows)), study.units.label(drive.quantity)))
+    told = [region.local.column(name) for name in index_columns(region)]
+    columns += [Column(column.name, column.values[rows].astype(float), column.unit) for column in told]
+    return Table("poses", tuple(columns))
+
+
+def _region(layer: Element, sheet: Sheet, region: Region) -> None:
+    """The region, and faintly what is left out."""
+    if region.others is not None:
+        _fill(layer, sheet, region.others[0], LEFT_OUT)
+    _fill(layer, sheet, region.local, PALE)
+
+
+def _map(layer: Element, sheet: Sheet, region: Region, index: str, norm: BoundaryNorm) -> None:
+    """A local index over the region, as a picture of few colours."""
+    figure = Figure(figsize=(sheet.width / 72, sheet.height / 72), dpi=_DPI)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set_axis_off()
+    contours(axes, list(grids(region.local, index)), norm, labels=False)
+    far = sheet.corner + complex(sheet.width, -sheet.height) / sheet.scale
+    axes.set_xlim(sheet.corner.real, far.real)
+    axes.set_ylim(far.imag, sheet.corner.imag)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="rgba", dpi=_DPI)
+    pixels = Image.frombytes("RGBA", figure.canvas.get_width_height(), stream.getvalue()).convert("RGB")
+    few, packed = pixels.quantize(_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE), io.BytesIO()
+    few.save(packed, format="png", optimize=True)
+    data = f"data:image/png;base64,{base64.b64encode(packed.getvalue()).decode()}"
+    add(layer, "image", href=data, width=sheet.width, height=sheet.height, preserveAspectRatio="none")
+
+
+def _boundary(layer: Element, sheet: Sheet, region: Region) -> None:
+    """The boundary, by what ends the region there."""
+    table = region.boundary
+    for rows in curves(table):
+        line = add(layer, "path", d=sheet.path(table["x"][rows] + 1j * table["y"][rows]))
+        _look(line, fate(str(table["kind"][rows[0]]), str(table["at"][rows[0]])))
+
+
+def _fill(layer: Element, sheet: Sheet, local: Table, color: str) -> None:
+    for x, y, _ in grids(local, "det_J"):
+        z = x + 1j * y
+        edge = np.concatenate([z[:, 0], z[::-1, -1]])
+        add(layer, "path", d=f"{sheet.path(edge)}z", fill=color, stroke=color, stroke_width=0.6)
+
+
+def _look(line: Element, kind: str) -> None:
+    color, dashes, width, _ = LOOKS[kind]
+    line.attrib |= {"stroke": to_hex(color), "stroke-width": f"{width:g}"}
+    if dashes != "-":
+        line.set("stroke-dasharray", " ".join(f"{width * part:g}" for part in dashes[1]))
+
+
+def _legend(
+    root: Element, sheet: Sheet, found: Sequence[Region], index: Column | None, norm: BoundaryNorm | None
+) -> None:
+    """Below the drawing what ends the regions, and what the colours of the map mean."""
+    seen = {fate(str(kind), str(at)) for region in found
+            for kind, at in zip(region.boundary["kind"], region.boundary["at"], strict=True)}  # fmt: skip
+    kinds = [kind for kind in LOOKS if kind in seen]
+    columns = int(sheet.width // _ENTRY)
+    for k, kind in enumerate(kinds):
+        x, y = 12 + _ENTRY * (k % columns), sheet.height + _LINE * (k // columns + 0.5)
+        _look(add(root, "path", d=f"M{x:g} {y:.1f}h24"), kind)
+        add(root, "text", LOOKS[kind][3], x=x + 30, y=y + 3.5, font_size=10, fill="#333333")
+    height = sheet.height + _LINE * -(-len(kinds) // columns)
+    if index is not None and norm is not None:
+        height += _LINE
+        levels = np.asarray(norm.boundaries, dtype=float)
+        for k, level in enumerate((levels[1:] + levels[:-1]) / 2):
+            add(root, "rect", x=12 + _SWATCH * k, y=height - 0.8 * _LINE, width=_SWATCH, height=0.6 * _LINE,
+                fill=to_hex(colormaps[style.COLORMAP](int(norm(level)))))  # fmt: skip
+        name = style.axis_label(index.name.replace("_", " "), index.unit)
+        words = f"{name}, from {levels[0]:g} to {levels[-1]:g}{' and beyond' * (norm.extend != 'neither')}"
+        add(root, "text", words, x=18 + _SWATCH * (len(levels) - 1), y=height - 0.3 * _LINE, font_size=10,
+            fill="#333333")  # fmt: skip
+    root.set("viewBox", f"0 0 {sheet.width:g} {height + 4:.1f}")

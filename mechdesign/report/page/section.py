@@ -1,0 +1,88 @@
+"""What stands of one question in a report, as plain data: it is kept in the question's folder, as ``report.json``."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mechdesign.errors import explain
+from mechdesign.report.page.headlines import headlines
+from mechdesign.report.page.moving import moving
+from mechdesign.report.tables import cells, plain
+from mechdesign.results import Result, Table
+from mechdesign.study import Study
+
+NAME = "report.json"
+# Of a mechanism that moves: the picture of the same curves is left out.
+CURVES = "motion"
+# Tables of more rows than this are shown by their first ones.
+MOST_ROWS = 24
+FIRST_ROWS = 8
+# A table of few rows and many columns is turned: a line a column, with its meaning.
+FEW_ROWS = 3
+MANY_COLUMNS = 7
+_DIGITS = 6
+_NO_NUMBER = {"nan": "\N{EN DASH}", "inf": "\N{INFINITY}", "-inf": "\N{MINUS SIGN}\N{INFINITY}"}
+
+
+def section(
+    study: Study, result: Result, pictures: Mapping[str, str], mechanism: str, undrawn: Sequence[str], *, plots: bool
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """The part of a report that a result fills, and a warning if the mechanism cannot be shown moving.
+
+    Parameters
+    ----------
+    pictures : mapping of str to str
+        HTML of the pictures of the question by their names.
+    mechanism : str
+        HTML of the drawing of the mechanism; empty where there is none.
+    plots : bool
+        Whether pictures are wanted; without them nothing moves.
+    """
+    part, warnings = None, tuple(undrawn)
+    if plots and not result.interrupted:
+        try:
+            part = moving(study, result)
+        except Exception as error:
+            warnings = (*warnings, f"the mechanism cannot be shown moving: {explain(error)[1]}")
+    shown = {name: html for name, html in pictures.items() if part is None or name != CURVES}
+    return {
+        "command": result.command,
+        "headlines": [dataclasses.asdict(each) for each in headlines(result)],
+        "mechanism": mechanism,
+        "pictures": [{"name": name, "html": html} for name, html in shown.items()],
+        "moving": None if part is None else dataclasses.asdict(part),
+        "tables": [_table(table) for table in result.tables.values()],
+        "files": list(result.files),
+        "counts": plain(dict(result.counts)),
+        "warnings": [*result.warnings, *warnings],
+        "interrupted": result.interrupted,
+        "plots": plots,
+    }, warnings
+
+
+def encoded(part: Mapping[str, Any]) -> bytes:
+    """The part as the bytes of its file."""
+    return (json.dumps(part, ensure_ascii=False, separators=(",", ":")) + "\n").encode()
+
+
+def _table(table: Table) -> dict[str, Any]:
+    count = len(table)
+    turned = 0 < count <= FEW_ROWS and len(table.columns) >= MANY_COLUMNS
+    first = table.take(np.arange(count if count <= MOST_ROWS else FIRST_ROWS))
+    texts = [[_NO_NUMBER.get(text, text) for text in column] for column in cells(first, _DIGITS)]
+    return {
+        "name": table.name,
+        "meaning": table.meaning,
+        "rows": count,
+        "turned": turned,
+        "columns": [
+            {"name": column.name, "unit": column.unit, "meaning": column.meaning, "numeric": column.numeric}
+            for column in table.columns
+        ],
+        "cells": texts if turned else [list(row) for row in zip(*texts, strict=True)],
+    }

@@ -1,0 +1,135 @@
+"""Poses of a mechanism, and its numbers in them, as integers that a small script draws from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Link
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.report.figures import style
+from mechdesign.report.figures.scene import link_points
+from mechdesign.report.page.linkage import Sheet
+from mechdesign.results import Column, Table
+
+# Integers in a unit of a drawing, in a degree, and in a point of the curves.
+PLACES = 20
+TURNS = 100
+CURVES = 10
+# Steps of a number up to its usual size, at least.
+_STEPS = 1000
+_COMMON = 0.5  # part of the values that are smaller than what counts as the size of a column
+_ROUNDING = 1e-11  # of a number that should be zero, and its part of others of its unit
+_POWERS = (-3, 5)  # of ten, beyond which numbers are written with a power of their own
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A number of the pose drawn, which of the numbers it is, and its unit."""
+
+    number: int
+    text: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A mechanism that moves in a page."""
+
+    drawing: str  # inline SVG in one pose: what is seen without script and in print
+    beside: str  # inline SVG that shows where it is: motion curves, or nothing where the drawing has the map
+    data: Mapping[str, Any]  # what the script moves it by, as JSON
+    words: str  # the pose drawn
+    headings: Sequence[str]  # of the columns of numbers
+    rows: Sequence[tuple[str, Sequence[Cell | None]]]  # numbers of the pose drawn, by what they are of
+
+
+class Numbers:
+    """Columns as integers of their last decimal shown, and the text of each in the pose drawn.
+
+    Those of further poses have as many decimals as `alike`, and the same units.
+    """
+
+    def __init__(self, table: Table, rows: Ints, begin: int, alike: Numbers | None = None) -> None:
+        self.rows, self.begin, self.alike = rows, begin, alike
+        self.sizes: dict[str, float] = {}
+        for column in table.columns:
+            if column.values.dtype.kind == "f":
+                self.sizes[column.unit] = max(self.sizes.get(column.unit, 0.0), _size(column.values[rows]))
+        self.tracks: list[list[Any]] = []
+        self.found: dict[str, tuple[int, int, int]] = {}
+        self.units: dict[str, str] = {}
+
+    def add(self, column: Column) -> int:
+        """Take over a column; returns which of the numbers it is."""
+        if column.name in self.found:
+            return self.found[column.name][0]
+        values = column.values[self.rows]
+        decimals, power = self._digits(column) if self.alike is None else self.alike.found[column.name][1:]
+        self.tracks.append([decimals, deltas(values, 10.0 ** (decimals - power))])
+        self.found[column.name] = len(self.tracks) - 1, decimals, power
+        factor = f"\N{MULTIPLICATION SIGN}10{style.raised(power)} " if power else ""
+        self.units[column.name] = f"{factor}{style.printed(column.unit)}".rstrip()
+        return len(self.tracks) - 1
+
+    def _digits(self, column: Column) -> tuple[int, int]:
+        """Decimals of a column, and the power of ten of its unit."""
+        size, largest = _size(column.values[self.rows]), self.sizes.get(column.unit, 0.0)
+        if size <= _ROUNDING * max(1.0, largest):
+            # What stands still but for rounding has the digits of what moves.
+            size = largest if largest > _ROUNDING else 1.0
+        power = math.floor(math.log10(size))
+        power = 0 if _POWERS[0] < power < _POWERS[1] else 3 * (power // 3)
+        return max(0, math.ceil(math.log10(_STEPS * 10.0**power / size))), power
+
+    def cell(self, column: Column) -> Cell:
+        """The column's number in the pose drawn."""
+        which = self.add(column)
+        _, decimals, power = self.found[column.name]
+        value = float(column.values[self.rows[self.begin]])
+        text = f"{value / 10.0**power:.{decimals}f}" if math.isfinite(value) else "\N{EN DASH}"
+        return Cell(which, text, self.units[column.name])
+
+
+def _size(values: Floats) -> float:
+    """How large the numbers of a column usually are."""
+    known = np.abs(values[np.isfinite(values)])
+    return float(np.quantile(known, _COMMON) or known.max()) if len(known) else 0.0
+
+
+def deltas(values: Floats, factor: float) -> list[int | None]:
+    """Values times a factor as integers: the first, then the step from the last known one; None where there is none.
+
+    Steps of zero at the end are left out.
+    """
+    found: list[int | None] = []
+    last = 0
+    for value in (values * factor).tolist():
+        whole = round(value) if math.isfinite(value) else None
+        found.append(None if whole is None else whole - last)
+        last = last if whole is None else whole
+    while found and found[-1] == 0:
+        found.pop()
+    return found
+
+
+def places(sheet: Sheet, configuration: Configuration, links: Mapping[str, Link]) -> dict[str, Any]:
+    """Places of the points and directions of the links in every pose, in the drawing's units and degrees."""
+    valid = configuration.valid
+    found: dict[str, Any] = {"corner": [sheet.corner.real, sheet.corner.imag], "scale": sheet.scale,
+                             "x": {}, "y": {}, "turn": {}}  # fmt: skip
+    for point in dict.fromkeys(point for link in links.values() for point in link_points(link)):
+        at = sheet.all(np.where(valid, configuration.point(point), complex(np.nan, np.nan)))
+        found["x"][point], found["y"][point] = deltas(at.real, PLACES), deltas(at.imag, PLACES)
+    for name in links:
+        if name != GROUND:
+            angles = np.full(len(valid), np.nan)
+            angles[valid] = np.unwrap(-np.angle(configuration.rotation(name)[valid]))
+            found["turn"][name] = deltas(np.degrees(angles), TURNS)
+    return found

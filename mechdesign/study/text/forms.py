@@ -1,0 +1,71 @@
+"""JSON Schema in words: what may stand at a key, for editors and the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import core_schema
+
+from mechdesign.study.text import fields
+from mechdesign.study.text.fields import Form
+
+_TYPES = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true or false"}
+
+
+class Generator(GenerateJsonSchema):
+    """Of pydantic, without the titles that it makes of names."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        """None is wanted: `name_forms` gives titles that say something."""
+        return False
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> Form:
+        """The same of a model."""
+        found = super().model_schema(schema)
+        found.pop("title", None)
+        return found
+
+    def dict_schema(self, schema: core_schema.DictSchema) -> Form:
+        """That of a mapping, whose keys and values keep their titles."""
+        found = super().dict_schema(schema)
+        if "keys_schema" in schema and schema["keys_schema"]["type"] != "str":
+            found["propertyNames"] = self.generate_inner(schema["keys_schema"])
+        if "values_schema" in schema:
+            found["additionalProperties"] = self.generate_inner(schema["values_schema"])
+        return found
+
+
+def name_forms(schema: Form) -> None:
+    """Give every property of a schema and of the models it refers to a title: what it takes, in words."""
+    for model in (schema, *schema["$defs"].values()):
+        for form in properties(model).values():
+            form["title"] = in_words(form, schema["$defs"])
+
+
+def properties(model: Form) -> dict[str, Form]:
+    """Of a model's schema the part that each key has; a model with short forms is the first of several."""
+    found: dict[str, Form] = model.get("anyOf", [model])[0]["properties"]
+    return found
+
+
+def in_words(form: Form, known: Mapping[str, Form]) -> str:
+    """What a form accepts, written as it stands in a study; `known` are the models that it refers to."""
+    if "title" in form:
+        return str(form["title"])
+    if "$ref" in form:
+        return in_words(known[form["$ref"].rpartition("/")[2]], known)
+    if arms := form.get("anyOf", form.get("oneOf")):
+        return " or ".join(dict.fromkeys(in_words(arm, known) for arm in arms if arm.get("type") != "null"))
+    if "const" in form or "enum" in form:
+        return " or ".join(map(str, form.get("enum", [form.get("const")])))
+    if "prefixItems" in form:
+        return f"[{', '.join(in_words(part, known) for part in form['prefixItems'])}]"
+    if "items" in form:
+        each = in_words(form["items"], known)
+        return f"[{each}, {each}]" if form.get("maxItems") == 2 else f"[{each}, ...]"
+    if isinstance(form.get("additionalProperties"), dict):
+        by = in_words(form.get("propertyNames", fields.NAME_FORM), known)
+        return f"{{{by}: {in_words(form['additionalProperties'], known)}, ...}}"
+    return "mapping" if form.get("type") == "object" else _TYPES[form["type"]]

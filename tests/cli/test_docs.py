@@ -1,0 +1,44 @@
+"""`mechdesign docs`: words in the terminal, and where a wrong study leads to."""
+
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("pin", "normal_in_disc: "),
+        ("GII", "global isotropy index"),
+        ("--junit", "stands in: run"),
+        ("kinematics", "takes: mechdesign kinematics STUDY [OPTIONS]"),
+        ("130", "interrupted"),
+        ("reliability.clearances", "    radial: Mean radial clearance"),
+        ("thou", "0.001 * inch"),
+    ],
+)
+def test_a_word_is_told(word, told, invoke):
+    done = invoke("docs", word)
+    assert done.exit_code == 0
+    assert told in done.stdout
+    assert "\x1b" not in done.stdout
+
+
+def test_without_a_word_there_is_an_overview(invoke):
+    lines = invoke("docs").stdout.splitlines()
+    assert "study: name, units, seed, mechanism, kinematics" in "\n".join(lines)
+    assert any(line.startswith("function: sqrt") for line in lines)
+
+
+def test_several_words_and_one_that_nobody_knows(invoke):
+    assert invoke("docs", "sweep", "GRI").stdout.count("GRI (") == 1
+    done = invoke("docs", "sweep", "clearence")
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "the reference has no 'clearence'; did you mean 'clearances'?" in done.stderr
+
+
+def test_a_wrong_study_names_the_words_to_look_up_once(folder, invoke):
+    text = (folder / "slider.yaml").read_text().replace("through: G}", "through: G, angel: 3}")
+    (folder / "wrong.yaml").write_text(text + "  sweeep: 3\n  rates: {theta: fast}\n")
+    done = invoke("kinematics", "wrong.yaml")
+    assert done.exit_code == 2
+    assert done.stderr.splitlines()[-1] == "(mechdesign docs mechanism.joints kinematics kinematics.rates)"
+    assert done.stderr.count("mechdesign docs") == 1

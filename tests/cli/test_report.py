@@ -1,0 +1,250 @@
+"""`--report`: a page a study and an index, whole in one file, whatever became of the questions."""
+
+import base64
+import hashlib
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.errors import AssemblyError, Interrupted
+
+from .conftest import SLIDER, answer
+
+HOSTILE = """</script><img src=x onerror=alert(1)>'"&"""
+STIFF = """\
+stiffness:
+  link: rod
+  at: B
+  sections: {beam: {E: 200 GPa, area: 100, inertia: 1000}}
+  elastic: {rod: beam}
+requirements:
+  - {result: kinematics.B.x, at_least: 90}
+  - {result: stiffness.k_x, at_least: 1}
+"""
+FINE = (
+    SLIDER.replace("to: 90, step: 45", "to: 360, step: 1") + "  rates: {theta: 10 rad/s}\n  outputs: [B, rod.angle]\n"
+)
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """A page taken apart: its elements in order with their attributes, their texts, and what is nested wrongly."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.bytes = Path(path).read_bytes()
+        self.text = self.bytes.decode()
+        self.elements, self.texts, self.open, self.wrong = [], {}, [], []
+        self.feed(self.text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append((tag, len(self.elements) - 1))
+
+    def handle_startendtag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop()[0] != tag:
+            self.wrong.append(tag)
+
+    def handle_data(self, data):
+        if self.open:
+            for _, number in self.open:
+                self.texts[number] = self.texts.get(number, "") + data
+
+    def all(self, tag):
+        return [attributes for each, attributes in self.elements if each == tag]
+
+    def said(self, tag):
+        return [self.texts.get(number, "") for number, (each, _) in enumerate(self.elements) if each == tag]
+
+
+def check(page):
+    """What holds of every page, whatever is in it."""
+    assert not page.wrong
+    assert not page.open
+    # Nothing is asked of anybody: no address but the name of SVG, and a policy that names what may style and run.
+    assert "http" not in page.text.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")
+    policy = next(each["content"] for each in page.all("meta") if each.get("http-equiv"))
+    assert "default-src 'none'" in policy
+    scripts = [
+        page.texts[number]
+        for number, (tag, attributes) in enumerate(page.elements)
+        if tag == "script" and attributes.get("type") != "application/json"
+    ]
+    for kind, found in (("style-src", page.said("style")), ("script-src", scripts)):
+        assert len(found) == (f"{kind} " in policy)
+        for text in found:
+            assert f"{kind} 'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" in policy
+    assert not [key for _, attributes in page.elements for key in attributes if key.startswith("on") or key == "style"]
+    ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    named = re.findall(r'(?:(?:href|aria-labelledby)="#?|url\(#)([\w.-]+)["\)]', page.text)
+    assert {name for name in named if not name.endswith(".html")} <= set(ids)
+    assert all(each.get("alt") for each in page.all("img"))
+    assert all(each.get("aria-label") or each.get("aria-hidden") for each in page.all("svg"))
+    assert all(each.get("scope") for each in page.all("th"))
+    assert len(page.all("caption")) == len(page.all("table"))
+    assert page.said("title") == page.said("h1") or page.said("title") == ["Design studies"]
+
+
+@pytest.fixture
+def asks(folder):
+    (folder / "both.yaml").write_text(SLIDER.replace("step: 45", "step: 15") + STIFF)
+    return folder
+
+
+def test_a_page_holds_all_of_a_study(asks, invoke):
+    with (asks / "both.yaml").open("a") as stream:
+        stream.write("  - {result: kinematics.extremes.range, at_most: 50, where: {output: B.x}}\n")
+    done = invoke("run", "both.yaml", "--report")
+    assert done.exit_code == 1
+    page = Page("results/both/report.html")
+    check(page)
+    headings = page.said("h2")
+    assert headings[:3] == ["Mechanism", "Answers", "Requirements"]
+    assert {"How does it move?", "How stiff is it?"} <= set(headings)
+    motion = json.loads(Path("results/both/kinematics/manifest.json").read_text())["tables"]["motion.csv"]["columns"]
+    heads = page.said("th")
+    for column in motion:
+        assert f"{column['name']} [{column['unit']}]" in heads or (not column["unit"] and column["name"] in heads)
+        assert {"scope": "col", "class": "number", "title": column["meaning"]} in page.all("th")
+    # With the crank up B is at sqrt(120^2 - 60^2), at 0 deg at 40 + sqrt(120^2 - 20^2).
+    cells = page.said("td")
+    first, last = cells.index("✓ met"), cells.index("✗ not met")
+    assert cells[first + 1 : first + 5] == ["≥ 90 mm", "103.9 mm", "+13.92 mm", "theta 90"]
+    assert cells[last + 1 : last + 4] == ["≤ 50 mm", "54.4 mm", "−4.399 mm"]
+    assert "2 of 3 requirements met" in page.text
+
+
+def test_the_same_study_gives_the_same_page_also_of_kept_questions(folder, invoke):
+    for out, more in (("one", []), ("two", []), ("two", ["--resume"])):
+        invoke("run", "slider.yaml", "--report", "--out", out, *more)
+        assert Path(out, "report.html").read_bytes() == Path("one/report.html").read_bytes()
+    # A question of which the page has nothing yet is asked again.
+    invoke("run", "slider.yaml", "--no-plots", "--out", "two")
+    assert not Path("two/report.html").exists()
+    assert not Path("two/kinematics/report.json").exists()
+    invoke("run", "slider.yaml", "--report", "--out", "two", "--resume")
+    assert Path("two/report.html").read_bytes() == Path("one/report.html").read_bytes()
+
+
+def test_kept_questions_are_not_computed_for_a_page(asks, analysis, invoke):
+    computed = []
+    analysis(lambda study, **options: computed.append(study) or kinematics(study))
+    for times in (1, 1):
+        invoke("run", "slider.yaml", "--report", "--resume")
+        assert len(computed) == times
+    check(Page("results/slider/report.html"))
+
+
+def test_a_fine_motion_with_its_curves_is_small(folder, invoke):
+    (folder / "fine.yaml").write_text(FINE)
+    done = invoke("kinematics", "fine.yaml", "--report")
+    assert done.exit_code == 0, done.output
+    page = Page("results/fine/kinematics/report.html")
+    check(page)
+    assert len(page.bytes) < 300_000
+    assert "the first 8 of 361 rows" in page.text
+    for words in ("range of B.x", "largest velocity of rod.angle"):
+        assert words in page.said("dt")
+
+
+def test_what_a_study_says_stays_text(folder, invoke):
+    folder.joinpath("<b>.yaml").write_text(SLIDER.replace("Offset slider-crank", json.dumps(HOSTILE)))
+    done = invoke("run", "<b>.yaml", "slider.yaml", "--report", "--no-plots")
+    assert done.exit_code == 0, done.stderr
+    for path in ("results/<b>/report.html", "results/index.html"):
+        page = Page(path)
+        check(page)
+        assert not [each for each in page.all("img") if "onerror" in each]
+        assert HOSTILE in (page.said("h1") if "report" in path else page.said("a"))
+    assert "%3Cb%3E/report.html" in [each["href"] for each in Page("results/index.html").all("a")]
+
+
+def test_an_index_tells_of_every_study(asks, analysis, invoke):
+    def fail(study, **options):
+        raise AssemblyError("cannot reach <there>")
+
+    analysis(fail, "stiffness")
+    (asks / "wrong.yaml").write_text(SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]"))
+    done = invoke("run", "both.yaml", "wrong.yaml", "slider.yaml", "--report")
+    assert done.exit_code == 3, done.stderr
+    page = Page("results/index.html")
+    check(page)
+    rows = [" ".join(text.split()) for text in page.said("tr")][1:]
+    assert "wrong study" in rows[0]
+    assert "mechanism.links.crank" in rows[0]
+    assert "stiffness: ✗ cannot be assembled" in rows[1]
+    assert "✗ 0 of 2 met" in rows[1]
+    assert "kinematics: ✓ done no requirements no warnings" in rows[2]
+    assert [each["href"] for each in page.all("a")] == ["both/report.html", "slider/report.html"]
+    assert len(page.all("img")) == 2
+    failed = Page("results/both/report.html")
+    check(failed)
+    assert "cannot be assembled: cannot reach <there>" in " ".join(failed.said("p"))
+    assert "not judged" in failed.text
+
+
+def test_an_interrupted_run_leaves_a_page_of_what_was_finished(asks, analysis, invoke):
+    def interrupt(study, **options):
+        raise KeyboardInterrupt
+
+    analysis(interrupt, "stiffness")
+    done = invoke("run", "both.yaml", "slider.yaml", "--report")
+    assert done.exit_code == 130
+    assert "failed" not in done.output, done.output
+    page = Page("results/both/report.html")
+    check(page)
+    assert "✗ interrupted" in " ".join(page.said("p"))
+    assert "motion.csv" in page.text
+    assert not Path("results/slider").exists()
+
+
+def test_the_finished_part_of_an_interrupted_question_is_in_its_page(folder, analysis, invoke):
+    def interrupt(study, **options):
+        raise Interrupted(answer(interrupted="2 of 3 poses"))
+
+    analysis(interrupt)
+    for command in (["kinematics"], ["run"]):
+        done = invoke(*command, "slider.yaml", "--report", "--out", "out")
+        assert done.exit_code == 130
+        page = Page("out/report.html")
+        check(page)
+        assert "✗ interrupted: 2 of 3 poses" in page.said("p")
+        assert "all 3 rows" in page.said("caption")
+
+
+def test_questions_after_a_failure_stand_as_not_asked(asks, analysis, invoke):
+    analysis(lambda study, **options: answer(failed="no pose"))
+    invoke("run", "both.yaml", "--report", "--fail-fast")
+    page = Page("results/both/report.html")
+    check(page)
+    assert "✗ not asked: the run ended before it" in page.said("p")
+
+
+def test_a_page_without_pictures_says_so(folder, invoke):
+    done = invoke("kinematics", "slider.yaml", "--report", "--no-plots")
+    assert done.exit_code == 0
+    page = Page("results/slider/kinematics/report.html")
+    check(page)
+    assert "without pictures, as was asked (--no-plots)" in page.text
+    assert not page.all("svg")
+
+
+def test_an_older_page_goes_and_one_of_others_stays(folder, invoke):
+    own = folder / "results/slider/report.html"
+    invoke("run", "slider.yaml", "--report", "--no-plots")
+    assert own.exists()
+    invoke("run", "slider.yaml", "--no-plots")
+    assert not own.exists()
+    own.write_text("<p>mine")
+    invoke("run", "slider.yaml", "--no-plots")
+    assert own.exists()

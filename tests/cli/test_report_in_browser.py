@@ -1,0 +1,202 @@
+"""The moving mechanism of a report as a person uses it, in a real browser (Debian: chromium-headless-shell)."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.analyses.workspace.analysis import workspace
+from mechdesign.report.page.page import Answered, report
+from mechdesign.report.page.section import section
+from mechdesign.study import load
+
+try:
+    from playwright.sync_api import expect, sync_playwright
+except ImportError:
+    sync_playwright = None
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+PIXELS = 0.2  # of the drawing: a step of the places and of the angles that the page has
+ABSENT = "no browser: install Debian's chromium-headless-shell and pip's playwright to look at the reports"
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """One browser for all."""
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None or sync_playwright is None:
+        pytest.skip(ABSENT)
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def answers():
+    """Results of a few questions, by study."""
+    found = {}
+    for name, command in (("gallery/slider_crank", kinematics), ("gallery/rrr_platform", kinematics),
+                          ("five_bar", workspace)):  # fmt: skip
+        study = load(CONFIGS / f"{name}.yaml")
+        found[Path(name).name] = study, command(study)
+    return found
+
+
+@pytest.fixture(scope="module")
+def reports(answers, tmp_path_factory):
+    """A folder with the reports of these, without other pictures."""
+    folder = tmp_path_factory.mktemp("reports")
+    for name, (study, result) in answers.items():
+        part, warnings = section(study, result, {}, "", (), plots=True)
+        assert warnings == ()
+        (folder / f"{name}.html").write_bytes(
+            report(study, [Answered(result.command, "done", 0, section=part)], below=False)
+        )
+    return folder
+
+
+@pytest.fixture
+def opened(browser, reports):
+    """Open a study's report; at the end nothing was asked of the network, and nothing complained."""
+    pages, complaints = [], []
+
+    def look(name, width=1400, **options):
+        page = browser.new_page(viewport={"width": width, "height": 900}, **options)
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda request: complaints.append(request.url)
+                if not request.url.startswith(("file://", "data:")) else None)  # fmt: skip
+        page.goto((reports / f"{name}.html").as_uri())
+        pages.append(page)
+        return page
+
+    yield look
+    for page in pages:
+        page.close()
+    assert complaints == []
+
+
+def rows_of(answers, name):
+    return list(answers[name][1].tables["motion"])
+
+
+def words(page):
+    return page.locator(".moving-words").inner_text().replace("\N{NO-BREAK SPACE}", " ")
+
+
+def place(page, point):
+    """Where the joint of a point stands in the drawing, in the study's units."""
+    transform = page.locator(f".moving [data-at={point}]:has(circle)").get_attribute("transform")
+    x, y = map(float, re.match(r"translate\((\S+) (\S+)\)", transform).groups())
+    data = page.evaluate("() => { const d = JSON.parse(document.querySelector('.moving script').textContent);"
+                         " return (d.choices || [d])[0]; }")  # fmt: skip
+    return data["corner"][0] + x / data["scale"], data["corner"][1] - y / data["scale"], PIXELS / data["scale"]
+
+
+def test_slider_and_keys_bring_the_pin_to_where_the_table_has_it(opened, answers):
+    page, rows = opened("slider_crank"), rows_of(answers, "slider_crank")
+    slider = page.get_by_role("slider", name="pose of the motion")
+
+    def at(row):
+        x, _, error = place(page, "B")
+        assert x == pytest.approx(rows[row]["B.x"], abs=error)
+        assert slider.input_value() == str(row)
+        assert f"crank = {rows[row]['crank']:.1f} deg" in words(page)
+        assert float(page.locator("tr:has(th:text-is('B.x')) td span").first.inner_text()) == pytest.approx(
+            rows[row]["B.x"], abs=1e-3)  # fmt: skip
+
+    at(0)
+    slider.fill("20")
+    at(20)
+    for key, row in (("ArrowRight", 21), ("End", len(rows) - 1), ("Home", 0)):
+        slider.press(key)
+        at(row)
+    assert page.get_by_label("Velocities").is_checked() is False
+    page.get_by_label("Velocities").check()
+    assert page.locator(".moving svg path[d*='m']").last.is_visible()
+
+
+def test_it_plays_on_request_only_and_stops(opened):
+    page = opened("slider_crank")
+    slider, button = page.get_by_role("slider"), page.get_by_role("button", name="Play")
+    page.wait_for_timeout(150)
+    assert slider.input_value() == "0"
+    button.click()
+    expect(slider).to_have_value(re.compile(r"[4-9]|\d\d"))
+    slider.press(" ")
+    page.get_by_role("button", name="Play").wait_for()
+    stopped = slider.input_value()
+    page.wait_for_timeout(150)
+    assert slider.input_value() == stopped
+
+
+def test_who_wants_no_motion_sees_steps(opened):
+    page = opened("slider_crank", reduced_motion="reduce")
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(300)
+    assert page.get_by_role("slider").input_value() == "0"
+    expect(page.get_by_role("slider")).to_have_value("3")
+
+
+def test_a_click_in_the_curves_chooses_the_pose(opened, answers):
+    page, rows = opened("slider_crank"), rows_of(answers, "slider_crank")
+    curves = page.locator(".moving-curves")
+    box = curves.bounding_box()
+    curves.click(position={"x": 0.5 * box["width"], "y": 0.3 * box["height"]})
+    row = int(page.get_by_role("slider").input_value())
+    cursor = float(page.locator(".moving-cursor").get_attribute("x1"))
+    wide = float(curves.get_attribute("viewBox").split()[2])
+    assert cursor == pytest.approx(0.5 * wide, abs=0.01 * wide)
+    assert 0 < row < len(rows) - 1
+    assert place(page, "B")[0] == pytest.approx(rows[row]["B.x"], abs=place(page, "B")[2])
+
+
+def test_poses_that_cannot_be_assembled_are_said_and_not_drawn(opened, answers):
+    page, rows = opened("rrr_platform"), rows_of(answers, "rrr_platform")
+    bad = next(k for k, row in enumerate(rows) if not row["valid"])
+    page.get_by_role("slider").fill(str(bad))
+    assert "cannot be assembled here" in words(page)
+    assert page.locator(".moving [data-at=P]:has(circle)").is_hidden()
+    page.get_by_role("slider").fill(str(bad - 1))
+    assert page.locator(".moving [data-at=P]:has(circle)").is_visible()
+
+
+def test_in_a_workspace_the_mechanism_follows_pointer_and_keys(opened):
+    page = opened("five_bar")
+    drawing = page.locator(".moving-map")
+    box = drawing.bounding_box()
+    for share in (0.4, 0.5, 0.6):
+        drawing.hover(position={"x": share * box["width"], "y": 0.3 * box["height"]})
+        pin, box = page.locator(".moving [data-at=C]:has(circle)").bounding_box(), drawing.bounding_box()
+        gap = complex(pin["x"] + pin["width"] / 2 - box["x"], pin["y"] + pin["height"] / 2 - box["y"])
+        assert abs(gap - complex(share * box["width"], 0.3 * box["height"])) < 0.02 * box["width"]
+    before = place(page, "C")
+    drawing.press("ArrowLeft")
+    after = place(page, "C")
+    assert after[0] < before[0]
+    assert f"C.x = {after[0]:.1f}"[:-2] in words(page)
+
+
+@pytest.mark.parametrize("width", [400, 1400])
+def test_nothing_is_wider_than_the_screen(opened, width):
+    for name in ("slider_crank", "five_bar"):
+        page = opened(name, width)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_without_script_and_in_print_it_is_a_still_drawing(opened):
+    page = opened("slider_crank", java_script_enabled=False)
+    assert page.locator(".moving [data-at=B]:has(circle)").is_visible()
+    assert page.get_by_role("button", name="Play").count() == 0
+    page = opened("slider_crank")
+    page.emulate_media(media="print")
+    assert page.locator(".moving-controls").is_hidden()
+    assert page.locator(".moving [data-at=B]:has(circle)").is_visible()

@@ -1,0 +1,169 @@
+"""The mechanism in the report: what the script is given is the motion of the tables, part by part."""
+
+import json
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from helpers.gallery import FOLDER, result_of, study_named
+
+from mechdesign.analyses.workspace.analysis import workspace
+from mechdesign.report.page.moving import moving
+from mechdesign.report.page.tracks import PLACES, TURNS
+from mechdesign.study import load
+
+
+def decoded(steps, count, unit=1):
+    """Values of a list of steps, as the script reads it."""
+    steps = [*steps, *[0] * (count - len(steps))]
+    known = np.array([step is not None for step in steps])
+    return np.where(known, np.cumsum([step or 0 for step in steps]) / unit, np.nan)
+
+
+def places(data, point):
+    """Places of a point in the drawing, whose y axis points down."""
+    return decoded(data["x"][point], data["poses"], PLACES) + 1j * decoded(data["y"][point], data["poses"], PLACES)
+
+
+def in_study(data, z):
+    """Places of the drawing in the study's units."""
+    return complex(*data["corner"]) + z.conj() / data["scale"]
+
+
+def shown(name, *overrides):
+    result = result_of(name, *overrides)
+    return moving(study_named(name, *overrides), result), result
+
+
+@pytest.mark.parametrize("name", ["four_bar", "excavator", "rrr_platform", "jansen"])
+def test_points_are_where_the_table_of_motion_has_them_within_half_a_step(name):
+    part, result = shown(name)
+    data, table = part.data, result.tables["motion"]
+    error = 0.5 / PLACES / data["scale"]
+    points = [column[:-2] for column in table.names if column.endswith(".x")]
+    for point in points:
+        found = in_study(data, places(data, point))
+        for axis, values in (("x", found.real), ("y", found.imag)):
+            valid = table["valid"] == 1
+            assert np.abs(values - table[f"{point}.{axis}"])[valid].max() <= 1.001 * error
+            assert np.isnan(values[~valid]).all()
+    assert points
+
+
+def moved(data, group, places_of_parts):
+    """Places of a part's own frame in the drawing, pose by pose; shape (places, poses)."""
+    turn = np.exp(1j * np.radians(decoded(data["turn"][group.get("data-turn")], data["poses"], TURNS)))
+    return places(data, group.get("data-at")) + turn * np.asarray(places_of_parts)[:, None]
+
+
+def corners(path):
+    return [complex(*map(float, step.split())) for step in path.get("d").lstrip("M").rstrip("z").split("L")]
+
+
+@pytest.mark.parametrize("name", ["four_bar", "jansen", "oldham", "whitworth"])
+def test_a_rigid_part_stays_with_the_points_of_its_link(name):
+    part, _ = shown(name)
+    links = study_named(name).mechanism.description.links
+    root = ElementTree.fromstring(part.drawing)
+    met = 0
+    for group in root.iterfind("./g[@data-turn]"):
+        link = links[group.get("data-turn")]
+        points = [*(link.ends or ()), *link.points]
+        outline = group.find("path")
+        if outline is None or len(points) < 2:
+            continue
+        ends = moved(part.data, group, corners(outline))
+        for corner in ends[:, :] if outline.get("d").endswith("z") else ():
+            assert min(np.abs(corner - places(part.data, point)).max() for point in points) < 0.15
+            met += 1
+        if not outline.get("d").endswith("z"):
+            # The points of a bar lie on its line, wherever guides make it longer.
+            along = (ends[1] - ends[0]) / np.abs(ends[1] - ends[0])
+            for point in points:
+                assert np.abs(((places(part.data, point) - ends[0]) * along.conj()).imag).max() < 0.15
+                met += 1
+    assert met
+
+
+@pytest.mark.parametrize(("name", "pin", "owner"), [("whitworth", "A", "arm"), ("scotch_yoke", "A", "yoke")])
+def test_a_pin_stays_in_its_slot(name, pin, owner):
+    part, _ = shown(name)
+    root = ElementTree.fromstring(part.drawing)
+    (slot,) = (group for group in root.iterfind(f"./g[@data-turn='{owner}']")
+               if group.find("path") is not None and group.find("path").get("stroke") == "#ffffff")  # fmt: skip
+    begin, end = moved(part.data, slot, corners(slot.find("path")))
+    share = (places(part.data, pin) - begin) / (end - begin)
+    assert np.abs(share.imag * np.abs(end - begin)).max() < 0.15
+    assert share.real.min() > 0
+    assert share.real.max() < 1
+
+
+def test_numbers_and_velocities_are_those_of_the_table():
+    part, result = shown("four_bar")
+    data, table = part.data, result.tables["motion"]
+    cells = dict(part.rows)
+    assert part.headings == ["value", "velocity", "acceleration"]
+    for row, cell, column in (("C.x", 0, "C.x"), ("C.y", 1, "C.y_velocity"), ("mu", 2, "mu_acceleration")):
+        decimals, steps = data["numbers"][cells[row][cell].number]
+        assert decoded(steps, data["poses"], 10**decimals) == pytest.approx(table[column], abs=0.51 * 10**-decimals)
+        assert float(cells[row][cell].text) == pytest.approx(table[column][0], abs=0.51 * 10**-decimals)
+        assert cells[row][cell].unit.replace("²", "^2") == table.column(column).unit
+    vx, vy = (decoded(steps, data["poses"], PLACES) for steps in data["arrows"]["C"])
+    scale = np.hypot(vx, vy).max() / np.hypot(table["C.x_velocity"], table["C.y_velocity"]).max()
+    assert vx == pytest.approx(scale * table["C.x_velocity"], abs=1 / PLACES)
+    assert vy == pytest.approx(-scale * table["C.y_velocity"], abs=1 / PLACES)
+    length, words = data["arrow"]
+    assert length == pytest.approx(scale * float(words.split()[0]), rel=2e-3)
+
+
+def test_time_goes_as_the_rates_have_it():
+    # A crank at 1 rad/s takes 2 pi seconds; Jansen's turns against its sweep, at 60 rpm.
+    crank, _ = shown("four_bar")
+    assert crank.data["seconds"] == pytest.approx(2 * np.pi, abs=1e-3)
+    assert not crank.data["backwards"]
+    leg, _ = shown("jansen")
+    assert leg.data["backwards"]
+    assert "at the study's rates 1 s" in leg.data["pace"]
+    for part in (crank, leg):
+        assert decoded(part.data["times"], part.data["poses"] + 1)[:-1] == pytest.approx(
+            np.linspace(0, 10000, part.data["poses"]), abs=1)  # fmt: skip
+
+
+def test_poses_that_cannot_be_assembled_are_said():
+    part, result = shown("rrr_platform")
+    bad = np.flatnonzero(result.tables["motion"]["valid"] == 0)
+    assert part.data["gaps"] == [(bad[0], bad[-1], "cannot be assembled here")]
+
+
+def test_a_motion_of_361_poses_is_small_and_the_same_again():
+    part, _ = shown("jansen", "kinematics.sweep.crank.step=1")
+    again, _ = shown("jansen", "kinematics.sweep.crank.step=1")
+    assert part == again
+    assert len(part.drawing) + len(part.beside) + len(json.dumps(part.data)) < 200_000
+
+
+def test_in_a_workspace_every_pose_keeps_the_links_and_has_its_numbers_from_the_table():
+    study = load(FOLDER.parent / "five_bar.yaml")
+    result = workspace(study)
+    part = moving(study, result)
+    (data,) = part.data["choices"]
+    assert data["poses"] > 900
+    for link in study.mechanism.description.links.values():
+        if link.ends:
+            one, two = (places(data, end) for end in link.ends)
+            lengths = np.abs(one - two)
+            assert np.ptp(lengths) < 3 / PLACES
+    local, cells = result.tables["local"], dict(part.rows)
+    found = in_study(data, places(data, "C"))
+    # At the tips of a region several nodes lie within a step of the places.
+    far = np.abs((local["x"] + 1j * local["y"])[:, None] - found)
+    for name in ("inverse_condition", "sigma_min"):
+        decimals, steps = data["numbers"][cells[name][0].number]
+        values = decoded(steps, data["poses"], 10**decimals)
+        off = np.where(far < 1 / PLACES / data["scale"], np.abs(local[name][:, None] - values), np.inf).min(axis=0)
+        assert off.max() <= 0.51 * 10**-decimals
+
+
+def test_listed_poses_do_not_move():
+    study = study_named("path_synthesis")
+    assert moving(study, result_of("path_synthesis")) is None

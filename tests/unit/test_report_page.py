@@ -1,0 +1,130 @@
+"""What a report is made of: pictures as SVG, headline figures, margins of requirements."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from mechdesign.report.figures import style
+from mechdesign.report.page import vector
+from mechdesign.report.page.headlines import headlines, shown
+from mechdesign.report.requirements import judge
+from mechdesign.results import Column, Result, Table
+from mechdesign.study.schema.optimize import Requirement
+
+X = np.linspace(0, 10, 400)
+
+
+def figure(curve=np.sin, name="C.x"):
+    made = style.new_figure(3.0)
+    axes = made.subplots()
+    axes.plot(X, curve(X), label=name)
+    axes.set_xlabel("theta [deg]")
+    axes.set_title(name)
+    axes.legend()
+    return made
+
+
+def test_a_curve_is_where_it_was_drawn() -> None:
+    with style.context():
+        made = figure()
+        root = ElementTree.fromstring(vector.inline(made, "one", "a sine"))
+        axes = made.axes[0]
+    paths = [path.get("d", "") for path in root.iter("path")]
+    steps = re.findall(r"-?\d*\.?\d+", max(paths, key=len))
+    places = np.cumsum(np.array(steps, dtype=float).reshape(-1, 2), axis=0)
+    height = 72 * style.new_figure(3.0).get_figheight()
+    inside = axes.transData.inverted().transform(np.column_stack([places[:, 0], height - places[:, 1]]) * made.dpi / 72)
+    # To a hundredth of a point, and half of that which Matplotlib leaves out where a curve is smooth.
+    assert inside[[0, -1], 0] == pytest.approx([0, 10], abs=1e-3)
+    assert inside[:, 1] == pytest.approx(np.sin(inside[:, 0]), abs=5e-3)
+
+
+def test_texts_are_texts_and_stay_it() -> None:
+    hostile = "<script>'\"&</text>"
+    with style.context():
+        drawn = vector.inline(figure(name=hostile), "one", hostile)
+    root = ElementTree.fromstring(drawn)
+    texts = {text.text: text for text in root.iter("text")}
+    assert {hostile, "theta [deg]"} <= texts.keys()
+    assert root.get("aria-label") == hostile
+    # Whatever font a reader has, a text is as long as it was laid out: some 11 letters of 10 points.
+    assert 50 < float(texts["theta [deg]"].get("textLength", 0)) < 70
+    assert not {"script", "style", "metadata"} & {element.tag for element in root.iter()}
+    assert not [key for element in root.iter() for key in element.attrib if key == "style" or "{" in key]
+    assert "http" not in drawn
+
+
+def test_pictures_of_one_page_share_no_names() -> None:
+    with style.context():
+        drawn = [vector.inline(figure(), name, "") for name in ("one", "two")]
+    ids = [re.findall(r' id="([^"]+)"', each) for each in drawn]
+    assert ids[0]
+    assert not set(ids[0]) & set(ids[1])
+    for each, own in zip(drawn, ids, strict=True):
+        assert set(re.findall(r"#([\w-]+-\d+)", each)) == set(own)
+
+
+def test_what_is_large_as_lines_is_a_picture_of_pixels() -> None:
+    random = np.random.default_rng(0)
+    with style.context():
+        made = style.new_figure(3.0)
+        made.subplots().scatter(*random.random((2, 3000)), c=random.random(3000))
+        drawn = vector.picture(made, "cloud", "a <cloud>")
+        assert vector.picture(figure(), "sine", "").startswith("<svg")
+    assert drawn.startswith('<img alt="a &lt;cloud&gt;" width="960" height="360" src="data:image/png;base64,')
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"), (53541.2, "53 541"), (-0.0486353, "−0.04864"), (100.0, "100"), (9.99996, "10"), (1e-9, "1·10⁻⁹"),
+        (-2.5681e-4, "−2.568·10⁻⁴"), (2e9, "2·10⁹"), (float("nan"), "none"), (float("inf"), "infinite"),
+    ],
+)  # fmt: skip
+def test_numbers_for_people(value: float, text: str) -> None:
+    assert shown(value).replace("\N{NARROW NO-BREAK SPACE}", " ") == text
+
+
+def table(name: str, **columns: tuple[list[object], str, str]) -> Table:
+    return Table(name, tuple(Column(each, np.array(v), unit, meaning) for each, (v, unit, meaning) in columns.items()))
+
+
+def test_headlines_name_the_extreme_row_with_its_unit_and_pose() -> None:
+    nothing = float("nan")
+    result = Result("stiffness", {"stiffness": table(
+        "stiffness", theta=([0.0, 5.0, 10.0], "deg", "given"), k_min=([7.0, 4.0, nothing], "N/mm", "softest"),
+    )})  # fmt: skip
+    (found,) = headlines(result)
+    assert (found.label, found.value, found.unit) == ("smallest stiffness", "4", "N/mm")
+    assert found.note.replace("\N{NO-BREAK SPACE}", " ") == "at theta = 5 deg"
+
+
+def test_headlines_of_every_method_with_the_interval_of_the_worst_pose() -> None:
+    result = Result("reliability", {"reliability": table(
+        "reliability",
+        theta=([0.0, 5.0, 0.0, 5.0], "deg", "given"),
+        method=(["analytic", "analytic", "auto", "auto"], "", ""),
+        failure=([0.01, 0.03, 0.02, 0.01], "", ""),
+        failure_low=([0.01, 0.03, 0.015, 0.01], "", ""),
+        failure_high=([0.01, 0.03, 0.025, 0.01], "", ""),
+    )})  # fmt: skip
+    one, other = headlines(result)
+    assert (one.label, one.value) == ("failure probability, analytic", "0.03")
+    assert (other.label, other.value) == ("failure probability, auto", "0.02")
+    assert other.note.startswith("99.7 % between 0.015 and 0.025; at theta")
+
+
+@pytest.mark.parametrize(
+    ("values", "worst", "margin"), [([41.0, 60.0, 139.5], 139.5, 0.5), ([39.0, 60.0, 139.0], 39.0, -1.0)]
+)
+def test_the_margin_is_that_of_the_row_nearest_to_a_limit(values: list[float], worst: float, margin: float) -> None:
+    motion = table("motion", crank=([0.0, 1.0, 2.0], "deg", "drive"), mu=(list(values), "deg", "angle"))
+    verdict = judge(
+        Result("kinematics", {"motion": motion}),
+        Requirement(result="kinematics.mu", at_least=40.0, at_most=140.0),
+    )
+    assert (verdict.worst, verdict.margin, verdict.unit, verdict.met) == (worst, margin, "deg", margin >= 0)
