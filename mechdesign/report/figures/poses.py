@@ -166,7 +166,7 @@ def _scale(shown: Sequence[SpecialPose], points: Sequence[str], order: int, side
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    width = (style.WIDTH - LEFT - RIGHT - _GAP * (columns - 1)) / columns
+    width = (style.width() - LEFT - RIGHT - _GAP * (columns - 1)) / columns
     return width, min(max(_PAGE / rows, _MIN_HEIGHT), _MAX_HEIGHT)
 
 
@@ -233,11 +233,11 @@ def _centre_look(shape: str) -> dict[str, Any]:
 def _key_rows(centres: Sequence[Centre]) -> list[_Row]:
     """Words and shapes of the marks of instant centres, as many in a row as the page is wide."""
     rows: list[_Row] = []
-    x = style.WIDTH
+    x = style.width()
     for centre, shape in zip(centres, _SHAPES * len(centres), strict=False):
         words = f"instant centre of {centre.one} and {centre.other}"
         wide = _SYMBOL + _KEY_LETTER * len(words) + _BETWEEN
-        if x + wide - _BETWEEN > style.WIDTH:
+        if x + wide - _BETWEEN > style.width():
             rows.append([])
             x = LEFT
         rows[-1].append((words, shape))
@@ -251,10 +251,10 @@ def _draw_key(
     """The heading, below it arrows of round rates, and the marks of instant centres; `inches` a length of one."""
     height = figure.get_figheight()
     line = height - 0.22
-    figure.text(LEFT / style.WIDTH, line / height, heading, va="center", fontsize=11)
+    figure.text(LEFT / style.width(), line / height, heading, va="center", fontsize=11)
 
     def write(x: float, words: str) -> float:
-        figure.text(x / style.WIDTH, line / height, words, va="center", fontsize=9)
+        figure.text(x / style.width(), line / height, words, va="center", fontsize=9)
         return x + _KEY_LETTER * len(words) + _BETWEEN
 
     x = LEFT
