@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -87,7 +87,7 @@ class Moved:
     unit: str
     old: Floats
     new: Floats
-    relative: float
+    share: float  # largest difference over the largest old value
     along: Column | None = None  # the pose, where it alone tells the rows apart
 
 
@@ -152,7 +152,7 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
         note if len(folders) == everywhere else f"{', '.join(folders)}: {note}" for note, folders in noted.items()
     ]
     found.notes += [f"tolerances: {pattern!r} fits no column that was compared" for pattern in sorted(unused)]
-    found.moved.sort(key=lambda each: -each.relative)
+    found.moved.sort(key=lambda each: -each.share)
     return found
 
 
@@ -263,7 +263,7 @@ def compare_results(
         for difference, moved in compare_tables(*pair, chosen, given[1][0], same_poses=given[0] == given[1]):
             found.differences.append(Difference(folder, table, **difference))
             if moved is not None:
-                found.moved.append(moved)
+                found.moved.append(moved if folder == "." else replace(moved, name=f"{folder}/{moved.name}"))
     verdicts = [{each["requirement"]: each for each in content["requirements"]} for content in (before, after)]
     for words in verdicts[0] | verdicts[1]:
         told = [_verdict(each.get(words)) for each in verdicts]
@@ -354,11 +354,13 @@ def compare_tables(
             row = beyond[np.argmax(size[beyond])]
             with np.errstate(divide="ignore", invalid="ignore"):
                 relative = float(np.max(size[beyond] / np.where(np.isfinite(a[beyond]), np.abs(a[beyond]), 1)))
+            largest = np.abs(a[np.isfinite(a)]).max(initial=0.0)
+            share = float(size[row] / largest) if largest else math.inf
             told = {"old": f"{a[row]:.12g}", "new": f"{b[row]:.12g}", "unit": before.unit}
             sizes = {"rows": beyond.size, "largest": float(size[row]), "relative": relative}
             yield (
                 {"column": name, "change": MOVED, "row": _words(old, keys, first[row]), **told, **sizes},
-                Moved(f"{old.name}: {name}", before.unit, a, b, relative, along if along and along.numeric else None),
+                Moved(f"{old.name}: {name}", before.unit, a, b, share, along if along and along.numeric else None),
             )
 
 

@@ -14,20 +14,20 @@ from mechdesign.report.figures.panels import MAX_PANELS
 # Inches.
 _HEIGHT = 2.2
 _COLUMNS = 2
-_MARGINS = {"left": 0.85, "right": 0.25, "top": 0.85, "bottom": 0.6}
+_MARGINS = {"left": 0.95, "right": 0.25, "top": 0.85, "bottom": 0.6}
 _ACROSS = 0.95
 _DOWN = 0.95
 _TITLE_SIZE = 9.0
 
 
 def differences_figure(moved: Sequence[Moved]) -> Figure:
-    """A panel a column, of those that moved most by their relative difference; use inside `style.context`."""
+    """A panel a column, of those that moved most for the size of their old values; use inside `style.context`."""
     shown = moved[:MAX_PANELS]
     columns = 1 if style.narrow() else min(_COLUMNS, len(shown))
     figure, panels = style.page(len(shown), columns, _HEIGHT, across=_ACROSS, down=_DOWN, **_MARGINS)
     room = panels[0].get_position().width * style.width()
     for axes, each in zip(panels, shown, strict=True):
-        unit = f" [{each.unit}]" if each.unit else ""
+        unit = f" [{style.printed(each.unit)}]" if each.unit else ""
         if each.along is None:
             axes.plot(each.old, each.new, "o", color=style.VERMILION, markersize=4, linestyle="none")
             both = np.concatenate([each.old, each.new])
@@ -43,7 +43,8 @@ def differences_figure(moved: Sequence[Moved]) -> Figure:
                 (each.new, "new", style.VERMILION, style.DASHES[1]),
             ):
                 axes.plot(each.along.values[order], values[order], color=color, linestyle=dashes, label=name)
-            axes.set_xlabel(f"{each.along.name} [{each.along.unit}]" if each.along.unit else each.along.name)
+            along = f" [{style.printed(each.along.unit)}]" if each.along.unit else ""
+            axes.set_xlabel(f"{each.along.name}{along}")
             axes.set_ylabel(unit.strip())
             axes.legend(loc="best")
         axes.set_title(style.folded(each.name, _TITLE_SIZE, room), fontsize=_TITLE_SIZE, loc="left")
