@@ -182,7 +182,7 @@ def test_a_picture_that_fails_is_told_and_costs_no_other(monkeypatch: pytest.Mon
     monkeypatch.setattr("mechdesign.report.figures.kinematics.curves_figure", fail)
     result = mechdesign.kinematics(mechdesign.load(DATA))
     with pytest.warns(UserWarning, match=r"picture motion could not be drawn: .*no ink"):
-        assert result.figures == ("paths", "mechanism")
+        assert result.figures == ("paths", "poses", "transmission", "mechanism")
     with pytest.raises(mechdesign.MechdesignError, match="no ink"):
         result.figure("motion")
 
@@ -206,7 +206,7 @@ def test_a_requirement_that_names_nothing_does_not_keep_a_result_from_being_show
 
 def test_one_picture_by_its_name_whatever_the_settings() -> None:
     result = mechdesign.kinematics(mechdesign.load(DATA))
-    assert result.figures == ("motion", "paths", "mechanism")
+    assert result.figures == ("motion", "paths", "poses", "transmission", "mechanism")
     usual = result.figure("paths")
     with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "savefig.dpi": 20}):
         mine = dict(matplotlib.rcParams)
@@ -218,7 +218,7 @@ def test_one_picture_by_its_name_whatever_the_settings() -> None:
     assert shown == usual._repr_png_()
     assert shown.startswith(PNG)
     assert result._repr_png_() == result.figure("motion")._repr_png_()
-    with pytest.raises(mechdesign.StudyError, match=r"'path'; did you mean 'paths'\?; there are motion, paths, mech"):
+    with pytest.raises(mechdesign.StudyError, match=r"'path'; did you mean 'paths'\?; there are motion, paths, poses"):
         result.figure("path")
 
 

@@ -13,6 +13,7 @@ import mechdesign
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.region.curves import workspace_nodes
+from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 
@@ -292,6 +293,29 @@ workspace: {point: P, indices: []}
     label, _ = ndimage.label(inside)
     # The sketch's piece is the largest.
     assert found == pytest.approx(np.bincount(label.ravel())[1:].max() * (x[1] - x[0]) ** 2, rel=2e-3)
+
+
+def test_angles_in_a_limited_expression_are_near_each_designs_own_sketch() -> None:
+    """They were near those of the study's, and their turns other ones."""
+    text = """
+mechanism:
+  parameters: {l1: 10, l2: 12}
+  links: {ground: {O: [-4, 0], Q: [4, 0]}, one: [O, A, l1], fore_1: [A, P, l2], two: [Q, B, l1], fore_2: [B, P, l2]}
+  drives: {q1: {angle: one}, q2: {angle: two}}
+  sketch: {A: [-10, 8], B: [10, 8], P: [0, 14]}
+  measures: {m: fore_1.angle - fore_2.angle}
+workspace: {point: P, indices: [], assembly: any}
+"""
+    sizes = {"l1": 9.0195, "l2": 10.0765}
+    study = study_of(text, "mechanism.limits=[{measure: m, max: -48.3471}]")
+    other = study_of(
+        text, "mechanism.limits=[{measure: m, max: -48.3471}]",
+        *(f"mechanism.parameters.{name}={value}" for name, value in sizes.items()),
+    )  # fmt: skip
+    x, y = np.random.default_rng(1).uniform(-18, 18, (2, 2000))
+    places = {name: np.full(2000, value) for name, value in study.parameters.places(sizes).items()}
+    found, alone = (questions(each)[0].field.margins(x + 1j * y, at) for each, at in ((study, places), (other, {})))
+    assert found == pytest.approx(alone, rel=1e-9, abs=1e-9, nan_ok=True)
 
 
 def test_an_expression_that_turns_often_along_a_ray() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -13,10 +13,10 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.margins import LIMIT, SINGULARITY, Cause, causes
-from mechdesign.mechanism.mechanism import Variant
+from mechdesign.mechanism.mechanism import Variant, drawn
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
@@ -71,8 +71,22 @@ class Field:
         return Configuration(
             graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros((), dtype=np.int8), places,
-            self.plan.near_sketch(given, places),
+            self.plan.near_sketch(given, places) | self._drawn(places),
         )  # fmt: skip
+
+    def _drawn(self, places: Places) -> dict[str, Value]:
+        """Angles in limited expressions as the sketch with other dimensions has them, which chooses their turns."""
+        counting = angles_of(self.mechanism.counting) if places else {}
+        free = {name: angle for name, angle in counting.items() if name not in self._known_turns}
+        if not free:
+            return {}
+        sketch, nominal = drawn(self.mechanism, places), self.mechanism.sketch_configuration
+        return {name: np.where(sketch.valid, sketch.value(angle), nominal.value(angle)) for name, angle in free.items()}
+
+    @cached_property
+    def _known_turns(self) -> Collection[str]:
+        """Angles whose turns are given, or chosen by limits, or which the sketch has whatever the dimensions."""
+        return {*self.plan.turns((), {}), *(each.name for each in self.outputs), *self.mechanism.drives}
 
     @property
     def rootless(self) -> bool:
@@ -158,8 +172,8 @@ class Field:
     def surroundings(self) -> Complexes:
         """The point's place in the sketch, and places at some distances from it."""
         turn, share = np.meshgrid(np.exp(1j * np.linspace(0, 2 * np.pi, 24, endpoint=False)), SHARES)
-        drawn = self.mechanism.sketch_configuration
-        at = complex(*(float(drawn.value(c)) for c in self.outputs[:2]))
+        sketch = self.mechanism.sketch_configuration
+        at = complex(*(float(sketch.value(c)) for c in self.outputs[:2]))
         return np.append(at, at + self.mechanism.size * (turn * share).ravel())
 
     @cached_property
