@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ ROOT = Path(__file__).parents[1]
 DATA = Path(__file__).parent / "papers.yaml"
 OPENING = """# The four papers
 
-mechdesign began with four papers; the text of the code and of these pages calls them S1 to S4. Here are their references as
-far as they are known, and the numbers that they print beside ours. Ours are read from `results/` when the site is built,
-rounded as the paper's numbers are. Where a printed digit is another one, a letter leads to the reason.
+mechdesign began with four papers; the code and these pages call them S1 to S4. Here are their references
+as far as they are known, and the numbers that they print beside ours. Ours are read from `results/` when the site is
+built, and rounded as the paper's numbers are. Where a printed digit is another one, a letter leads to the reason.
 """
 
 
@@ -29,9 +30,11 @@ def _same(text: str, value: float | str) -> bool:
     return text == value if isinstance(value, str) else float(text) == value
 
 
-def ours(row: dict[str, Any], name: str, column: dict[str, Any], file: str) -> float:
+def ours(table: dict[str, Any], row: dict[str, Any], name: str) -> float:
     """Our number for a column of a printed row."""
-    found = rows_of(column.get("file") or row.get("file") or file, row["where"] | column.get("where", {}))
+    column = table["columns"][name]
+    file = column.get("file") or row.get("file") or table["file"]
+    found = rows_of(table.get("folder", "") + file, row["where"] | column.get("where", {}))
     if "percent" in column:
         analytic, simulated = (
             np.array([float(each["sigma"]) for each in found if each["method"] == method])
@@ -64,8 +67,8 @@ def _noted(table: dict[str, Any], row: str, column: str, number: float, printed:
         If there is none.
     """
     for place, note in enumerate(table.get("notes", ())):
-        apart = abs(number / float(printed) - 1)
-        if row in note.get("rows", [row]) and column in note.get("columns", [column]) and apart <= note.get("within", 9):
+        near = abs(number - float(printed)) <= note.get("within", math.inf) * abs(float(printed))
+        if row in note.get("rows", [row]) and column in note.get("columns", [column]) and near:
             return place
     message = f"{table['title']}: {column} of {row} is {number:.6g} in results/ and {printed} in the paper: why?"
     raise ValueError(message)
@@ -85,7 +88,7 @@ def section(table: dict[str, Any]) -> str:
     letters: dict[str, str] = {}
     used, lines = set(), []
     for row in table["rows"]:
-        numbers = [ours(row, name, column, table.get("file", "")) for name, column in columns.items()]
+        numbers = [ours(table, row, name) for name in columns]
         if "printed" not in row:
             lines.append([row["name"], "ours", *(f"{number:.10g}" for number in numbers)])
             continue
@@ -96,7 +99,7 @@ def section(table: dict[str, Any]) -> str:
                 note = _noted(table, row["name"], name, number, text)
                 used.add(note)
                 letter = letters.setdefault(texts[note], chr(ord("a") + len(letters)))
-                shown[-1] += f" {{sup}}`{letter}`"
+                shown[-1] += f"{{sup}}`{letter}`"
         lines += [[row["name"], "printed", *printed], ["", "ours", *shown]]
     if idle := [text for place, text in enumerate(texts) if place not in used]:
         raise ValueError(f"{table['title']}: these notes are about no number: {idle}")

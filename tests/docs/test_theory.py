@@ -61,7 +61,9 @@ def test_every_page_is_listed() -> None:
 def test_papers_page_is_made_and_names_tests_that_exist() -> None:
     (text,) = papers.pages().values()
     assert missing(text) == []
-    assert len(NAME.findall(text)) == sum(len(paper["tests"]) for paper in yaml.safe_load(papers.DATA.read_text()).values())
+    assert len(NAME.findall(text)) == sum(
+        len(paper["tests"]) for paper in yaml.safe_load(papers.DATA.read_text()).values()
+    )
 
 
 def test_a_difference_without_a_reason_is_an_error() -> None:
