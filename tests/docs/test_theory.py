@@ -53,6 +53,21 @@ def test_what_is_missing_is_found() -> None:
     assert missing(text) == ["tests/docs/test_theory.py::test_no_such_thing"]
 
 
+def cited(text: str) -> set[tuple[str, str]]:
+    """First word and year of the sources that a page names, such as [Deb, 2000; Fay & Feuer, 1997]."""
+    groups = re.findall(r"\[([A-Z][^\]\[$`]*,\s\d{4})\]", text)
+    return {(source.split()[0].strip(","), source[-4:]) for group in groups for source in re.split(r";\s+", group)}
+
+
+def test_every_source_is_listed_and_none_is_idle() -> None:
+    entries = (DOCS / "theory" / "sources.md").read_text(encoding="utf-8").split("\n- ")[1:]
+    named = set().union(*(cited(path.read_text(encoding="utf-8")) for path in PAGES))
+    assert [f"{name} {year}" for name, year in sorted(named)
+            if not any(entry.startswith(name) and year in entry for entry in entries)] == []  # fmt: skip
+    idle = [entry for entry in entries if not any(entry.startswith(name) and year in entry for name, year in named)]
+    assert [entry for entry in idle if not entry.startswith("ISO")] == []
+
+
 def test_every_page_is_listed() -> None:
     listed = (DOCS / "theory" / "index.md").read_text(encoding="utf-8")
     assert {path.stem for path in PAGES} - {"index"} <= set(listed.split())
