@@ -76,6 +76,17 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
             assert content.startswith(PNG) or name.endswith(".csv") or load(folder / name)
 
 
+@pytest.mark.usefixtures("judged_pages")
+@pytest.mark.parametrize("name", ["wiper", "press_stiffness", "cheapest_tolerances"])
+def test_pages_as_narrow_as_a_column_are_laid_out(name: str, tmp_path: Path, invoke) -> None:
+    done = invoke("run", ROOT / "configs" / "gallery" / f"{name}.yaml", "--out", tmp_path, "--style", "paper")
+    assert done.exit_code == 0, done.output
+    manifests = [json.loads(path.read_text()) for path in tmp_path.glob("*/manifest.json")]
+    assert manifests
+    for manifest in manifests:
+        assert not [warning for warning in manifest["warnings"] if "could not be drawn" in warning]
+
+
 @pytest.mark.parametrize("config", CONFIGS, ids=named)
 def test_results_are_those_of_the_study_as_it_is(config: Path) -> None:
     for command in load(config).questions:

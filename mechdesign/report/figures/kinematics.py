@@ -18,11 +18,13 @@ from PIL import Image
 from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.report.before import Before, known
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
 from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, fit, framed, windows
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.panels import abscissa, clear_of_ticks, moving_names, tick_abscissa
+from mechdesign.report.figures.overlay import DASHES, draw_sweep, name_both
+from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
 from mechdesign.report.figures.poses import poses_figure
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
@@ -44,6 +46,7 @@ _STILL = 1e-9  # part of its size by which a column changes that does not change
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
 _TICK = 9.0  # points, a tick of equal time across a path
 _LEGEND_LINE = 0.19  # inches
+_LEGEND_SYMBOL = 0.6  # inches, of a legend's lines beside their words
 _MOST_TICKS = 24  # along a motion
 _FEWEST_TICKS = 4
 _UNEVEN = 2e-3  # part of the mean step by which those of a sweep may differ
@@ -53,6 +56,8 @@ _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
+_LEFT = 1.0  # inches beside panels of curves
+_LEGEND_ROW = 0.19
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
@@ -66,14 +71,14 @@ _PANEL_TITLE = 0.3
 _NOTE = 0.3
 _GAP = 0.12
 _SMALL_SYMBOLS = 0.6
-# Of the animation: frames at most, colours, milliseconds, and dots an inch, 480 pixels wide.
+# Of the animation: frames at most, colours, milliseconds, and pixels across.
 FRAMES = 36
 _GIF_COLORS = 32
 _WHITE = 244  # brightness of 255 from which on a colour is white
 _CYCLE = 3600  # of the whole
 _MIN_FRAME = 50
 _MAX_FRAME = 160
-_DPI = 60
+_GIF_WIDTH = 480
 
 
 def figures(study: Study, result: Result) -> Gallery:
@@ -87,7 +92,8 @@ def figures(study: Study, result: Result) -> Gallery:
         found.add("motion", curves_figure, study, result)
         sweep = Sweep.of(result.drawn["motion"])
         if len(sweep.valid):
-            found.add("paths", paths_figure, sweep, centres=result.tables.get("instant_centres"))
+            centres = result.tables.get("instant_centres")
+            found.add("paths", paths_figure, sweep, centres=centres, before=known(result.drawn))
     found.add("poses", poses_figure, study, result)
     if result.drawn["poses"].motion:
         found.add("transmission", transmission_figure, study, result)
@@ -114,27 +120,54 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     panels = _panels(study, [column for column in table.columns if column.name != "valid"], swept, x)
     if not panels:
         return None
+    before = known(result.drawn)
     limits, marks = result.tables.get("limits"), []
     if limits is not None and swept in limits:
         marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
+    # A narrow page has no room for legends beside its panels: they stand above them.
+    above = style.narrow()
+    rows = max(-(-len(panel[:MAX_CURVES]) // _columns(panel)) + (len(panel) > MAX_CURVES) for panel in panels)
+    room = 0.1 + _LEGEND_ROW * rows
     longest = min(max(len(curve.of) for panel in panels for curve in panel[:MAX_CURVES]), _LEGEND_LETTERS)
     figure, axes = style.page(
-        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=1.0, right=0.6 + 0.08 * longest,
-        top=0.4 if marks else 0.15, bottom=0.5, down=0.2, sharex=True,
+        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=_LEFT,
+        right=0.15 if above else 0.6 + 0.08 * longest, top=(0.4 if marks else 0.15) + room * above, bottom=0.5,
+        down=room if above else 0.2, sharex=True,
     )  # fmt: skip
     colors: dict[tuple[str, str], str] = {}
     for axis, panel in zip(axes, panels, strict=True):
         for begin, end in invalid:
             axis.axvspan(begin, end, color=_SHADE, linewidth=0, zorder=0)
         _draw(axis, panel, x, study.units, colors)
+        if before is not None:
+            _draw_before(axis, panel, before, colors)
     _draw_limits(figure, axes, marks, bool(invalid))
     axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
     axes[-1].margins(x=0.02)
     axes[-1].set_xlabel(over.label)
     tick_abscissa(axes[-1], over)
     clear_of_ticks(figure, axes)
+    if before is not None:
+        name_both(figure, before)
     return figure
+
+
+def _draw_before(axis: Axes, panel: list[_Curve], before: Before, colors: dict[tuple[str, str], str]) -> None:
+    """The curves of the study before, dashed, each in the colour of its name."""
+    table, x = before.result.tables["motion"], abscissa(before.study, before.result.drawn["poses"]).values
+    low, high = axis.get_ylim()
+    for curve in panel[:MAX_CURVES]:
+        if curve.column.name in table:
+            color = colors[curve.of, "" if curve.order in _RANKS[:4] else curve.order]
+            values = table[curve.column.name]
+            axis.plot(x, values, color=color, linestyle=DASHES, linewidth=1.1, zorder=1.9)
+            if curve.order == "position" and np.isfinite(values).any():
+                low, high = min(low, float(np.nanmin(values))), max(high, float(np.nanmax(values)))
+    # Near a dead centre rates grow without bound: their axis stays that of the study now.
+    if (low, high) != axis.get_ylim():
+        margin = 0.04 * (high - low)
+        axis.set_ylim(low - margin, high + margin)
 
 
 def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
@@ -199,6 +232,15 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
     return found
 
 
+def _shortened(name: str) -> str:
+    return name if len(name) <= _LEGEND_LETTERS else f"{name[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+
+
+def _columns(panel: list[_Curve]) -> int:
+    """Columns of a legend above a panel."""
+    return fitting([_shortened(curve.of) for curve in panel[:MAX_CURVES]], style.width() - _LEFT - 0.3)
+
+
 def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
     shown: list[Floats] = []
     for curve in panel[:MAX_CURVES]:
@@ -206,16 +248,11 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
         # A name keeps its colour from its position to its acceleration.
         color = colors.setdefault((curve.of, "" if curve.order in _RANKS[:4] else curve.order), _COLORS[len(shown)])
         hidden = any(_coincide(values, other) for other in shown)
-        label = (
-            curve.of
-            if len(curve.of) <= _LEGEND_LETTERS
-            else f"{curve.of[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
-        )
         # In grey the markers tell what the colours tell.
         which, every = _COLORS.index(color), max(len(x) // _MARKS, 1)
         marker = _MARKERS[which] if len(panel) > 1 else ""
-        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=label, marker=marker,
-                  markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
+        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=_shortened(curve.of),
+                  marker=marker, markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
         shown.append(values)
     first = panel[0]
     title = first.order.replace("_", " ")
@@ -238,7 +275,10 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
     if len(panel) > 1 or first.of != first.order:
         left_out = len(panel) - len(shown)
         note = f"and {left_out} more" if left_out else None
-        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=note, title_fontsize=9, alignment="left")
+        place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+        if style.narrow():
+            place = {"loc": "lower left", "bbox_to_anchor": (-0.02, 0.97), "ncols": _columns(panel), "borderaxespad": 0}
+        axis.legend(title=note, title_fontsize=9, alignment="left", **place)
 
 
 def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, str]], shaded: bool) -> None:
@@ -261,29 +301,36 @@ def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, 
         )  # fmt: skip
 
 
-def paths_figure(sweep: Sweep, *, above: float = ABOVE, centres: Table | None = None) -> Figure:
+def paths_figure(
+    sweep: Sweep, *, above: float = ABOVE, centres: Table | None = None, before: Before | None = None
+) -> Figure:
     """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
 
     The boldest paths have ticks at equal steps of time where the swept drive has a rate; `centres` are the instant
-    centres, of which those against the ground have a path, too. `above` it, inches are left for a title.
+    centres, of which those against the ground have a path, too. A study before it lies under it in grey dashes.
+    `above` it, inches are left for a title.
     """
     wanted = [
         target.table[:, -2] + 1j * target.table[:, -1]
         for target in sweep.study.targets.values()
         if target.table is not None and len(target.coordinates) == 2
     ]
+    earlier = Sweep.of(before.result.drawn["motion"]) if before is not None else None
     centrodes = _centrodes(sweep, centres)
     middle, *sides = extent(sweep.extent)
     near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
-    places = np.concatenate([sweep.extent, *wanted, *near])
+    places = np.concatenate([sweep.extent, *wanted, *near, *([earlier.extent] if earlier is not None else [])])
     ticks = equal_times(sweep)
-    if told := len(centrodes) + (ticks is not None):
+    room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
+    words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
+             for link in centrodes]  # fmt: skip
+    if told := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
         above = max(above, TITLE + _LEGEND_LINE * (told - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
-    for (link, path), dashes in zip(centrodes.items(), _CENTRODES * len(centrodes), strict=False):
+    for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
         path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
         axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
-                  label=f"fixed centrode of {link}: path of its instant centre with the ground")  # fmt: skip
+                  label=label)  # fmt: skip
     if ticks is not None:
         _draw_ticks(axes, sweep, *ticks)
     for path in wanted:
@@ -297,11 +344,15 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE, centres: Table | None = 
     some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
     for index in np.unique(some[1 : -1 if sweep.closed else None]):
         draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index))
+    if earlier is not None:
+        draw_sweep(axes, earlier)
     draw_paths(axes, sweep)
     first = int(sweep.valid[0])
     draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handlelength=2.6)
+    if before is not None:
+        name_both(figure, before)
     return figure
 
 
@@ -410,13 +461,13 @@ def modes_figure(study: Study, result: Result) -> Figure:
             axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=columns == 1, drives=False,
             travel=sweep.travel, size=_SMALL_SYMBOLS if columns > 1 else 1.0,
         )  # fmt: skip
-    figure.text(LEFT / style.WIDTH, 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
+    figure.text(LEFT / style.width(), 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
     return figure
 
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches: all of them on about one screen."""
-    width = (style.WIDTH - LEFT - RIGHT - _GAP * (columns - 1)) / columns
+    width = (style.width() - LEFT - RIGHT - _GAP * (columns - 1)) / columns
     return width, min(max(8.0 / rows, _MIN_HEIGHT), _MAX_HEIGHT)
 
 
@@ -439,7 +490,7 @@ def gif(sweep: Sweep) -> bytes:
     most = FRAMES + 1 if closed else FRAMES // 2 + 1
     some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
     figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=HEIGHT, above=TITLE)
-    figure.set_dpi(_DPI)
+    figure.set_dpi(_GIF_WIDTH / style.width())
     draw_paths(axes, sweep)
     pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)
     pictures = pictures if closed else pictures + pictures[-2:0:-1]
