@@ -35,3 +35,7 @@ html_show_sphinx = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
+napoleon_use_param = False
+napoleon_use_rtype = False
+autodoc_class_signature = "separated"
+autodoc_preserve_defaults = True

@@ -181,7 +181,8 @@ def _run(path: Path) -> tuple[str, list[str]]:
 def pages(names: Iterable[str] = ()) -> list[Path]:
     """Pages with examples: those named, or all."""
     return [Path(name).resolve() for name in names] or [
-        path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.md"))
+        *sorted(ROOT.glob("*.md")),
+        *(path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.md"))),
     ]
 
 
