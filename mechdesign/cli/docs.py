@@ -21,12 +21,11 @@ _NAMED = 3
 _NO_WRAPPING = 10_000
 _OVERVIEW = (
     "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
-    "part (sweep), a command, an option, or one of the words below. Wherever a study takes a number there may be a "
-    "number, one with its unit (40 mm, 600 rpm), or an expression over parameters (2*r + 10)."
+    "part (sweep), a command, an option, or one of the words below."
 )
 
 
-def show(words: Sequence[str], commands: Mapping[str, Any]) -> None:
+def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
     """Print what words mean; without any an overview.
 
     Raises
@@ -34,7 +33,7 @@ def show(words: Sequence[str], commands: Mapping[str, Any]) -> None:
     StudyError
         If a word is not known; the message names the nearest.
     """
-    known = entries(_commands(commands))
+    known = entries(commands(group))
     found = [(word, find(known, word)) for word in words]
     for word, hits in found:
         if not hits:
@@ -54,18 +53,19 @@ def explained(error: Exception) -> tuple[int, str]:
     return code, f"{message}\n(mechdesign docs {' '.join(words)})" if words else message
 
 
-def _commands(commands: Mapping[str, Any]) -> Iterator[Entry]:
-    """Commands and their options, as Typer has them."""
+def commands(group: Mapping[str, Any]) -> Iterator[Entry]:
+    """Entries of commands and their options, as Typer has them."""
     options: dict[tuple[str, str], Entry] = {}
-    for name, command in commands.items():
+    for name, command in group.items():
         for given in command.params:
             flags = [*given.opts, *given.secondary_opts] if given.param_type_name == "option" else []
             for flag in flags:
                 before = options[flag, given.help].where if (flag, given.help) in options else ()
                 takes = "" if given.is_flag else f"{flag} {given.metavar or given.type.name.upper()}"
                 options[flag, given.help] = Entry(flag, "option", given.help, takes=takes, where=(*before, name))
-        usage = " ".join(["mechdesign", name, *(each.metavar for each in command.params if each.metavar
-                          and each.param_type_name == "argument"), "[OPTIONS]"])  # fmt: skip
+        arguments = [each.metavar for each in command.params if each.param_type_name == "argument"]
+        some = ["[OPTIONS]"] * (len(command.params) > len(arguments))
+        usage = " ".join(["mechdesign", name, *arguments, *some])
         yield Entry(name, "command", " ".join(command.help.split()), takes=usage)
     yield from options.values()
 

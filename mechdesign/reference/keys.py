@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, get_args, get_origin
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from mechdesign.indices import INDEX_NAMES
 from mechdesign.reference.entries import Entry
 from mechdesign.study import Units, schema
 from mechdesign.study.schema.study_file import StudyFile
@@ -70,8 +71,9 @@ def entries() -> Iterator[Entry]:
         model = forms if key.model is StudyFile else forms["$defs"][key.model.__name__]
         reads = list(_reads(key.field.annotation, key.field.metadata))
         words = _words(reads)
-        about = " ".join(dict.fromkeys(model.said_of_all() for model, _ in inner))
-        for what, word, text in words:
+        about = " Or: ".join(dict.fromkeys(model.said_of_all() for model, _ in inner))
+        # Of local indices there is more to say: `mechdesign.reference.sources.indices`.
+        for what, word, text in _words(read for read in reads if read.words is not INDEX_NAMES):
             before = chosen[what, word].where if (what, word) in chosen else ()
             chosen[what, word] = Entry(word, what, text, where=(*before, key.path.replace(".*", "")))
         yield Entry(
@@ -112,7 +114,7 @@ def _default(field: FieldInfo) -> str:
     """The value that is taken where a key is left out, as a study writes it."""
     value = field.get_default(call_default_factory=True, validated_data={})
     if value is PydanticUndefined:
-        return "an error: it is required"
+        return "never; it is required"
     if value is None or value in ((), {}) or isinstance(value, Model):
         return ""
     if isinstance(value, bool):

@@ -13,7 +13,14 @@ from mechdesign.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
 from mechdesign.reference import keys
 from mechdesign.reference.entries import Entry
 from mechdesign.study.text.fields import quoted
+from mechdesign.study.text.forms import TERMS
 from mechdesign.study.text.units import listed
+
+
+def terms() -> Iterator[Entry]:
+    """What may stand at a key."""
+    for word, meaning in TERMS.items():
+        yield Entry(word, "what may stand", meaning)
 
 
 def indices() -> Iterator[Entry]:
@@ -62,12 +69,11 @@ def exit_codes() -> Iterator[Entry]:
 
 
 # A further kind of word is one more function here.
-SOURCES: tuple[Callable[[], Iterable[Entry]], ...] = (keys.entries, indices, results, expressions, units, exit_codes)
+SOURCES: tuple[Callable[[], Iterable[Entry]], ...] = (
+    keys.entries, terms, indices, results, expressions, units, exit_codes,
+)  # fmt: skip
 
 
 def entries(*more: Iterable[Entry]) -> tuple[Entry, ...]:
-    """All entries, and `more` that others declare; what two sources say of a word is told by the one that says more."""
-    found: dict[tuple[str, str], Entry] = {}
-    for entry in chain(*(source() for source in SOURCES), *more):
-        found[entry.word, entry.kind] = entry
-    return tuple(found.values())
+    """All entries, and `more` that others declare."""
+    return tuple(chain(*(source() for source in SOURCES), *more))

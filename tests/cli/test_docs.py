@@ -1,6 +1,11 @@
 """`mechdesign docs`: words in the terminal, and where a wrong study leads to."""
 
 import pytest
+import typer.main
+
+from mechdesign.cli.app import app
+from mechdesign.cli.docs import commands
+from mechdesign.reference import entries, find
 
 
 @pytest.mark.parametrize(
@@ -20,6 +25,16 @@ def test_a_word_is_told(word, told, invoke):
     assert done.exit_code == 0
     assert told in done.stdout
     assert "\x1b" not in done.stdout
+
+
+def test_every_command_and_option_is_found_with_what_it_does():
+    group = typer.main.get_command(app).commands
+    known = entries(commands(group))
+    for name, command in group.items():
+        assert "command" in {entry.kind for entry in find(known, name)}
+        for option in (given for given in command.params if given.param_type_name == "option"):
+            told = [entry.text for entry in find(known, option.opts[0]) if name in entry.where]
+            assert told == [option.help]
 
 
 def test_without_a_word_there_is_an_overview(invoke):

@@ -72,8 +72,8 @@ class Integrate(fields.Model):
 
 
 class Over(fields.Model):
-    """A range of a held coordinate: the places reached at some value of it, or at every one. It gives areas, no
-    indices.
+    """A range of a held coordinate: the places reached at some value of it, or at every one. It gives areas and
+    SUI only.
     """
 
     from_: fields.Number = Field(alias="from")

@@ -11,6 +11,16 @@ from pydantic_core import core_schema
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Form
 
+# Words of the titles that need a meaning; what they name is otherwise the study's own.
+TERMS = {
+    "number": "a number in the study's units, one with a unit of its own (40 mm, 600 rpm, 1e5 N*m/rad), or an "
+    "expression over parameters",
+    "expression": "numbers, names, functions and + - * / **, such as (l_min + R)/2; in quotes where it has a comma "
+    "within { } or [ ]. Trigonometry takes and gives the study's unit of angle",
+    "coordinate": "C.x and C.y of a point, rod.angle of a link (from the world's x axis), leg_1.length of a telescopic "
+    "link, guide.slide of a slide; drives and measures by their names",
+    "mapping": "keys and their values, {from: 0, to: 360} or one a line; its keys are told below",
+}
 _TYPES = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true or false"}
 
 
