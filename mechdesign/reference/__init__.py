@@ -4,5 +4,6 @@ from mechdesign.reference.entries import Entry
 from mechdesign.reference.keys import place
 from mechdesign.reference.lookup import below, find, near
 from mechdesign.reference.sources import entries
+from mechdesign.reference.tables import tables
 
-__all__ = ["Entry", "below", "entries", "find", "near", "place"]
+__all__ = ["Entry", "below", "entries", "find", "near", "place", "tables"]
