@@ -76,7 +76,8 @@ def section(found: list[Entry]) -> str:
     first, *keys = found
     parts = [*_told(first)]
     for entry in keys:
-        parts += [f"## {code(entry.word.partition('.')[2])}", *_told(entry)]
+        path = entry.word.partition(".")[2]
+        parts += [f"{'###' if '.' in path else '##'} {code(path)}", *_told(entry)]
     return _page(code(first.word), parts)
 
 
@@ -103,7 +104,7 @@ def table_page(command: str, found: Iterable[TableText]) -> str:
                 for column in table.columns]  # fmt: skip
         lines = ["| column | meaning | unit | formula |", "| --- | --- | --- | --- |",
                  *("| " + " | ".join(row) + " |" for row in rows)]  # fmt: skip
-        parts += [f"## {table.name}: {markdown(table.meaning)}", "\n".join(lines)]
+        parts += [f"## {table.name}", f"{markdown(table.meaning[0].upper() + table.meaning[1:])}.", "\n".join(lines)]
     return _page(f"Tables of {command}", parts)
 
 
@@ -144,7 +145,7 @@ def pages() -> dict[str, str]:
     text |= {f"reference/tables/{name}.md": table_page(name, found) for name, found in commands.items()}
     listing = "\n".join(commands)
     text["reference/tables/index.md"] = _page("Tables and columns", [
-        "Every table that a command writes. Each run's `manifest.json` has the meaning and the unit of every column too.",
+        "Every table that a command writes. The `manifest.json` of a run has the meaning and the unit of every column.",
         f"```{{toctree}}\n:maxdepth: 1\n\n{listing}\n```",
     ])  # fmt: skip
     for name, (title, before, kinds) in LISTS.items():

@@ -15,39 +15,45 @@ from mechdesign.errors import EXIT_CODES
 from mechdesign.reference.entries import Entry
 
 KIND = "message"
-# What the files whose names begin so speak of; the first that fits.
+# What the files whose names begin so speak of, in the order of the page; the longest that fits counts.
 SUBJECTS = {
-    "study/schema/iso_tolerances": "tolerances and fits (ISO 286-1)",
+    "study": "study file",
+    "study/text/units": "units",
+    "expressions": "expressions",
+    "mechanism": "mechanism",
+    "study/building": "mechanism",
+    "study/schema/checker": "mechanism",
+    "study/poses": "poses",
+    "study/schema/p": "poses",
+    "analyses/poses": "poses",
+    "analyses/kinematics": "kinematics",
+    "study/schema/targets": "targets",
+    "analyses/workspace": "workspace",
+    "analyses/region": "workspace",
+    "study/schema/workspace": "workspace",
+    "analyses/optimize": "optimize",
+    "study/schema/optimize": "optimize",
+    "analyses/reliability": "reliability",
     "study/schema/reliability": "reliability",
     "study/schema/variation": "reliability",
     "study/schema/methods": "reliability",
-    "study/schema/optimize": "optimize",
-    "study/schema/stiffness": "stiffness",
-    "study/schema/workspace": "workspace",
-    "study/schema/targets": "targets",
-    "study/schema/p": "poses",
-    "study/poses": "poses",
-    "analyses/poses": "poses",
-    "study/text/units": "units",
-    "expressions": "expressions",
-    "study/building": "mechanism",
-    "study/schema/checker": "mechanism",
-    "mechanism": "mechanism",
-    "study": "study file",
-    "analyses/kinematics": "kinematics",
-    "analyses/region": "workspace",
-    "analyses/workspace": "workspace",
-    "analyses/optimize": "optimize",
-    "analyses/reliability": "reliability",
+    "study/schema/iso_tolerances": "tolerances and fits (ISO 286-1)",
     "analyses/stiffness": "stiffness",
+    "study/schema/stiffness": "stiffness",
     "report/requirements": "requirements",
     "": "commands, options and files",
 }
+PART = 0
+_PART = "a part of an error or a warning"
 _WARNING = "a warning: the results are there, and this is to be known of them"
 # Calls that are given a message, besides errors; and lists that messages are put on.
 _GIVEN = ("Problem", "failure", "problem", "report", "_unexpected", "UnknownColumnError", "Undetermined")
-_LISTS = ("warnings", "problems", "told", "found")
-_TEXTS = ("Iterator[str]", "list[str]", "str | None")
+_LISTS = ("warnings", "problems", "notes", "told", "found")
+# Functions that give texts, in these rooms; of a single text it may be a part of a message.
+_TEXTS = ("Iterator[str]", "list[str]", "str | None", "str")
+_ROOMS = ("study", "mechanism", "analyses", "expressions", "errors")
+# Fewest words of a part.
+_WORDS = 5
 # Shortest message: two words, outside of its places.
 _SENTENCE = re.compile(r"[A-Za-z]{2,}[,;:')]* +['(]?[A-Za-z]")
 _PLACE = re.compile(r"<[^<>]*>")
@@ -56,7 +62,7 @@ _LETTERS = 12
 
 
 class Message(NamedTuple):
-    """An error or a warning: its text, ``<...>`` for what differs; what it speaks of; the exit code, None of a warning."""
+    """Error or warning: its text with ``<...>`` for what differs, its subject, its exit code: a warning has none, a part `PART`."""
 
     text: str
     subject: str
@@ -76,8 +82,8 @@ def messages() -> tuple[Message, ...]:
     """Every message of the package, by what it speaks of and in the order of the source."""
     found: dict[Message, None] = {}
     for name, source in _sources(files("mechdesign")):
-        subject = next(told for begin, told in SUBJECTS.items() if name.startswith(begin))
-        for text, code in _Reader.read(source):
+        subject = SUBJECTS[max((begin for begin in SUBJECTS if name.startswith(begin)), key=len)]
+        for text, code in _Reader.read(source, texts=name.startswith(_ROOMS)):
             found[Message(text, subject, code)] = None
     order = list(dict.fromkeys(SUBJECTS.values()))
     return tuple(sorted(found, key=lambda message: order.index(message.subject)))
@@ -85,14 +91,14 @@ def messages() -> tuple[Message, ...]:
 
 def find_messages(words: str) -> list[Entry]:
     """Entries of the messages in which these words stand, or that these words are."""
-    return [
-        Entry(told.text, KIND, meaning(told.code), where=(told.subject,)) for told in messages() if told.holds(words)
-    ]
+    return [Entry(told.text, KIND, f"{told.subject}; {meaning(told.code)}") for told in messages() if told.holds(words)]
 
 
 def meaning(code: int | None) -> str:
     """What an error with an exit code means, or a warning."""
-    return _WARNING if code is None else f"exit code {code}: {EXIT_CODES[code]}"
+    if code is None or code == PART:
+        return _WARNING if code is None else _PART
+    return f"exit code {code}: {EXIT_CODES[code]}"
 
 
 def _sources(folder: Traversable, prefix: str = "") -> Iterator[tuple[str, str]]:
@@ -106,21 +112,25 @@ def _sources(folder: Traversable, prefix: str = "") -> Iterator[tuple[str, str]]
 class _Reader(ast.NodeVisitor):
     """Gathers the messages of a file; a name that is given for a message is looked up in the function around it."""
 
-    def __init__(self) -> None:
+    def __init__(self, rooms: bool) -> None:
         self.found: list[tuple[str, int | None]] = []
         self.names: dict[str, list[ast.expr]] = {}
-        self.texts = False
+        # What functions give that are read for their texts.
+        self.given = _TEXTS if rooms else ()
+        self.texts = ""
 
     @staticmethod
-    def read(source: str) -> list[tuple[str, int | None]]:
-        reader = _Reader()
+    def read(source: str, *, texts: bool) -> list[tuple[str, int | None]]:
+        """Messages of a file and their exit codes; with `texts` also what its functions return."""
+        reader = _Reader(texts)
         reader.visit(ast.parse(source))
         return reader.found
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         outer = self.names, self.texts
         self.names = {}
-        self.texts = node.returns is not None and any(each in ast.unparse(node.returns) for each in _TEXTS)
+        gives = ast.unparse(node.returns) if node.returns is not None else ""
+        self.texts = gives if gives in self.given and not node.name.startswith("__") else ""
         for each in ast.walk(node):
             if isinstance(each, ast.Assign) and len(each.targets) == 1 and isinstance(each.targets[0], ast.Name):
                 self.names.setdefault(each.targets[0].id, []).append(each.value)
@@ -133,8 +143,13 @@ class _Reader(ast.NodeVisitor):
         if name in _GIVEN or isinstance(getattr(errors, name, None), type) or name.endswith("Error"):
             if name not in ("KeyError", "TypeError", "AttributeError", "ImportError", "ValueError"):
                 self._add(node.args, getattr(getattr(errors, name, None), "exit_code", 2))
-        elif name in ("append", "extend") and owner in _LISTS:
+        elif name in ("append", "extend") and (owner in _LISTS or self.texts):
             self._add(node.args, 2 if owner == "problems" else None)
+        self.generic_visit(node)
+
+    def visit_Assign(self, node: ast.Assign) -> None:
+        if isinstance(node.value, ast.List) and _last(node.targets[0]) in _LISTS:
+            self._add([node.value], None)
         self.generic_visit(node)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> None:
@@ -143,18 +158,23 @@ class _Reader(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Yield(self, node: ast.Yield) -> None:
-        self._add([node.value] if self.texts and node.value else [], None)
+        self._give(node.value)
         self.generic_visit(node)
 
     def visit_Return(self, node: ast.Return) -> None:
-        self._add([node.value] if self.texts and node.value else [], None)
+        self._give(node.value)
         self.generic_visit(node)
+
+    def _give(self, value: ast.expr | None) -> None:
+        if self.texts and value is not None:
+            self._add([value], PART if self.texts == "str" else None)
 
     def _add(self, given: Iterable[ast.expr], code: int | None) -> None:
         for each in given:
             for text in self._written(each):
-                if _SENTENCE.search(_PLACE.sub("", text)):
-                    self.found.append((text, code))
+                plain = _PLACE.sub("", text)
+                if _SENTENCE.search(plain) and (code != PART or len(re.findall(r"[A-Za-z']{2,}", plain)) >= _WORDS):
+                    self.found.append((text.strip(" ;"), code))
 
     def _written(self, node: ast.expr, *, known: bool = True) -> Iterator[str]:
         """What an expression may read, ``<...>`` for what is not written there; a name's values are looked up once."""
@@ -164,6 +184,8 @@ class _Reader(ast.NodeVisitor):
         elif isinstance(node, ast.IfExp):
             yield from self._written(node.body, known=known)
             yield from self._written(node.orelse, known=known)
+        elif isinstance(node, ast.ListComp | ast.GeneratorExp):
+            yield from self._written(node.elt, known=known)
         elif isinstance(node, ast.List | ast.Tuple):
             for part in node.elts:
                 yield from self._written(part, known=known)
@@ -181,7 +203,7 @@ def _text(node: ast.expr) -> str:
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         return _text(node.left) + _text(node.right)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult) and isinstance(node.left, ast.Constant):
-        return str(node.left.value)
+        return node.left.value if isinstance(node.left.value, str) else f"<{_place(node)}>"
     return f"<{_place(node)}>"
 
 

@@ -85,7 +85,7 @@ def entries() -> Iterator[Entry]:
     where: dict[tuple[str, ColumnText], list[str]] = {}
     for table in tables():
         columns = tuple((column.name, column.meaning) for column in table.columns)
-        yield Entry(table.name, "table", table.meaning, where=(f"mechdesign {table.command}",), words=columns)
+        yield Entry(table.name, "table", f"{table.meaning}; mechdesign {table.command} writes it", words=columns)
         for column in table.columns:
             for name in column.name.split(", "):
                 where.setdefault((name, column), []).append(table.name)
