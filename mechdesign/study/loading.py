@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import MechanismError, Problem, StudyError
+from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
@@ -117,11 +117,16 @@ class Study:
         """A mistake at a path of the data, with its place in the text."""
         if not self.text:
             return Problem(message, ".".join(map(str, keys)))
-        document = read(self.text, str(self.path or _TEXT))
-        override(document, self.overrides)
-        reporter = Reporter(document)
+        reporter = Reporter(self._document)
         reporter.report(keys, message)
         return reporter.problems[-1]
+
+    @cached_property
+    def _document(self) -> Document:
+        """The text once more, with the places of its entries."""
+        document = read(self.text, str(self.path or _TEXT))
+        override(document, self.overrides)
+        return document
 
 
 def load(
@@ -212,6 +217,7 @@ def _plain_data(value: Any, what: str) -> Any:
         raise StudyError([Problem(message)]) from None
 
 
+@few_comparisons()
 def load_document(
     document: Document,
     path: pathlib.Path | None,
