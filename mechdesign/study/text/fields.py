@@ -45,8 +45,6 @@ MAX_LENGTH = 1e15
 MIN_LENGTH = 1e-15
 # Names that a message lists of those that might have stood in place of a wrong one.
 MAX_NAMED = 12
-# Endings of the names of files with a table.
-FILES = (".csv", ".txt", ".dat")
 
 
 @dataclass(frozen=True)
