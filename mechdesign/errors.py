@@ -70,6 +70,11 @@ def printable(text: str) -> str:
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+def printable_lines(text: str) -> str:
+    """The same of a text of several lines, which it keeps."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
 def cut(text: str, most: int = MAX_ECHO) -> str:
     """A text that is echoed in a message, at most this long."""
     return text if len(text) <= most else text[: most - 3] + "..."
@@ -190,7 +195,7 @@ class Interrupted(KeyboardInterrupt):
 def explain(error: Exception) -> tuple[int, str]:
     """Exit code and message of an exception; what nobody foresaw asks to be reported."""
     if isinstance(error, MechdesignError):
-        return error.exit_code, str(error)
+        return error.exit_code, printable_lines(str(error))
     if isinstance(error, MemoryError):
         return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
     frames = [

@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import Context, failure, read_number, read_rows
+from mechdesign.study.text.fields import MIN_NUMBER, Context, failure, read_number, read_rows
 from mechdesign.study.text.inputs import Folder, file_of
 
 # Numbers of poses where a study does not say them: of a circle (in steps of 5 deg); of a line or an arc, both ends too.
@@ -188,6 +188,8 @@ def polyline(places: Complexes) -> PointPath:
     """Straight segments; a corner has the direction of the segment that begins there, directions nan for one place."""
     steps = np.diff(places)
     lengths = np.abs(steps)
+    # What is shorter than any number of a study is no step: its reciprocal would overflow.
+    lengths[lengths < MIN_NUMBER] = 0.0
     way = np.concatenate([[0.0], np.cumsum(lengths)])
     directions = np.full(len(places), complex(np.nan, np.nan))
     moving = np.flatnonzero(lengths > 0)
