@@ -103,6 +103,7 @@ _add(
         given.NO_PLOTS,
         given.FORMAT,
         given.STYLE,
+        given.ALLOW_FILES,
     ),
     "Validate only: joints, mobility, plan of solution.",
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",
