@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from mechdesign.commands import MAX_JOBS
 from mechdesign.errors import StudyError
 from mechdesign.files import formats_of
 
@@ -62,6 +63,7 @@ JOBS = _text(
     "N",
     "Threads to compute on; the results do not depend on it. Default: every processor.",
     min=1,
+    max=MAX_JOBS,
 )
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
