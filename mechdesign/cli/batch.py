@@ -27,12 +27,13 @@ from mechdesign.cli.execution import (
 )  # fmt: skip
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Interrupted, StudyError
+from mechdesign.errors import Interrupted, OutputError, StudyError
+from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, foresee
-from mechdesign.report.writer import write_file, write_sketch
+from mechdesign.report.writer import check_writable, write_file, write_sketch
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
@@ -67,9 +68,9 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
     except KeyboardInterrupt:
         terminal.say("interrupted; what was finished is whole")
         answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
-    terminal.show(_summary(answers), as_json=options.json)
     if options.junit is not None:
-        write_file(options.junit, _junit(answers).encode())
+        book.file(options.junit, _junit(answers).encode())
+    terminal.show(_summary(answers), as_json=options.json)
     book.close()
     return max(book.exit_code, *(given.exit_code for given in answers))
 
@@ -126,7 +127,9 @@ def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Gene
         try:
             for command in questions(study):
                 try:
-                    given = replace(answer(study, command, root / command, options), result=None)
+                    check_writable(root / command)
+                    with owned(root / command):
+                        given = replace(answer(study, command, root / command, options), result=None)
                     tell(given, options)
                 except KeyboardInterrupt as error:
                     told.append(interrupted(study, command, root / command, error))
@@ -178,11 +181,17 @@ class Book:
         from mechdesign.report.page.page import index
 
         path = self._folder / pages.INDEX
-        try:
-            write_file(path, index(self._entries))
+        if self.file(path, index(self._entries)):
             terminal.say(f"index of the reports in {path}", quiet=self.options.quiet)
-        except Exception as error:
-            self._fail(explained(error)[1], error)
+
+    def file(self, path: Path, data: bytes) -> bool:
+        """Write a file about all studies; whether it is there, for the run goes on without it."""
+        try:
+            write_file(path, data)
+        except OutputError as error:
+            self._fail(str(error), error)
+            return False
+        return True
 
     def _entry(self, study: Study, told: Sequence[Outcome]) -> Entry:
         from mechdesign.report.page.page import Entry, thumbnail

@@ -11,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from mechdesign.files import proper
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import plain
 from mechdesign.results import Result
@@ -87,7 +88,7 @@ def read(directory: Path) -> dict[str, Any] | None:
     """The manifest in a folder, or None where there is none that can be read."""
     try:
         content = json.loads((directory / NAME).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) else None
 
@@ -97,7 +98,7 @@ def recorded_files(content: Mapping[str, Any]) -> dict[str, str]:
     files = content.get("files")
     if not isinstance(files, dict):
         return {}
-    return {name: str(digest) for name, digest in files.items() if Path(name).name == name}
+    return {name: str(digest) for name, digest in files.items() if proper(name)}
 
 
 def is_current(directory: Path, study: Study, command: str, asked: Extras) -> dict[str, Any] | None:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import errno
+import json
 import os
+import platform
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from mechdesign.files import Transaction
+from mechdesign.results import Column, Result, Table
 
 from .conftest import SLIDER
 from .test_optimize_resume import METHODS, STUDY
@@ -118,3 +126,148 @@ def test_no_stream_can_fail_a_run(here, stream, how):
         assert "wrong.yaml:6:19" in done.stderr
         assert "Traceback" not in done.stderr
         assert ("not whole" in done.stderr) == (how == "full")
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def forked(call):
+    """Process that calls a function with what this one has imported, and says nothing."""
+    pid = os.fork()
+    if not pid:
+        try:
+            call()
+        finally:
+            os._exit(9)
+    return pid
+
+
+def table(value, columns=3):
+    """A result of several tables, large enough to be cut off in."""
+    names = [f"t{k}" for k in range(columns)]
+    made = {name: Table(name, (Column("x", np.full(20_000, float(value))),)) for name in names}
+    return Result("kinematics", made)
+
+
+def test_a_kill_at_any_instant_leaves_whole_files(here, analysis, invoke):
+    """Old results of other tables are there; the resumed ones are those of an undisturbed run."""
+    arguments = ("kinematics", "slider.yaml", "--no-plots", "--quiet", "--out")
+    analysis(lambda study, **options: table(study.seed, 5 - study.seed))
+    begun = time.monotonic()
+    invoke(*arguments, "new", "--seed", 2)
+    took = time.monotonic() - begun
+    new = contents(here / "new")
+    broken = []
+    for part in np.random.default_rng(1).random(8):
+        shutil.rmtree(here / "out", ignore_errors=True)
+        invoke(*arguments, "out", "--seed", 1)
+        old = contents(here / "out")
+        pid = forked(lambda: invoke(*arguments, "out", "--seed", 2))
+        time.sleep(part * took)
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        left = contents(here / "out")
+        for name, data in left.items():
+            assert name.startswith(".") or data in (old.get(name), new.get(name)), name
+        if "manifest.json" in left:
+            whole = {name: data for name, data in left.items() if not name.startswith(".")}
+            assert whole in (old, new)
+        broken.append({*left} - {*old})
+        assert invoke(*arguments, "out", "--seed", 2).exit_code == 0
+        assert contents(here / "out") == new
+    assert any(broken)
+
+
+@pytest.mark.parametrize("instant", range(0, 10, 2))
+def test_a_kill_between_two_files(here, analysis, invoke, monkeypatch, instant):
+    """The n-th step on the way of files into place is the last one."""
+    arguments = ("run", "slider.yaml", "--no-plots", "--quiet", "--resume", "--out")
+    analysis(lambda study, **options: table(study.seed, 5 - study.seed))
+    invoke(*arguments, "new", "--seed", 2)
+    invoke(*arguments, "out", "--seed", 1)
+    old, new = contents(here / "out"), contents(here / "new")
+    steps = []
+
+    def last(step):
+        def counted(*given, **options):
+            if len(steps) == instant:
+                os.kill(os.getpid(), signal.SIGKILL)
+            steps.append(step)
+            return step(*given, **options)
+
+        return counted
+
+    def killed():
+        os.replace, Path.unlink = last(os.replace), last(Path.unlink)
+        invoke(*arguments, "out", "--seed", 2)
+
+    os.waitpid(forked(killed), 0)
+    left = contents(here / "out")
+    assert "manifest.json" not in left or {name: left[name] for name in left if name[0] != "."} in (old, new)
+    assert invoke(*arguments, "out", "--seed", 2).exit_code == 0
+    assert contents(here / "out") == new
+
+
+def test_a_full_disk_leaves_the_old_results(here, analysis, invoke, monkeypatch):
+    analysis(lambda study, **options: table(study.seed))
+    arguments = ("run", "slider.yaml", "--no-plots", "--out", "out", "--seed")
+    assert invoke(*arguments, 1).exit_code == 0
+    old = contents(here / "out")
+    stage = Transaction.stage
+
+    def full(self, name, blocks):
+        def some():
+            yield next(iter(blocks))
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        return stage(self, name, some() if name == "t1.csv" else blocks)
+
+    monkeypatch.setattr(Transaction, "stage", full)
+    done = invoke(*arguments, 2, "--junit", "junit.xml")
+    assert done.exit_code == 4
+    assert "results could not be written: No space left on device" in done.stderr
+    assert "No space left" in (here / "junit.xml").read_text()
+    assert contents(here / "out") == old
+
+
+def test_a_folder_is_of_one_process(here, analysis, invoke):
+    """While one run computes another is told who it is; a killed one is in nobody's way."""
+    reader, writer = os.pipe()
+
+    def slow(study, **options):
+        os.write(writer, b"x")
+        time.sleep(60)
+
+    quick = table(1)
+    analysis(slow)
+    arguments = ("run", "slider.yaml", "--no-plots", "--out", "out")
+    pid = forked(lambda: invoke(*arguments))
+    os.read(reader, 1)
+    (here / "out/kinematics/.t0.csv.99999999.tmp").write_text("half")
+    analysis(lambda study, **options: quick)
+    done = invoke(*arguments)
+    assert done.exit_code == 4
+    assert f"process {pid} on {platform.node()} writes there" in done.stderr
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    assert invoke(*arguments).exit_code == 0
+    assert set(contents(here / "out")) == {"t0.csv", "t1.csv", "t2.csv", "manifest.json"}
+
+
+@pytest.mark.parametrize(
+    "damage", ["", "[]", "{}", "[" * 100_000, '{"files": {"..": "", "": "", "a\\u0000b": ""}}', "tables", "bytes"]
+)
+def test_a_damaged_manifest_is_no_manifest(here, analysis, invoke, damage):
+    analysis(lambda study, **options: table(1))
+    arguments = ("run", "slider.yaml", "--no-plots", "--resume", "--out", "out")
+    invoke(*arguments)
+    whole = contents(here / "out")
+    path = here / "out/kinematics/manifest.json"
+    if damage == "tables":
+        damage = json.dumps({key: value for key, value in json.loads(path.read_text()).items() if key != "tables"})
+    path.write_bytes(b"\xff" if damage == "bytes" else damage.encode())
+    done = invoke(*arguments)
+    assert done.exit_code == 0, done.stderr
+    assert "kept" not in done.stdout
+    assert contents(here / "out") == whole
