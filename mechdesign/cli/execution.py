@@ -30,6 +30,7 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study, load, template_path
 
 STANDARD_INPUT = Path("-")
+RESULTS = Path("results")  # where no other folder is asked for
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -80,7 +81,7 @@ def load_study(path: Path | None, options: Options) -> Study:
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
     """Where the results of a command go, given alone; of several studies each has a folder in that of the option."""
     if options.out is None:
-        return Path("results") / study.label / name
+        return RESULTS / study.label / name
     return options.out / study.label if several else options.out
 
 

@@ -44,9 +44,11 @@ def _out(meaning: str) -> Parameter:
 
 
 STUDY = _study(Path, "STUDY", "The study file; - is standard input.")
-STUDIES = _study(list[Path], "STUDY...", "The study files; - is standard input.")
+STUDIES = _study(list[Path], "STUDY...", "The study files, folders of *.yaml or patterns; - is standard input.")
 OUT = _out("Folder for tables, pictures and manifest. Default: results/<study>/<command>.")
-OUT_ALL = _out("Folder that gets one folder a command (several studies: <study>/<command>). Default: results/<study>.")
+OUT_ALL = _out(
+    "Folder that gets one folder a command (several studies: <study>/<command>, summary.csv). Default: results/<study>."
+)
 OUT_DRAWINGS = _out("Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.")
 OVERRIDES = _text(
     "overrides",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -36,7 +37,11 @@ class Extras:
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
-    files = {file.name: hashlib.sha256(text.encode()).hexdigest() for _, file, text in study.inputs()}
+    folder = study.path.parent if study.path is not None else Path()
+    files = {
+        Path(os.path.relpath(file, folder)).as_posix(): hashlib.sha256(text.encode()).hexdigest()
+        for _, file, text in study.inputs()
+    }
     return {
         "tool": {"name": "mechdesign", "version": version("mechdesign")},
         "libraries": {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES},

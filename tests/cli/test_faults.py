@@ -20,7 +20,7 @@ import pytest
 from mechdesign.files import Transaction
 from mechdesign.results import Column, Result, Table
 
-from .conftest import SLIDER
+from .conftest import SLIDER, answer
 from .test_optimize_resume import METHODS, STUDY
 
 if sys.platform != "linux":
@@ -271,3 +271,51 @@ def test_a_damaged_manifest_is_no_manifest(here, analysis, invoke, damage):
     assert done.exit_code == 0, done.stderr
     assert "kept" not in done.stdout
     assert contents(here / "out") == whole
+
+
+def test_folders_and_patterns(here, invoke):
+    (here / "deep").mkdir()
+    for name in ("b", "a", "c"):
+        (here / f"deep/{name}.yaml").write_text(SLIDER)
+    (here / "deep/notes.txt").write_text("none")
+    done = invoke("run", "deep", "deep/[ab].yaml", "deep/c.yaml", "--no-plots", "--out", "out")
+    assert done.exit_code == 0, done.stderr
+    assert [row.split(",")[0] for row in done.stdout.splitlines()] == ["study", "a", "b", "c"]
+    assert (here / "out/summary.csv").read_text() == done.stdout
+    (here / "empty").mkdir()
+    for nothing in ("empty", "deep/*.yml"):
+        done = invoke("run", nothing)
+        assert (done.exit_code, "no studies" in done.stderr) == (2, True)
+
+
+def test_failures_are_told_at_the_end_and_to_github(here, analysis, invoke, monkeypatch):
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    analysis(lambda study, **options: answer(warnings=["50 % play, mind the gap"]))
+    gate = "requirements:\n  - {result: kinematics.theta, at_least: 0}\n  - {result: kinematics.theta, at_most: 80}\n"
+    (here / "gate.yaml").write_text(SLIDER + gate)
+    (here / "wrong.yaml").write_text(SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]"))
+    done = invoke("run", "gate.yaml", "wrong.yaml", "slider.yaml", "--no-plots", "--quiet")
+    assert done.exit_code == 2
+    lines = done.stderr.splitlines()
+    assert any(line.startswith("::error file=wrong.yaml,line=6,col=19::mechanism.links.crank") for line in lines)
+    assert any(line.startswith("::error file=gate.yaml,line=16,col=") and "theta at most 80" in line for line in lines)
+    assert "::warning file=gate.yaml::gate: kinematics: 50 %25 play, mind the gap" in lines
+    at = lines.index("failed: 2 of 3 questions")
+    assert [line.split(":")[0].strip() for line in lines[at + 1 :]] == ["wrong", "gate"]
+
+
+def test_inputs_of_one_name_are_told_apart(here, invoke):
+    """Results are kept by what the files hold, each of them."""
+    for name in ("one", "two"):
+        (here / name).mkdir()
+        (here / name / "line.csv").write_text("P.x,P.y\n6,4\n5,5\n")
+    text = STUDY[: STUDY.index("kinematics:")] + "kinematics:\n  path: {P.x: one/x.csv, P.y: two/x.csv}\n"
+    for name in ("one", "two"):
+        (here / name / "x.csv").write_text("6\n5\n")
+    (here / "two_inputs.yaml").write_text(text)
+    arguments = ("run", "two_inputs.yaml", "--no-plots", "--resume")
+    assert invoke(*arguments).exit_code == 0
+    assert "kept" in invoke(*arguments).stdout
+    for name in ("one", "two"):
+        (here / name / "x.csv").write_text("6\n4\n")
+        assert "kept" not in invoke(*arguments).stdout
