@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
 import platform
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -319,3 +321,46 @@ def test_inputs_of_one_name_are_told_apart(here, invoke):
     for name in ("one", "two"):
         (here / name / "x.csv").write_text("6\n4\n")
         assert "kept" not in invoke(*arguments).stdout
+
+
+def test_a_poor_environment(here):
+    """No home, no locale, few files: names of other letters stay whole on the disk."""
+    (here / "größe.yaml").write_text("name: Größe → µm\n" + SLIDER.partition("\n")[2], encoding="utf-8")
+    command = [*COMMAND, "run", "größe.yaml", "slider.yaml", "--out", "aus/größe", "--jobs", "4"]
+
+    def few():
+        resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+
+    done = subprocess.run(command, env={"LC_ALL": "C"}, capture_output=True, preexec_fn=few, check=False)
+    assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
+    manifest = json.loads((here / "aus/größe/größe/kinematics/manifest.json").read_text(encoding="utf-8"))
+    assert manifest["study"]["name"] == "Größe → µm"
+    assert any(name.endswith(".png") for name in manifest["files"])
+
+
+def test_places_that_are_no_folders(here, invoke):
+    (here / "loop").symlink_to("loop")
+    for out in ("slider.yaml", "slider.yaml/deep", "loop", "loop/deep"):
+        done = invoke("run", "slider.yaml", "--no-plots", "--out", out)
+        assert done.exit_code == 4, out
+        assert "results cannot be written there" in done.stderr
+        assert "internal" not in done.stderr
+    assert invoke("run", "loop/slider.yaml").exit_code == 2
+    assert invoke("run", "slider.yaml", "--jobs", 100_000).exit_code == 2
+    assert (here / "slider.yaml").read_text() == SLIDER
+
+
+def test_a_study_that_is_edited_while_it_runs(here, analysis, invoke):
+    """The results are those of the text that was read, and say so."""
+
+    def edit(study, **options):
+        (here / "slider.yaml").write_text(SLIDER + "# edited\n")
+        return table(1)
+
+    analysis(edit)
+    arguments = ("run", "slider.yaml", "--no-plots", "--resume", "--out", "out")
+    assert invoke(*arguments).exit_code == 0
+    told = json.loads((here / "out/kinematics/manifest.json").read_text())
+    assert told["study"]["sha256"] == hashlib.sha256(SLIDER.encode()).hexdigest()
+    assert "kept" not in invoke(*arguments).stdout
+    assert "kept" in invoke(*arguments).stdout
