@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from mechdesign.cli import options as given
+from mechdesign.cli import process
 from mechdesign.cli.options import BUILT_IN, Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import EXIT_CODES, Interrupted
@@ -159,9 +160,5 @@ def schema() -> None:
 
 
 def main() -> None:
-    """Entry point of the `mechdesign` command."""
-    for stream in (sys.stdout, sys.stderr):
-        # A name in a study must not fail on a terminal that lacks its letters.
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")
-    app()
+    """The command in a process of its own."""
+    process.run(app)
