@@ -18,8 +18,10 @@ import math
 import os
 import pty
 import re
+import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -40,6 +42,8 @@ ANY = "..."
 DIGITS = 1e-6
 _FENCE = re.compile(r"(?ms)^(?P<fence>`{3,})(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=fence)[ ]*$")
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w])")
+# Python of one page at a time: the folder it runs in and what it prints are those of the whole process.
+_PYTHON = threading.Lock()
 _CAPTION = re.compile(r":caption: (?P<name>\S+?)(?P<more>, continued)?\n")
 
 
@@ -175,24 +179,25 @@ def _yaml(page: Page, body: str, where: int) -> None:
 
 def _python(page: Page, body: str, where: int) -> None:
     stream = io.StringIO()
-    before = Path.cwd()
-    try:
-        os.chdir(page.folder)
-        with contextlib.redirect_stdout(stream):
-            exec(compile(body, str(page.path), "exec"), page.names)
-    except Exception as error:
-        page.fail(where, f"{type(error).__name__}: {error}")
-    finally:
-        os.chdir(before)
+    with _PYTHON:
+        before = Path.cwd()
+        try:
+            os.chdir(page.folder)
+            with contextlib.redirect_stdout(stream):
+                exec(compile(body, str(page.path), "exec"), page.names)
+        except Exception as error:
+            page.fail(where, f"{type(error).__name__}: {error}")
+        finally:
+            os.chdir(before)
     page.printed = stream.getvalue()
 
 
 def _run(path: Path) -> tuple[str, list[str]]:
     """The text of a page as it would be true, and what is wrong with it as it is."""
     folder = RUN / path.relative_to(ROOT).with_suffix("")
-    folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob("*.yaml"):
-        old.unlink()
+    # What an earlier run has left could make a page true that is not.
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     page = Page(path, folder)
 
     def block(found: re.Match[str]) -> str:
@@ -222,7 +227,8 @@ def pages(names: Iterable[str] = ()) -> list[Path]:
 
 def wrong(paths: Iterable[Path]) -> list[str]:
     """Run the examples of these pages; what is wrong with them, in words."""
-    return [words for path in paths for words in _run(path)[1]]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return [words for _, told in pool.map(_run, paths) for words in told]
 
 
 def main() -> None:
