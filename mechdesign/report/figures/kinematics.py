@@ -46,6 +46,7 @@ _STILL = 1e-9  # part of its size by which a column changes that does not change
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
 _TICK = 9.0  # points, a tick of equal time across a path
 _LEGEND_LINE = 0.19  # inches
+_LEGEND_SYMBOL = 0.6  # inches, of a legend's lines beside their words
 _MOST_TICKS = 24  # along a motion
 _FEWEST_TICKS = 4
 _UNEVEN = 2e-3  # part of the mean step by which those of a sweep may differ
@@ -320,13 +321,16 @@ def paths_figure(
     near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
     places = np.concatenate([sweep.extent, *wanted, *near, *([earlier.extent] if earlier is not None else [])])
     ticks = equal_times(sweep)
-    if told := len(centrodes) + (ticks is not None):
+    room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
+    words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
+             for link in centrodes]  # fmt: skip
+    if told := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
         above = max(above, TITLE + _LEGEND_LINE * (told - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
-    for (link, path), dashes in zip(centrodes.items(), _CENTRODES * len(centrodes), strict=False):
+    for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
         path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
         axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
-                  label=f"fixed centrode of {link}: path of its instant centre with the ground")  # fmt: skip
+                  label=label)  # fmt: skip
     if ticks is not None:
         _draw_ticks(axes, sweep, *ticks)
     for path in wanted:

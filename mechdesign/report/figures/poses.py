@@ -37,6 +37,7 @@ _TITLE_ROOM = 0.14
 _LETTERS_AN_INCH = 14.5  # in a panel's title
 _TITLE_SIZE = 9.0
 _HEADING = 0.34  # inches, the heading
+_HEADING_LINE = 0.19  # inches, a further line of it
 _KEY = 0.26  # inches, a row of the key
 _KEY_LETTER = 0.074  # inches, a letter of the key
 _SYMBOL = 0.3  # inches, a symbol of the key and its gap
@@ -101,7 +102,9 @@ def poses_figure(study: Study, result: Result) -> Figure | None:
     above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
     centres = study_centres(found)
     rows = _key_rows(centres)
-    top = _HEADING + _KEY * (any(scales) + len(rows))
+    arrows = sum(map(bool, scales)) if style.narrow() else int(any(scales))  # rows of the key
+    heading = style.folded(_heading(found, result), 11, style.width() - LEFT - RIGHT)
+    top = _HEADING + _HEADING_LINE * heading.count("\n") + _KEY * (arrows + len(rows))
     figure, grid = windows(window, study.units.label("length"), count, columns, gap=_GAP, above=above, top=top)
     for axes, title, each in zip(grid, titles, found.shown, strict=True):
         axes.set_title(title, loc="left", fontsize=_TITLE_SIZE)
@@ -115,7 +118,7 @@ def poses_figure(study: Study, result: Result) -> Figure | None:
         _draw_centres(axes, each, centres, int(window.width * _LETTERS_AN_INCH))
         draw_mechanism(axes, mechanism, each.configuration, each.index, drives=False, travel=sweep.travel,
                        size=_SYMBOLS)  # fmt: skip
-    _draw_key(figure, study, _heading(found, result), scales, window.scale, side, rows)
+    _draw_key(figure, study, heading, scales, window.scale, side, rows)
     return figure
 
 
@@ -250,8 +253,8 @@ def _draw_key(
 ) -> None:  # fmt: skip
     """The heading, below it arrows of round rates, and the marks of instant centres; `inches` a length of one."""
     height = figure.get_figheight()
-    line = height - 0.22
-    figure.text(LEFT / style.width(), line / height, heading, va="center", fontsize=11)
+    figure.text(LEFT / style.width(), 1 - 0.12 / height, heading, va="top", fontsize=11)
+    line = height - 0.22 - _HEADING_LINE * heading.count("\n")
 
     def write(x: float, words: str) -> float:
         figure.text(x / style.width(), line / height, words, va="center", fontsize=9)
@@ -261,6 +264,8 @@ def _draw_key(
     line -= _KEY if any(scales) else 0.0
     for kind, scale in zip(_KINDS, scales, strict=True):
         if scale:
+            if style.narrow() and x > LEFT:
+                line, x = line - _KEY, LEFT
             most = min(_LONGEST * side, _KEY_ARROW / inches)
             value = round_down(most / scale)
             length = value * scale * inches

@@ -34,6 +34,7 @@ MOST_LOOPS = 5
 MOST_ADVANTAGES = 4
 _TALL = 2.5  # inches, a panel
 _LEGEND_LINE = 0.19
+_LEGEND_SYMBOL = 0.8  # inches, the line beside a name, and margins
 # Distances from where an advantage is infinite, as parts of that of the nearest pose, at which its curve is drawn.
 _SHRINKING = 2.0 ** -np.arange(1, 9)
 _BAND = "#E4EFE8"
@@ -75,8 +76,9 @@ def transmission_figure(study: Study, result: Result) -> Figure | None:
         notes.append(f"{len(names)} of {len(asked)} mechanical advantages")
     heading = " and ".join(["transmission angle"] * bool(loops) + ["mechanical advantage"] * bool(names))
     loops = sorted(loops, key=lambda each: _off(each.worst))[:MOST_LOOPS]
-    told = [GOOD_WORDS, *(each.loop.name for each in loops)] if loops else []
+    told = [GOOD_WORDS, *map(_label, loops)] if loops else []
     rows = -(-(len(told) + 1) // fitting(told)) if told else 0  # with the worst of them
+    rows += sum(label.count("\n") for label in told)
     figure, axes = stack(bool(loops) + len(names), heading, over.label, note="; ".join(notes), tall=_TALL,
                          bottom=BELOW_BARE + _LEGEND_LINE * rows)  # fmt: skip
     if loops:
@@ -122,6 +124,11 @@ def transmissions(study: Study, result: Result, sweep: Sweep, over: Along) -> li
     return found
 
 
+def _label(each: Transmission) -> str:
+    """The name of a loop, as wide as the page at most."""
+    return style.folded(each.loop.name, 9, style.width() - _LEGEND_SYMBOL)
+
+
 def _off(angle: float) -> float:
     """The acute angle: how far the links are from a straight line."""
     return min(angle, 180 - angle)
@@ -132,7 +139,7 @@ def _draw_angles(axis: Axes, x: Floats, loops: list[Transmission], over: Along) 
     for end in GOOD:
         axis.axhline(end, color=style.GREEN, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
     for each, (color, dashes) in zip(loops, _LOOKS, strict=False):
-        axis.plot(x, each.angle, color=color, linestyle=dashes, linewidth=1.8, label=each.loop.name)
+        axis.plot(x, each.angle, color=color, linestyle=dashes, linewidth=1.8, label=_label(each))
     worst = loops[0]
     words = f"worst: {worst.worst:.4g} deg" + (f" at {over.name} = {worst.at:.4g}" if over.name else "")
     color = style.INK if GOOD[0] <= worst.worst <= GOOD[1] else style.VERMILION
@@ -140,7 +147,7 @@ def _draw_angles(axis: Axes, x: Floats, loops: list[Transmission], over: Along) 
     axis.set_ylim(0, 180)
     axis.set_yticks([0, GOOD[0], 90, GOOD[1], 180])
     axis.set_ylabel("angle between coupler\nand output [deg]")
-    axis.set_title("90 deg: the coupler's force all moves the output; 0, 180 deg: none does", loc="left", fontsize=9.5)
+    axis.set_title("90 deg is best; 0 and 180 deg pass no force", loc="left", fontsize=9.5)
 
 
 @quiet
