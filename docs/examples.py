@@ -131,7 +131,8 @@ def _yaml(page: Page, body: str, where: int) -> None:
                 mechdesign.load(file)
         else:
             (page.folder / "part.yaml").write_text(
-                yaml.safe_dump(merged(yaml.safe_load(page.study) or {}, yaml.safe_load(text))), encoding="utf-8"
+                yaml.safe_dump(merged(yaml.safe_load(page.study) or {}, yaml.safe_load(text)), sort_keys=False),
+                encoding="utf-8",
             )
             mechdesign.load(page.folder / "part.yaml")
     except (MechdesignError, yaml.YAMLError) as error:
