@@ -59,11 +59,11 @@ class MechdesignError(Exception):
 class Problem:
     """One mistake in a study: where it stands and what would mend it."""
 
-    message: str
-    key: str = ""
+    message: str  #: what is wrong, and what to write instead
+    key: str = ""  #: path of the key, with points between its words
     file: str = ""
-    line: int = 0
-    column: int = 0
+    line: int = 0  #: from 1; 0 where the study is not a text
+    column: int = 0  #: from 1
 
     def __str__(self) -> str:
         place = self.file

@@ -391,10 +391,27 @@ def solve_shown(study: Study, most: int = MAX_SHOWN_POSES) -> Shown:
         Where the coordinates given do not determine the mechanism.
     """
     poses = study_poses(study, "kinematics")
-    rows, names = _rows(poses, most), poses.groups[0].names
+    rows = _rows(poses, most)
+    return Shown(study, poses, rows, _solve_rows(study, poses, rows))
+
+
+def solve_pose(study: Study, poses: Poses, row: int) -> Configuration:
+    """One of some poses.
+
+    Raises
+    ------
+    MechdesignError
+        Where the coordinates given do not determine the mechanism.
+    """
+    return _solve_rows(study, poses, np.array([row]))
+
+
+def _solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
+    """Poses that give the same coordinates."""
+    names = next(group.names for group in poses.groups if rows[0] in group.rows)
     plan = study.mechanism.plan(names)
     given = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]
-    return Shown(study, poses, rows, plan.solve(given))
+    return plan.solve(given)
 
 
 def _rows(poses: Poses, most: int) -> Ints:

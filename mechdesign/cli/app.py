@@ -95,7 +95,15 @@ _add(
 )  # fmt: skip
 _add(
     "check",
-    (given.STUDIES, given.OUT_DRAWINGS, given.OVERRIDES, given.QUIET, given.NO_PLOTS),
+    (
+        given.STUDIES,
+        given.OUT_DRAWINGS,
+        given.OVERRIDES,
+        given.QUIET,
+        given.NO_PLOTS,
+        given.FORMAT,
+        given.STYLE,
+    ),
     "Validate only: joints, mobility, plan of solution.",
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",
 )

@@ -18,6 +18,7 @@ from mechdesign.cli.execution import (
     Outcome,
     answer,
     claim,
+    extras,
     folder,
     interrupted,
     load_study,
@@ -92,7 +93,8 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             if not options.no_plots:
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
-                terminal.say(f"{label}: {write_sketch(directory, study)}", quiet=options.quiet)
+                told = write_sketch(directory, study, extras("check", options))
+                terminal.say(f"{label}: {told}", quiet=options.quiet)
         except Exception as error:
             code, message = explained(error)
             terminal.say(message)

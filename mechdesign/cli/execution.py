@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import sys
@@ -14,11 +15,12 @@ from typing import Any
 import mechdesign
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
-from mechdesign.cli.options import BUILT_IN, Options
-from mechdesign.errors import Interrupted, StudyError
+from mechdesign.cli.options import BUILT_IN, STYLES, Options
+from mechdesign.errors import Interrupted, MechdesignError, StudyError
 from mechdesign.journal import NAME, Journal
 from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer
+from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, command_of
@@ -104,8 +106,10 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     """
     begun = time.perf_counter()
     writer.check_writable(directory)
-    animate = options.animate and command == "kinematics"
-    asked = manifest.Extras(not options.no_plots, options.kinds, animate, options.all_modes, options.report)
+    asked = extras(command, options)
+    before = load(options.before, seed=options.seed) if options.before is not None else None
+    if before is not None:
+        asked = dataclasses.replace(asked, before=manifest.shown_before(before))
     if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
     if command in LONG:
@@ -119,6 +123,8 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
             result: Result = getattr(mechdesign, command)(
                 study, seed=options.seed, jobs=options.jobs, progress=bar, **more
             )
+            if before is not None:
+                result = laid_under(study, result, before, _earlier(before, command, options))
     except Interrupted as interrupt:
         writer.write(directory, study, interrupt.result, (), asked)
         terminal.say(f"{study.label}: {command}: {interrupt}")
@@ -137,6 +143,23 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         written=True, result=result,
     )  # fmt: skip
+
+
+def _earlier(before: Study, command: str, options: Options) -> Result:
+    """The result of the study before; its errors begin with its name."""
+    try:
+        result: Result = getattr(mechdesign, command)(before, seed=options.seed, jobs=options.jobs)
+    except MechdesignError as error:
+        error.args = (f"--before {before.label}: {error}", *error.args[1:])
+        raise
+    return result
+
+
+def extras(command: str, options: Options) -> Extras:
+    """What else than tables the options want of a command."""
+    animate = options.animate and command == "kinematics"
+    look = options.style or STYLES[0]
+    return Extras(not options.no_plots, options.kinds, animate, options.all_modes, options.report, look)
 
 
 def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
@@ -230,7 +253,7 @@ def write_report(
     told += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
     below = any(given.directory != directory for given in answers)
     path = directory / pages.REPORT
-    writer.write_file(path, page.report(study, told, below=below))
+    writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots))
     terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
 
 

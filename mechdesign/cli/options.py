@@ -14,6 +14,8 @@ from mechdesign.files import formats_of
 
 # Template of the study that is taken where there is none.
 BUILT_IN = "two_link_arm"
+# Widths of the pages of pictures and sizes of their type.
+STYLES = ("screen", "paper")
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
@@ -65,12 +67,26 @@ JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
 NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
 FORMAT = _text("formats", str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.")
+STYLE = _text(
+    "style",
+    str,
+    "--style",
+    "NAME",
+    "Of the pictures: screen, or paper for a journal's column, 88 mm wide with type of 8 pt. Default: screen.",
+)
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
 REPORT = _flag("report", "--report", "Also write report.html: one page with all of it, which moves.")
 REPORTS = _flag(
     "report", "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
 )
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
+BEFORE = _text(
+    "before",
+    Path,
+    "--before",
+    "STUDY",
+    "Also draw this study, without the overrides of --set, in dashes under the other: before and after a change.",
+)
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
 FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
 RESUME = _flag(
@@ -82,8 +98,8 @@ RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
 # What every question takes, and what only some of them do.
-COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT)
-OWN = {"kinematics": (ANIMATE, ALL_MODES), "optimize": (RESUME_DESIGNS,)}
+COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE)
+OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
 
 
 @dataclass(frozen=True)
@@ -93,7 +109,7 @@ class Options:
     Raises
     ------
     StudyError
-        If two options contradict each other, or a format is none.
+        If two options contradict each other, or a format or style is none.
     """
 
     out: Path | None = None
@@ -104,9 +120,11 @@ class Options:
     quiet: bool = False
     no_plots: bool = False
     formats: str | None = None
+    style: str | None = None
     report: bool = False
     animate: bool = False
     all_modes: bool = False
+    before: Path | None = None
     junit: Path | None = None
     fail_fast: bool = False
     resume: bool = False
@@ -114,8 +132,11 @@ class Options:
     def __post_init__(self) -> None:
         if self.animate and self.no_plots:
             raise StudyError("--animate and --no-plots contradict each other")
-        if self.formats is not None and self.no_plots:
-            raise StudyError("--format and --no-plots contradict each other")
+        for option, value in (("--format", self.formats), ("--style", self.style), ("--before", self.before)):
+            if value is not None and self.no_plots:
+                raise StudyError(f"{option} and --no-plots contradict each other")
+        if self.style is not None and self.style not in STYLES:
+            raise StudyError(f"--style takes {' or '.join(STYLES)}, not {self.style!r}")
         formats_of(self.formats, "--format")
 
     @property

@@ -62,7 +62,10 @@ _LETTERS = 10
 
 
 class Message(NamedTuple):
-    """Error or warning: its text with ``<...>`` for what differs, subject, exit code: None of a warning."""
+    """An error or a warning: its text with ``<...>`` for what differs, its subject, its exit code.
+
+    A warning has no code, a part of a message `PART`.
+    """
 
     text: str
     subject: str

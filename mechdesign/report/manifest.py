@@ -29,6 +29,8 @@ class Extras:
     animate: bool = False
     all_modes: bool = False
     report: bool = False
+    style: str = "screen"  # of the pictures
+    before: Mapping[str, Any] | None = None  # the study before a change, which pictures show as well
 
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
@@ -43,6 +45,12 @@ def computed_from(study: Study, command: str) -> dict[str, Any]:
         "overrides": list(study.overrides),
         "seed": study.seed,
     }
+
+
+def shown_before(study: Study) -> dict[str, Any]:
+    """What the manifest says of a study that pictures show as well."""
+    about = computed_from(study, "")
+    return {key: about[key] for key in ("study", "inputs", "overrides") if key in about}
 
 
 def compose(
@@ -99,7 +107,7 @@ def is_current(directory: Path, study: Study, command: str, asked: Extras) -> di
         return None
     expected = computed_from(study, command) | asdict(asked)
     without = [name for name in ("plots", "animate", "report") if not expected[name]]
-    for name in (*without, *(("formats",) if not asked.plots else ())):
+    for name in (*without, *(("formats", "style") if not asked.plots else ())):
         expected[name] = content.get(name)
     files = recorded_files(content)
     if not files or "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):

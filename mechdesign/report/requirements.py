@@ -19,12 +19,12 @@ from mechdesign.study.schema.optimize import Requirement
 class Verdict:
     """What became of one requirement."""
 
-    requirement: str  # in words
-    met: bool  # whether the worst row meets it
-    worst: float  # the value of the worst row; nan where a row has none or no row was found
-    place: str = ""  # the pose or row where it is worst
-    margin: float = float("nan")  # of the worst row to the limit, negative beyond it
-    unit: str = ""  # of `worst` and `margin`
+    requirement: str  #: in words
+    met: bool  #: whether the worst row meets it
+    worst: float  #: the value of the worst row; nan where a row has none or no row was found
+    place: str = ""  #: the pose or row where it is worst
+    margin: float = float("nan")  #: of the worst row to the limit, negative beyond it
+    unit: str = ""  #: of `worst` and `margin`
 
     def __str__(self) -> str:
         place = f" at {self.place}" if self.place else ""

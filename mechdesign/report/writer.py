@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from mechdesign.report.figures.rendering import Gallery
 
 MECHANISM = "mechanism"
+DIMENSIONS = "dimensions"  # of `check`
 ANIMATION = "motion.gif"
 FIGURES = "mechdesign.report.figures"
 # Ends the names under which pictures stand as HTML.
@@ -80,8 +81,7 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
         drawn: dict[str, bytes] = {}
         plots = asked.plots and not result.interrupted
         if plots:
-            kinds = asked.formats.split(",")
-            drawn, warnings = pictures(study, result, kinds, animate=asked.animate, inline=asked.report)
+            drawn, warnings = pictures(study, result, asked)
         if asked.report:
             from mechdesign.report.page import section
 
@@ -113,8 +113,8 @@ def write_file(path: Path, data: bytes) -> None:
         raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
 
 
-def write_sketch(directory: Path, study: Study) -> str:
-    """Draw the sketch as it is understood into a directory, as ``mechanism.png``; says where it is, or why not.
+def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
+    """Draw the sketch as it is understood into a directory, as ``mechanism`` and ``dimensions``; says what is there.
 
     Raises
     ------
@@ -122,13 +122,26 @@ def write_sketch(directory: Path, study: Study) -> str:
         If it cannot be written.
     """
     check_writable(directory)
-    path = directory / f"{MECHANISM}.png"
-    try:
-        data = sketch(study)
-    except Exception as error:
-        return f"warning: {_undrawn(path.name, explain(error)[1])}"
-    write_file(path, data)
-    return f"the sketch as understood is in {path}"
+    from mechdesign.report.figures import style
+    from mechdesign.report.figures.dimensions import dimensions_figure
+    from mechdesign.report.figures.mechanism import sketch_figure
+
+    kinds, told = asked.formats.split(","), []
+    drawings = ((MECHANISM, "the sketch as understood is", sketch_figure),
+                (DIMENSIONS, "its dimensions are", dimensions_figure))  # fmt: skip
+    for name, what, make in drawings:
+        paths = [directory / f"{name}.{kind}" for kind in kinds]
+        try:
+            with style.context(asked.style):
+                figure = make(study)
+                drawn = {path: style.encoded(figure, path.suffix[1:]) for path in paths}
+        except Exception as error:
+            told.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
+            continue
+        for path, data in drawn.items():
+            write_file(path, data)
+        told.append(f"{what} in {', '.join(map(str, paths))}")
+    return "; ".join(told)
 
 
 def sketch(study: Study) -> bytes:
@@ -150,25 +163,24 @@ def figures(study: Study, result: Result) -> Gallery:
     return found
 
 
-def pictures(
-    study: Study, result: Result, formats: Sequence[str] = ("png",), *, animate: bool = False, inline: bool = False
-) -> tuple[dict[str, bytes], tuple[str, ...]]:
+def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, bytes], tuple[str, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
 
-    With `inline` there is of each also the HTML by which it stands in a page, under its name and `INLINE`.
+    For a report there is of each also the HTML by which it stands in a page, under its name and `INLINE`.
     """
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
     from mechdesign.report.figures.rendering import Drawing, render
     from mechdesign.report.page import vector
 
-    with style.context():
+    formats = asked.formats.split(",")
+    with style.context(asked.style):
         gallery = figures(study, result)
 
         def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
             figure = make()
             drawn = {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
-            if inline:
+            if asked.report:
                 alt = f"{name.replace('_', ' ')}: {vector.described(figure)}"
                 html = vector.picture(figure, f"{result.command}-{name}", alt, drawn.get(f"{name}.png"))
                 drawn[f"{name}{INLINE}"] = html.encode()
@@ -178,7 +190,7 @@ def pictures(
             f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
         }
         drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
-        if animate:
+        if asked.animate:
             from mechdesign.report.figures.kinematics import animation
 
             drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}

@@ -52,26 +52,35 @@ _TEXT = "<study>"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study:
-    """A validated study; sections are None where it does not ask."""
+    """A validated study; sections are None where it does not ask.
 
-    name: str  # by default that of its file
-    path: pathlib.Path | None  # None of a study that was given as a text or a mapping
-    text: bytes  # as it was read; empty of a mapping
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
+    ... kinematics: {poses: [{arm: 60}]}
+    ... ''')
+    >>> study.questions, study.units.label("velocity"), study.mechanism.drives
+    (('kinematics',), 'mm/s', ('arm',))
+    """
+
+    name: str  #: by default that of its file
+    path: pathlib.Path | None  #: None of a study that was given as a text or a mapping
+    text: bytes  #: as it was read; empty of a mapping
     text_sha256: str
-    seed: int
-    overrides: tuple[str, ...]
-    units: Units
-    resolved: dict[str, Any]  # the study as plain data, overrides applied
-    mechanism: Mechanism
+    seed: int  #: of the random numbers
+    overrides: tuple[str, ...]  #: as ``a.b.c=value``, in the order in which they were applied
+    units: Units  #: of lengths, angles, forces and times, in the file as in the results
+    resolved: dict[str, Any]  #: the study as plain data, overrides applied
+    mechanism: Mechanism  #: which solves any pose
     parameters: Parameters
     kinematics: KinematicsSection | None
     workspace: WorkspaceSection | None
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[Requirement, ...]  #: in the order of the file
     targets: Mapping[str, Target]  # by the coordinate or point
-    warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
+    warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -80,7 +89,7 @@ class Study:
 
     @property
     def label(self) -> str:
-        """The name of its folder of results: that of its file, else its own."""
+        """The name of its folder of results, that of its file or else its own."""
         return self.path.stem if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
 
     def __repr__(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 import re
@@ -13,6 +14,7 @@ from helpers.pages import faults
 from helpers.tables import unsaid
 from matplotlib.figure import Figure
 
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
 from mechdesign.study import load, template_path, templates
@@ -76,6 +78,17 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
             assert content.startswith(PNG) or name.endswith(".csv") or load(folder / name)
 
 
+@pytest.mark.usefixtures("judged_pages")
+@pytest.mark.parametrize("name", ["wiper", "press_stiffness", "cheapest_tolerances"])
+def test_pages_as_narrow_as_a_column_are_laid_out(name: str, tmp_path: Path, invoke) -> None:
+    done = invoke("run", ROOT / "configs" / "gallery" / f"{name}.yaml", "--out", tmp_path, "--style", "paper")
+    assert done.exit_code == 0, done.output
+    manifests = [json.loads(path.read_text()) for path in tmp_path.glob("*/manifest.json")]
+    assert manifests
+    for manifest in manifests:
+        assert not [warning for warning in manifest["warnings"] if "could not be drawn" in warning]
+
+
 @pytest.mark.parametrize("config", CONFIGS, ids=named)
 def test_results_are_those_of_the_study_as_it_is(config: Path) -> None:
     for command in load(config).questions:
@@ -104,5 +117,29 @@ def test_pages_show_pictures_that_exist() -> None:
 def test_readme_shows_the_test_command_that_ci_runs_and_every_command() -> None:
     text = (ROOT / "README.md").read_text()
     assert "bash .ci/run" in text
-    for command in ("kinematics", "workspace", "optimize", "reliability", "stiffness", "run", "check", "new", "schema"):
+    for command in (*COMMANDS, "run", "check", "new", "docs", "schema"):
         assert f"mechdesign {command}" in text
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/questions.md"])
+def test_numbers_told_of_the_five_bar_are_those_of_its_results(page: str) -> None:
+    def row(table: str, **where: str) -> dict[str, float]:
+        with (ROOT / "results" / "five_bar" / f"{table}.csv").open() as file:
+            rows = [each for each in csv.DictReader(file) if all(each[name] == value for name, value in where.items())]
+        return {name: float(value) for name, value in rows[0].items() if re.fullmatch(r"[-+.\de]+", value)}
+
+    indices, stiff = row("workspace/indices"), row("stiffness/stiffness", **{"C.x": "0", "C.y": "220"})
+    near, far = (
+        100 * row("reliability/reliability", **{"C.x": "0", "C.y": y, "method": "monte_carlo"})["reliability"]
+        for y in ("220", "280")
+    )
+    told = {
+        "README.md": (
+            f"{indices['area']:,.0f} mm²", f"{100 * indices['SUI']:.1f} %", f"{indices['GII']:.3f}", f"{near:.1f} %",
+            f"{far:.1f} %",
+        ),
+        "docs/questions.md": (f"{stiff['k_x']:.0f} N/mm across", f"{stiff['k_y']:.0f} N/mm upwards"),
+    }  # fmt: skip
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for number in told[page]:
+        assert number in text

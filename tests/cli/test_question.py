@@ -1,11 +1,14 @@
 """One question from the study to files, tables, exit code."""
 
 import hashlib
+import io
 import json
 import os
+import re
 
 import numpy as np
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 from mechdesign.cli.app import app
@@ -236,8 +239,26 @@ def test_pictures_as_vectors_are_the_same_bytes_at_every_run(folder, invoke):
     assert not any(name.endswith(".png") for name in files)
 
 
+def test_pictures_for_paper_are_as_wide_as_a_column(folder, invoke):
+    wide = 88 / 25.4  # inches
+    asked = ("run", "slider.yaml", "--style", "paper", "--format", "png,svg,pdf", "--out", "out")
+    assert invoke(*asked).exit_code == 0
+    png = Image.open(io.BytesIO((folder / "out/kinematics/mechanism.png").read_bytes()))
+    assert png.width / png.info["dpi"][0] == pytest.approx(wide, abs=1 / 300)
+    svg = (folder / "out/kinematics/mechanism.svg").read_text()
+    assert float(re.search(r'<svg [^>]*width="([0-9.]+)pt"', svg)[1]) == pytest.approx(72 * wide, abs=1e-3)
+    pdf = (folder / "out/kinematics/mechanism.pdf").read_bytes()
+    assert float(re.search(rb"/MediaBox \[ 0 0 ([0-9.]+) ", pdf)[1]) == pytest.approx(72 * wide, abs=1e-3)
+    assert json.loads((folder / "out/kinematics/manifest.json").read_text())["style"] == "paper"
+    assert "(kept)" in invoke(*asked, "--resume").stdout
+    assert "(kept)" not in invoke("run", "slider.yaml", "--format", "png,svg,pdf", "--out", "out", "--resume").stdout
+
+
 def test_formats_that_are_none_are_refused(folder, invoke):
     done = invoke("kinematics", "slider.yaml", "--format", "png,jpg")
     assert done.exit_code == 2
     assert "--format takes png, svg, pdf or several with commas between, not 'jpg'" in done.stderr
     assert invoke("kinematics", "slider.yaml", "--format", "svg", "--no-plots").exit_code == 2
+    done = invoke("check", "slider.yaml", "--style", "poster")
+    assert done.exit_code == 2
+    assert "--style takes screen or paper, not 'poster'" in done.stderr

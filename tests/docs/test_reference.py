@@ -59,7 +59,8 @@ mechanism:
   limits: [{drive: q1, min: 0, max: 120}, {drive: q2, min: -150, max: -20}]
   sketch: {E: [0, 1.5], W: [1, 1.5], P: [1.3, 1.5]}
 workspace:
-  {point: P, at: {hand.angle: {from: 0, to: 20}}, scan: {about: [0.5, 1.5], from: 0, to: 5}, characteristic_length: 1}
+  {point: P, at: {hand.angle: {from: 0, to: 20}}, scan: {about: [0.5, 1.5], from: 0, to: 5, rays: 5},
+   characteristic_length: 1}
 """
 PLATFORM = ROOT / "configs" / "planar_3rpr.yaml"
 

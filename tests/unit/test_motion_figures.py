@@ -10,6 +10,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.kinematics import curves_figure, figures, in_order
 from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.scene import Sweep, ranks
+from mechdesign.report.figures.transmission import transmission_figure
 
 FOUR_BAR = """
 mechanism:
@@ -183,8 +184,110 @@ def test_a_long_sweep_is_drawn_at_a_bounded_number_of_poses():
     assert sweep.closed
 
 
-def test_lists_and_grids_have_no_curves():
-    assert drawn(study_of(FOUR_BAR, "kinematics={poses: [{theta: 0}, {theta: 30}]}")) == {}
+def test_listed_poses_are_drawn_one_by_one_and_have_no_curves():
+    found = drawn(study_of(FOUR_BAR, "kinematics={poses: [{theta: 0}, {theta: 30}]}"))
+    assert set(found) == {"poses"}
+    titles = [axes.get_title(loc="left") for axes in found["poses"].axes]
+    assert titles == ["theta = 0 deg", "theta = 30 deg"]
+
+
+def test_special_poses_say_what_is_special_and_their_arrows_are_to_scale():
+    study = study_of(FOUR_BAR, "kinematics.rates={theta: 1 rad/s}", "kinematics.outputs=[A, rocker.angle]")
+    figure = drawn(study)["poses"]
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert sum(title.endswith("rocker reverses") for title in titles) == 2
+    key = {line.get_label(): line for line in figure.artists}
+    words = {text.get_text().split(" ")[0]: text.get_text() for text in figure.texts}
+    for name, size, heading in (("velocity", 30, 1j), ("acceleration", 30, -1)):
+        # A turns about O at 1 rad/s.
+        for axes in figure.axes:
+            (line,) = [line for line in axes.lines if line.get_label() == f"{name} of A"]
+            base, tip = line.get_xydata() @ [1, 1j]
+            assert abs(tip - base) > 0
+            np.testing.assert_allclose((tip - base) / abs(tip - base), heading * base / 30, atol=1e-9)
+            pixels = np.hypot(*np.diff(axes.transData.transform(line.get_xydata()), axis=0)[0])
+            length = np.diff(key[name].get_xdata())[0] * figure.dpi
+            assert pixels / length == pytest.approx(size / float(words[name].split(" ")[1]))
+    assert key["velocity"].get_linestyle() == "-"
+    assert key["acceleration"].get_linestyle() == "--"
+
+
+def test_a_limit_of_motion_is_a_special_pose_without_rates():
+    poses = mechdesign.kinematics(study_of(ROCKER)).drawn["special"]
+    limits = [each for each in poses.shown if each.what.startswith("limit of motion: dead centre")]
+    assert len(limits) == 2
+    for each in limits:
+        rod, rocker = (each.configuration.rotation(link)[each.index] for link in ("rod", "rocker"))
+        assert abs((rod * np.conj(rocker)).imag) < 1e-6
+        assert np.isnan(each.velocities["B"])
+    assert [each.place for each in poses.shown] == sorted(each.place for each in poses.shown)
+
+
+def test_a_stretched_arm_is_a_special_pose():
+    arm = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 50], lower: [E, P, 30]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
+  sketch: {E: [30, 30], P: [10, 50]}
+kinematics: {sweep: {q1: 30, q2: {from: -97, to: 200, step: 11}}, rates: {q2: 10}, outputs: [P]}
+"""
+    study = study_of(arm)
+    poses = mechdesign.kinematics(study).drawn["special"]
+    singular = [each for each in poses.shown if each.what == "singular: det_J is 0"]
+    assert [each.place for each in singular] == pytest.approx([0, 180], abs=1e-8)
+    assert drawn(study)["poses"].texts[0].get_text() == "singular poses, poses between"
+
+
+def test_special_poses_of_one_configuration_are_shown_once():
+    """The outer dead centre of an engine at 0 and 360 deg is one pose."""
+    slider = FOUR_BAR.replace("rocker: [D, B, 60]", "rocker: {B: [0, 0]}").replace(
+        "  drives:", "  joints: {guide: {prismatic: [ground, rocker]}}\n  drives:"
+    )
+    poses = mechdesign.kinematics(study_of(slider.replace("B: [75, 55]", "B: [85, 0]"))).drawn["special"]
+    assert [each.place for each in poses.shown if each.what] == pytest.approx([0, 180])
+
+
+def test_ticks_of_equal_time_are_equal_steps_of_the_drive():
+    (axes,) = drawn(study_of(FOUR_BAR, "kinematics.rates={theta: 60 rpm}"))["paths"].axes
+    (ticks,) = axes.collections
+    middles = np.array([path.vertices.mean(axis=0) @ [1, 1j] for path in ticks.get_paths()])
+    path = sweep_of(study_of(FOUR_BAR)).places["C"]
+    np.testing.assert_allclose(middles, path[:-1:3], atol=1e-9)
+    assert axes.get_legend().get_texts()[0].get_text() == "ticks every 0.0417 s (15 deg of theta)"
+    assert (
+        not drawn(study_of(FOUR_BAR, "kinematics.rates={theta: 6}", "kinematics.accelerations={theta: 1}"))["paths"]
+        .axes[0]
+        .collections
+    )
+
+
+def test_transmission_angles_stand_before_their_band_and_the_worst_is_marked():
+    study = study_of(FOUR_BAR)
+    (axes,) = drawn(study)["transmission"].axes
+    (band,) = axes.patches
+    assert band.get_extents().transformed(axes.transData.inverted()).intervaly == pytest.approx((40, 140))
+    curve = next(line for line in axes.lines if len(line.get_xdata()) == 73)
+    # By the law of cosines in the triangle of coupler, rocker and the line from A to D.
+    square = 100**2 + 30**2 - 2 * 100 * 30 * np.cos(np.radians(curve.get_xdata()))
+    wanted = np.degrees(np.arccos((90**2 + 60**2 - square) / (2 * 90 * 60)))
+    np.testing.assert_allclose(curve.get_ydata(), wanted, atol=1e-9)
+    worst = next(line for line in axes.lines if line.get_marker() == "o")
+    assert worst.get_ydata() == pytest.approx([wanted[0]])
+    assert worst.get_xdata() == [0]
+
+
+def test_a_mechanical_advantage_without_bound_has_a_logarithmic_axis_and_its_place_is_marked():
+    advantage = "kinematics.mechanical_advantage={rocker.angle: theta}"
+    study = study_of(FOUR_BAR, advantage)
+    result = mechdesign.kinematics(study)
+    with style.context():
+        figure = transmission_figure(study, result)
+    axes = figure.axes[1]
+    assert axes.get_yscale() == "log"
+    marks = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2]
+    assert marks == pytest.approx(sorted(result.tables["toggles"]["theta"]))
+    assert "rocker.angle_advantage" in result.tables["motion"]
+    assert len(figures(study, result)["motion"].axes) == len(drawn(study_of(FOUR_BAR))["motion"].axes)
 
 
 def test_every_assembly_has_a_panel_on_one_scale():

@@ -1,6 +1,7 @@
 """The mechanism in the report: what the script is given is the motion of the tables, part by part."""
 
 import json
+from functools import cache
 from xml.etree import ElementTree
 
 import numpy as np
@@ -30,6 +31,7 @@ def in_study(data, z):
     return complex(*data["corner"]) + z.conj() / data["scale"]
 
 
+@cache
 def shown(name, *overrides):
     result = result_of(name, *overrides)
     return moving(study_named(name, *overrides), result), result
@@ -137,7 +139,7 @@ def test_poses_that_cannot_be_assembled_are_said():
 
 def test_a_motion_of_361_poses_is_small_and_the_same_again():
     part, _ = shown("jansen", "kinematics.sweep.crank.step=1")
-    again, _ = shown("jansen", "kinematics.sweep.crank.step=1")
+    again, _ = shown.__wrapped__("jansen", "kinematics.sweep.crank.step=1")
     assert part == again
     assert len(part.drawing) + len(part.beside) + len(json.dumps(part.data)) < 200_000
 

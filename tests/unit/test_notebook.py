@@ -22,8 +22,10 @@ import mechdesign
 from mechdesign.cli.app import app
 from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
+from mechdesign.mechanism import Mechanism
+from mechdesign.results import Column, Table
+from mechdesign.study import Study, template, template_path
 from mechdesign.study import load as load_plain
-from mechdesign.study import template, template_path
 
 DATA = {
     "mechanism": {
@@ -182,7 +184,7 @@ def test_a_picture_that_fails_is_told_and_costs_no_other(monkeypatch: pytest.Mon
     monkeypatch.setattr("mechdesign.report.figures.kinematics.curves_figure", fail)
     result = mechdesign.kinematics(mechdesign.load(DATA))
     with pytest.warns(UserWarning, match=r"picture motion could not be drawn: .*no ink"):
-        assert result.figures == ("paths", "mechanism")
+        assert result.figures == ("paths", "poses", "transmission", "mechanism")
     with pytest.raises(mechdesign.MechdesignError, match="no ink"):
         result.figure("motion")
 
@@ -206,7 +208,7 @@ def test_a_requirement_that_names_nothing_does_not_keep_a_result_from_being_show
 
 def test_one_picture_by_its_name_whatever_the_settings() -> None:
     result = mechdesign.kinematics(mechdesign.load(DATA))
-    assert result.figures == ("motion", "paths", "mechanism")
+    assert result.figures == ("motion", "paths", "poses", "transmission", "mechanism")
     usual = result.figure("paths")
     with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "savefig.dpi": 20}):
         mine = dict(matplotlib.rcParams)
@@ -218,7 +220,7 @@ def test_one_picture_by_its_name_whatever_the_settings() -> None:
     assert shown == usual._repr_png_()
     assert shown.startswith(PNG)
     assert result._repr_png_() == result.figure("motion")._repr_png_()
-    with pytest.raises(mechdesign.StudyError, match=r"'path'; did you mean 'paths'\?; there are motion, paths, mech"):
+    with pytest.raises(mechdesign.StudyError, match=r"'path'; did you mean 'paths'\?; there are motion, paths, poses"):
         result.figure("path")
 
 
@@ -295,7 +297,16 @@ def test_the_example_of_every_public_name_holds(name: str) -> None:
     told = getattr(mechdesign, name) if name else mechdesign
     if name == "__version__":
         return
-    (test,) = doctest.DocTestFinder(recurse=False).find(told, name or "mechdesign", module=False, globs={})
+    hold(told, name or "mechdesign")
+
+
+@pytest.mark.parametrize("told", [Study, Mechanism.solve, Table, Column], ids=lambda told: told.__qualname__)
+def test_the_example_of_what_they_return_holds(told: object) -> None:
+    hold(told, "returned")
+
+
+def hold(told: object, name: str) -> None:
+    (test,) = doctest.DocTestFinder(recurse=False).find(told, name, module=False, globs={})
     assert len(test.examples) > 1
     assert not doctest.DocTestRunner().run(test).failed
 

@@ -11,6 +11,7 @@ import mechdesign
 from mechdesign.analyses import poses
 from mechdesign.mechanism.plan import Plan
 from mechdesign.report import writer
+from mechdesign.report.manifest import Extras
 
 FOUR_BAR = """
 mechanism:
@@ -43,7 +44,7 @@ def test_nothing_is_solved_for_a_picture(command, study, options, expected, monk
         raise AssertionError("solved a second time")
 
     monkeypatch.setattr(Plan, "solve", refuse)
-    drawn, failed = writer.pictures(given, result)
+    drawn, failed = writer.pictures(given, result, Extras())
     assert expected <= set(drawn)
     # The mechanism's first pose is a question of kinematics.
     assert not [warning for warning in failed if "mechanism.png" not in warning or command == "kinematics"]

@@ -103,6 +103,16 @@ def test_headlines_name_the_extreme_row_with_its_unit_and_pose() -> None:
     assert found.note.replace("\N{NO-BREAK SPACE}", " ") == "at theta = 5 deg"
 
 
+def test_what_stands_still_but_for_rounding_has_no_largest_velocity() -> None:
+    result = Result("kinematics", {"motion": table(
+        "motion",
+        **{"P.x_velocity": ([0.1, -0.3, 9.0], "m/s", "velocity of P.x"),
+           "P.y_velocity": ([1e-17, 0.0, 9.0], "m/s", "velocity of P.y"),
+           "valid": ([True, True, False], "", "")},
+    )})  # fmt: skip
+    assert [(each.label, each.value) for each in headlines(result)] == [("largest velocity of P.x", "0.3")]
+
+
 def test_headlines_of_every_method_with_the_interval_of_the_worst_pose() -> None:
     result = Result("reliability", {"reliability": table(
         "reliability",

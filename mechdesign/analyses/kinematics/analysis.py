@@ -11,6 +11,7 @@ import numpy as np
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.boundaries import Boundary, motion_limits
+from mechdesign.analyses.kinematics.instant_centres import MOTIONS, REST, TRANSLATION
 from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
 from mechdesign.analyses.kinematics.motion import (
@@ -21,6 +22,7 @@ from mechdesign.analyses.kinematics.motion import (
     move,
 )
 from mechdesign.analyses.kinematics.peaks import extremes, needed
+from mechdesign.analyses.kinematics.special_poses import special_poses
 from mechdesign.analyses.poses import Keeper, Shown, judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
@@ -67,8 +69,9 @@ def kinematics(
     -------
     Result
         Tables ``motion``, ``extremes``; for a sweep of one coordinate ``limits``; ``loops`` and ``toggles`` of
-        four-bars and slider-cranks; ``targets`` where there are some;
-        ``jacobian`` where the study names as many outputs of it, or outputs, as drives; ``modes`` with `all_modes`.
+        four-bars and slider-cranks; ``targets`` where there are some; ``instant_centres`` where
+        pairs of links are named; ``jacobian`` where the study names as many outputs of it, or outputs, as drives;
+        ``modes`` with `all_modes`.
 
     Raises
     ------
@@ -107,8 +110,12 @@ def kinematics(
         tables["targets"] = targets_table(motion)
     if question.square:
         tables["jacobian"] = jacobian_table(motion)
+    if question.centres:
+        tables["instant_centres"] = centres_table(motion)
+        warnings += _without_centre(motion)
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(motion.reason))}
     drawn: dict[str, Any] = {"poses": poses, "motion": keeper.shown}
+    drawn["special"] = special_poses(motion, keeper.shown, swept, ends, tables.get("toggles"))
     if all_modes:
         tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
         warnings += told
@@ -207,6 +214,37 @@ def jacobian_table(motion: Motion) -> Table:
             columns.append(Column(name, motion.arrays[name], _per(question.study, output, drive), meaning))
     columns += shared(question.study.units, valid=motion.valid)
     return Table("jacobian", tuple(columns), "derivatives of outputs by the drives, per radian")
+
+
+def centres_table(motion: Motion) -> Table:
+    """Instant centres of pairs of links, a row a pose."""
+    length, columns = motion.question.study.units.label("length"), motion.pose_columns()
+    for centre in motion.question.centres:
+        pair = f"{centre.one} and {centre.other}"
+        for axis in "xy":
+            meaning = f"place of the instant centre of {pair}; inf where one translates against the other"
+            columns.append(Column(f"{centre.name}.{axis}", motion.arrays[f"{centre.name}.{axis}"], length, meaning))
+        numbers = np.nan_to_num(motion.arrays[f"{centre.name}.motion"]).round().astype(int)
+        meaning = f"how {centre.one} moves against {centre.other}: rotation, translation or rest"
+        columns.append(Column(f"{centre.name}.motion", np.array(MOTIONS)[numbers], "", meaning))
+    columns += shared(motion.question.study.units, valid=motion.valid)
+    return Table("instant_centres", tuple(columns), "instant centres of velocity of pairs of links")
+
+
+def _without_centre(motion: Motion) -> list[str]:
+    """What is to be known of poses in which two links have no instant centre within reach."""
+    study, poses, warnings = motion.question.study, motion.question.poses, []
+    for centre in motion.question.centres:
+        for kind, text in (
+            (TRANSLATION, "one translates against the other: their instant centre is at infinity"),
+            (REST, "neither moves against the other: they have no instant centre"),
+        ):
+            rows = np.flatnonzero(motion.valid & (motion.arrays[f"{centre.name}.motion"].round() == kind))
+            if len(rows):
+                where = f"in {len(rows)} of {poses.count} poses"
+                first = pose_in_words(study, poses, int(rows[0]))
+                warnings.append(f"{centre.one} and {centre.other}: {where} {text}; the first: {first}")
+    return warnings
 
 
 def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.columns import shared
+from mechdesign.analyses.kinematics.instant_centres import Centre
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.targets import Error, errors, needed
 from mechdesign.analyses.poses import (
@@ -25,11 +26,11 @@ from mechdesign.analyses.poses import (
 )
 from mechdesign.errors import counted
 from mechdesign.mechanism import Mechanism, Reason
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.outputs import first, second
+from mechdesign.mechanism.outputs import Rates, first, second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column
@@ -50,6 +51,8 @@ STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
 ENOUGH_POSES = 4096
 # but no step becomes longer than this (radians, or parts of the mechanism's size).
 LONGEST_STEP = 0.02
+# An output that moves less than this part of its input (lengths in sizes of the mechanism) stands still: at a toggle.
+STANDS_STILL = 1e-12
 
 
 def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
@@ -101,6 +104,11 @@ class MotionQuestion:
     def drives(self) -> list[Coordinate]:
         """The mechanism's drives."""
         return [self.study.mechanism.coordinate(name) for name in self.study.mechanism.drives]
+
+    @property
+    def centres(self) -> list[Centre]:
+        """Pairs of links whose instant centres are asked."""
+        return [Centre(*pair) for pair in self.section.instant_centres]
 
     @property
     def mixed(self) -> bool:
@@ -202,12 +210,25 @@ class Motion:
         self.put("conditioning", rows, conditioning)
         regular = conditioning >= STALLED
         section = self.question.section
+        velocity = None
         if section.rates or section.accelerations or section.speed:
-            self._rates(linear, solved, regular)
-        if self.question.square or self.question.section.loads:
+            velocity = self._rates(linear, solved, regular)
+        if section.instant_centres:
+            # Of one drive alone every speed gives the same centres.
+            self._centres(linear, rows, linear.velocity([1.0]) if len(study.mechanism.drives) == 1 else velocity)
+        if self.question.square or section.loads or section.mechanical_advantage:
             self._statics(linear, rows, regular)
 
-    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> None:
+    def _centres(self, linear: Linearization, rows: Ints, velocity: Rates | None) -> None:
+        assert velocity is not None
+        for centre in self.question.centres:
+            place, motion = centre.at(self.question.study.mechanism, linear.configuration, velocity)
+            known = np.isfinite(self.arrays["conditioning"][rows]) & (self.arrays["conditioning"][rows] >= STALLED)
+            self.put(f"{centre.name}.x", rows, np.where(known, place.real, np.nan))
+            self.put(f"{centre.name}.y", rows, np.where(known, place.imag, np.nan))
+            self.put(f"{centre.name}.motion", rows, np.where(known, motion, 0))
+
+    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> Rates:
         drives = drive_rates(self.question.study, self.question.section, self.question.poses, solved, linear)
         velocity = linear.velocity(drives.velocities)
         acceleration = linear.acceleration(velocity, drives.accelerations)
@@ -220,6 +241,7 @@ class Motion:
             ):
                 value = np.where(regular, in_study_units(self.question.study, output, value), np.nan)
                 self.put(f"{output.name}_{order}", solved.rows, value)
+        return velocity
 
     def _statics(self, linear: Linearization, rows: Ints, regular: Flags) -> None:
         study, listed, drives = self.question.study, self.question.listed, self.question.drives
@@ -246,6 +268,20 @@ class Motion:
         moved = Jacobian.of(linear, [study.mechanism.coordinate(name) for name in work]).entries
         for k, drive in enumerate(drives if work else ()):
             put(f"{drive.name}_effort", -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True)))
+        for name, given in self.question.section.mechanical_advantage.items():
+            put(f"{name}_advantage", self._advantage(linear, name, given))
+
+    @quiet
+    def _advantage(self, linear: Linearization, output: str, given: str) -> Value:
+        """Force of an output over that at its input: by virtual work the input's rate over the output's."""
+        mechanism, drives = self.question.study.mechanism, [drive.name for drive in self.question.drives]
+        both = [mechanism.coordinate(name) for name in (output, given)]
+        rows = Jacobian.of(linear, both).entries
+        k = drives.index(given) if given in drives else 0
+        given_out, put_in = rows[0][k], rows[1][k]
+        sizes = [mechanism.size if c.quantity == "length" else 1.0 for c in both]
+        still = np.abs(given_out) / sizes[0] <= STANDS_STILL * np.maximum(np.abs(put_in) / sizes[1], STANDS_STILL)
+        return np.where(still & (put_in != 0), np.inf, put_in / given_out)
 
     def columns(self) -> list[Column]:
         """The columns of the motion table, `valid` last."""
@@ -277,6 +313,12 @@ class Motion:
             if name in arrays:
                 unit = label("moment" if drive.quantity == "angle" else "force")
                 columns.append(Column(name, arrays[name], unit, "drive effort that balances the loads"))
+        for name, given in question.section.mechanical_advantage.items():
+            units = {"length": label("length"), "angle": ""}
+            above, below = (units[question.study.mechanism.quantity(each)] for each in (given, name))
+            unit = "" if above == below else above or f"1/{below}"
+            meaning = f"force or moment of {name} over that put in at {given}, without friction"
+            columns.append(Column(f"{name}_advantage", arrays[f"{name}_advantage"], unit, meaning))
         return [*columns, *shared(self.question.study.units, valid=self.valid)]
 
     def pose_columns(self) -> list[Column]:

@@ -28,6 +28,7 @@ _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
     "motion": kinematics.motion_table,
     "targets": kinematics.targets_table,
     "jacobian": kinematics.jacobian_table,
+    "instant_centres": kinematics.centres_table,
 }
 TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*_OF_MOTION, "extremes", "loops"),
@@ -166,7 +167,8 @@ def tables(
     absent: Mapping[str, str] = {}
     if command == "kinematics":
         motion = move(dataclasses.replace(motion_question(study), poses=poses), also=solved.append)
-        known = {"motion": True, "targets": bool(motion.errors), "jacobian": motion.question.square}
+        known = {"motion": True, "targets": bool(motion.errors), "jacobian": motion.question.square,
+                 "instant_centres": bool(motion.question.centres)}  # fmt: skip
         found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
         # Torn are designs whose motion ends where no limit is known.
         between, torn = kinematics.tables_between(motion, (), wanted, outputs)

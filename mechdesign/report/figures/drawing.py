@@ -83,9 +83,9 @@ class Pen:
             PathPatch(path, transform=transform, alpha=self.alpha, zorder=self.order + lift, clip_on=True, **look)
         )
 
-    def line(self, ends: Sequence[complex], color: str) -> None:
+    def line(self, ends: Sequence[complex], color: str, dashes: Any = "-") -> None:
         """A link as a thin line along its points: for ghosts."""
-        self._line(ends, 0.1, 1.3, color, solid_capstyle="round", solid_joinstyle="round")
+        self._line(ends, 0.1, 1.3, color, solid_capstyle="round", solid_joinstyle="round", linestyle=dashes)
 
     def bar(self, ends: Sequence[complex], color: str, width: float = BAR) -> None:
         """A link as a bar with round ends along a line of points."""
@@ -256,7 +256,8 @@ def _slide_labels(scene: Scene) -> list[Label]:
     ]
 
 
-def _link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
+def link_labels(scene: Scene, colors: Mapping[str, str]) -> list[Label]:
+    """Names of the moving links that are no drive."""
     labels = []
     for name in scene.description.links:
         places = [scene.points[point] for point in scene.link_points(name)]
@@ -339,25 +340,28 @@ def draw_mechanism(
     named = _draw_drives(pen, scene) if drives else []
     if labels:
         # The most needed first.
-        named = [*point_labels(scene), *named, *_slide_labels(scene), *_link_labels(scene, colors)]
+        named = [*point_labels(scene), *named, *_slide_labels(scene), *link_labels(scene, colors)]
         place_labels(axes, named, covered(axes), order=pen.order + 2)
 
 
-def draw_ghost(axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int) -> None:
+def draw_ghost(
+    axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int, *, dashes: Any = "-",
+    alpha: float = 0.4,
+) -> None:  # fmt: skip
     """Draw a further pose as thin grey lines, which lie below the paths and do not look like them."""
     scene = pose(mechanism, configuration, index)
     if scene is None:
         return
-    pen = Pen(axes, alpha=0.4, order=2.0)
+    pen = Pen(axes, alpha=alpha, order=2.0)
     for _, body in bodies(scene):
         if len(body) > 1:
-            pen.line([*body, *(body[:1] if len(body) > 2 else [])], _GHOST)
+            pen.line([*body, *(body[:1] if len(body) > 2 else [])], _GHOST, dashes)
     for link in scene.description.links.values():
         if link.telescopic and link.ends:
-            pen.line([scene.points[end] for end in link.ends], _GHOST)
+            pen.line([scene.points[end] for end in link.ends], _GHOST, dashes)
     for guide in scene.guides:
         if guide.owner != GROUND:
-            pen.line(reach(scene, guide, (guide.pin,)), _GHOST)
+            pen.line(reach(scene, guide, (guide.pin,)), _GHOST, dashes)
 
 
 def bodies(scene: Scene) -> list[tuple[str, list[complex]]]:

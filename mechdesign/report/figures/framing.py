@@ -63,7 +63,7 @@ def windows(
 
     Where the gap between columns has room for it each has an axis label of its own, or else the first one.
     """
-    rest = style.WIDTH - LEFT - columns * window.width - (columns - 1) * gap
+    rest = style.width() - LEFT - columns * window.width - (columns - 1) * gap
     figure, panels = style.page(
         count, columns, window.height, left=LEFT, right=rest, top=top + above, bottom=below, across=gap, down=above
     )
@@ -80,8 +80,8 @@ def windows(
 
 
 def framed(
-    places: Complexes | Iterable[complex], unit: str, *, height: float, above: float = ABOVE
+    places: Complexes | Iterable[complex], unit: str, *, height: float, above: float = ABOVE, pad: float = PAD
 ) -> tuple[Figure, Axes]:
     """A figure with one window as wide as the page; `above` it, inches are left for a title."""
-    figure, (axes,) = windows(fit(places, style.WIDTH - LEFT - RIGHT, height), unit, above=above)
+    figure, (axes,) = windows(fit(places, style.width() - LEFT - RIGHT, height, pad), unit, above=above)
     return figure, axes

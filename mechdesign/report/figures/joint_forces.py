@@ -145,7 +145,9 @@ def _curves(study: Study, kinds: Mapping[str, Sequence[Joint]], loads: Sequence[
         if kind == "force":
             axes.set_ylim(bottom=0)
         _in_powers(axes.yaxis, kind, unit, max(map(abs, axes.get_ylim())))
-        axes.set_title(f"{loads[number]}: {kind} {worst}", loc="left", fontsize=9.5)
+        title = f"{loads[number]}: {kind} {worst}"
+        size = 6.5 if style.narrow() else 9.5
+        axes.set_title(style.folded(title, size, style.width() - 1.0), loc="left", fontsize=size)
     tick_abscissa(panels[-1], over)
     panels[-1].set_xlim(float(over.values.min()), float(over.values.max()))
     clear_of_ticks(figure, panels)
@@ -190,7 +192,7 @@ def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], ove
     # As of the curves: what grows without bounds near a singularity is left out.
     places = np.append(known[np.abs(known) <= _BEYOND * np.quantile(np.abs(known), _USUAL)], 0.0)
     columns, unit = len(some), study.units.label("force")
-    window = fit(places, (style.WIDTH - RIGHT - LEFT * columns) / columns, _HODOGRAPH, 0.2)
+    window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, _HODOGRAPH, 0.2)
     labels = [f"{each.name.split(', ')[0]}: {each.words}" for each in joints]
     rows = -(-len(labels) // fitting(labels))
     figure, panels = windows(window, "", columns, columns, above=0.28, top=0.34,
@@ -208,7 +210,9 @@ def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], ove
     words = (
         f"Way of the tip of each joint's static force over {over.name or 'the path'}; dot: first pose, ring: largest"
     )
-    figure.text(LEFT / style.WIDTH, 1 - 0.1 / figure.get_figheight(), words, va="top", fontsize=11)
+    size = 8.0 if style.narrow() else 11.0
+    words = style.folded(words, size, style.width() - LEFT)
+    figure.text(LEFT / style.width(), 1 - 0.1 / figure.get_figheight(), words, va="top", fontsize=size)
     handles = [Line2D([], [], linewidth=1.8, label=words, **look) for words, look in zip(labels, looks, strict=False)]
     legend_below(figure, handles, labels)
     return figure

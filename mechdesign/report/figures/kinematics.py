@@ -9,20 +9,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from PIL import Image
 
+from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.report.before import Before, known
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, fit, framed, windows
-from mechdesign.report.figures.panels import abscissa, clear_of_ticks, moving_names, tick_abscissa
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, fit, framed, windows
+from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.overlay import DASHES, draw_sweep, name_both
+from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
+from mechdesign.report.figures.poses import poses_figure
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
-from mechdesign.results import Column, Result
+from mechdesign.report.figures.transmission import transmission_figure
+from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study, Units
 
 # More curves than this in one panel cannot be told apart.
@@ -37,10 +44,20 @@ _MAX_TALL_PANELS = 7  # more panels are lower
 _LEGEND_LETTERS = 26  # of the longest name in a legend
 _STILL = 1e-9  # part of its size by which a column changes that does not change
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
+_TICK = 9.0  # points, a tick of equal time across a path
+_LEGEND_LINE = 0.19  # inches
+_LEGEND_SYMBOL = 0.6  # inches, of a legend's lines beside their words
+_MOST_TICKS = 24  # along a motion
+_FEWEST_TICKS = 4
+_UNEVEN = 2e-3  # part of the mean step by which those of a sweep may differ
+_CENTRODES = ((0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (3, 2)))  # dashes
+_NEAR = 0.75  # larger sides of the mechanism from its middle up to which a centrode widens the window
 _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
 _SHADE = "#EFEFEF"
+_LEFT = 1.0  # inches beside panels of curves
+_LEGEND_ROW = 0.19
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
@@ -54,27 +71,32 @@ _PANEL_TITLE = 0.3
 _NOTE = 0.3
 _GAP = 0.12
 _SMALL_SYMBOLS = 0.6
-# Of the animation: frames at most, colours, milliseconds, and dots an inch, 480 pixels wide.
+# Of the animation: frames at most, colours, milliseconds, and pixels across.
 FRAMES = 36
 _GIF_COLORS = 32
 _WHITE = 244  # brightness of 255 from which on a colour is white
 _CYCLE = 3600  # of the whole
 _MIN_FRAME = 50
 _MAX_FRAME = 160
-_DPI = 60
+_GIF_WIDTH = 480
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """``motion`` (curves of a sweep or path), ``paths`` (poses and point paths) and ``modes`` (every assembly).
+    """``motion``, ``paths``, ``poses``, ``transmission`` and ``modes``.
 
-    Lists and grids of poses have neither curves nor paths.
+    They are curves of a sweep or path, poses and point paths, limits or listed poses one by one, how force is passed
+    on, and every assembly. Lists of poses have neither curves nor paths, grids have no pictures but their assemblies.
     """
     found = Gallery()
     if result.drawn["poses"].motion:
         found.add("motion", curves_figure, study, result)
         sweep = Sweep.of(result.drawn["motion"])
         if len(sweep.valid):
-            found.add("paths", paths_figure, sweep)
+            centres = result.tables.get("instant_centres")
+            found.add("paths", paths_figure, sweep, centres=centres, before=known(result.drawn))
+    found.add("poses", poses_figure, study, result)
+    if result.drawn["poses"].motion:
+        found.add("transmission", transmission_figure, study, result)
     if "modes" in result.tables:
         found.add("modes", modes_figure, study, result)
     return found
@@ -98,27 +120,54 @@ def curves_figure(study: Study, result: Result) -> Figure | None:
     panels = _panels(study, [column for column in table.columns if column.name != "valid"], swept, x)
     if not panels:
         return None
+    before = known(result.drawn)
     limits, marks = result.tables.get("limits"), []
     if limits is not None and swept in limits:
         marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
+    # A narrow page has no room for legends beside its panels: they stand above them.
+    above = style.narrow()
+    rows = max(-(-len(panel[:MAX_CURVES]) // _columns(panel)) + (len(panel) > MAX_CURVES) for panel in panels)
+    room = 0.1 + _LEGEND_ROW * rows
     longest = min(max(len(curve.of) for panel in panels for curve in panel[:MAX_CURVES]), _LEGEND_LETTERS)
     figure, axes = style.page(
-        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=1.0, right=0.6 + 0.08 * longest,
-        top=0.4 if marks else 0.15, bottom=0.5, down=0.2, sharex=True,
+        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=_LEFT,
+        right=0.15 if above else 0.6 + 0.08 * longest, top=(0.4 if marks else 0.15) + room * above, bottom=0.5,
+        down=room if above else 0.2, sharex=True,
     )  # fmt: skip
     colors: dict[tuple[str, str], str] = {}
     for axis, panel in zip(axes, panels, strict=True):
         for begin, end in invalid:
             axis.axvspan(begin, end, color=_SHADE, linewidth=0, zorder=0)
         _draw(axis, panel, x, study.units, colors)
+        if before is not None:
+            _draw_before(axis, panel, before, colors)
     _draw_limits(figure, axes, marks, bool(invalid))
     axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
     axes[-1].margins(x=0.02)
     axes[-1].set_xlabel(over.label)
     tick_abscissa(axes[-1], over)
     clear_of_ticks(figure, axes)
+    if before is not None:
+        name_both(figure, before)
     return figure
+
+
+def _draw_before(axis: Axes, panel: list[_Curve], before: Before, colors: dict[tuple[str, str], str]) -> None:
+    """The curves of the study before, dashed, each in the colour of its name."""
+    table, x = before.result.tables["motion"], abscissa(before.study, before.result.drawn["poses"]).values
+    low, high = axis.get_ylim()
+    for curve in panel[:MAX_CURVES]:
+        if curve.column.name in table:
+            color = colors[curve.of, "" if curve.order in _RANKS[:4] else curve.order]
+            values = table[curve.column.name]
+            axis.plot(x, values, color=color, linestyle=DASHES, linewidth=1.1, zorder=1.9)
+            if curve.order == "position" and np.isfinite(values).any():
+                low, high = min(low, float(np.nanmin(values))), max(high, float(np.nanmax(values)))
+    # Near a dead centre rates grow without bound: their axis stays that of the study now.
+    if (low, high) != axis.get_ylim():
+        margin = 0.04 * (high - low)
+        axis.set_ylim(low - margin, high + margin)
 
 
 def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[list[_Curve]]:
@@ -136,6 +185,8 @@ def _panels(study: Study, columns: list[Column], swept: str, x: Floats) -> list[
     for column in columns:
         if column.values.dtype.kind != "f" or column.name in left_out or not np.isfinite(column.values).any():
             continue
+        if column.name.endswith("_advantage"):
+            continue  # has a picture with the transmission angles
         order = next((order for order in _ORDERS if column.name.endswith(f"_{order}")), "position")
         of = column.name.removesuffix(f"_{order}")
         if column.name in _RANKS:
@@ -181,6 +232,15 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
     return found
 
 
+def _shortened(name: str) -> str:
+    return name if len(name) <= _LEGEND_LETTERS else f"{name[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+
+
+def _columns(panel: list[_Curve]) -> int:
+    """Columns of a legend above a panel."""
+    return fitting([_shortened(curve.of) for curve in panel[:MAX_CURVES]], style.width() - _LEFT - 0.3)
+
+
 def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
     shown: list[Floats] = []
     for curve in panel[:MAX_CURVES]:
@@ -188,16 +248,11 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
         # A name keeps its colour from its position to its acceleration.
         color = colors.setdefault((curve.of, "" if curve.order in _RANKS[:4] else curve.order), _COLORS[len(shown)])
         hidden = any(_coincide(values, other) for other in shown)
-        label = (
-            curve.of
-            if len(curve.of) <= _LEGEND_LETTERS
-            else f"{curve.of[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
-        )
         # In grey the markers tell what the colours tell.
         which, every = _COLORS.index(color), max(len(x) // _MARKS, 1)
         marker = _MARKERS[which] if len(panel) > 1 else ""
-        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=label, marker=marker,
-                  markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
+        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=_shortened(curve.of),
+                  marker=marker, markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
         shown.append(values)
     first = panel[0]
     title = first.order.replace("_", " ")
@@ -220,7 +275,10 @@ def _draw(axis: Axes, panel: list[_Curve], x: Floats, units: Units, colors: dict
     if len(panel) > 1 or first.of != first.order:
         left_out = len(panel) - len(shown)
         note = f"and {left_out} more" if left_out else None
-        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=note, title_fontsize=9, alignment="left")
+        place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+        if style.narrow():
+            place = {"loc": "lower left", "bbox_to_anchor": (-0.02, 0.97), "ncols": _columns(panel), "borderaxespad": 0}
+        axis.legend(title=note, title_fontsize=9, alignment="left", **place)
 
 
 def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, str]], shaded: bool) -> None:
@@ -243,9 +301,13 @@ def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, 
         )  # fmt: skip
 
 
-def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
+def paths_figure(
+    sweep: Sweep, *, above: float = ABOVE, centres: Table | None = None, before: Before | None = None
+) -> Figure:
     """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
 
+    The boldest paths have ticks at equal steps of time where the swept drive has a rate; `centres` are the instant
+    centres, of which those against the ground have a path, too. A study before it lies under it in grey dashes.
     `above` it, inches are left for a title.
     """
     wanted = [
@@ -253,8 +315,24 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
         for target in sweep.study.targets.values()
         if target.table is not None and len(target.coordinates) == 2
     ]
-    places = np.concatenate([sweep.extent, *wanted])
+    earlier = Sweep.of(before.result.drawn["motion"]) if before is not None else None
+    centrodes = _centrodes(sweep, centres)
+    middle, *sides = extent(sweep.extent)
+    near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
+    places = np.concatenate([sweep.extent, *wanted, *near, *([earlier.extent] if earlier is not None else [])])
+    ticks = equal_times(sweep)
+    room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
+    words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
+             for link in centrodes]  # fmt: skip
+    if told := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
+        above = max(above, TITLE + _LEGEND_LINE * (told - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
+    for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
+        path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
+        axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
+                  label=label)  # fmt: skip
+    if ticks is not None:
+        _draw_ticks(axes, sweep, *ticks)
     for path in wanted:
         axes.plot(
             path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,
@@ -266,10 +344,77 @@ def paths_figure(sweep: Sweep, *, above: float = ABOVE) -> Figure:
     some = sweep.valid[np.linspace(0, len(sweep.valid) - 1, ghosts + 1).round().astype(int)]
     for index in np.unique(some[1 : -1 if sweep.closed else None]):
         draw_ghost(axes, sweep.mechanism, sweep.configuration, int(index))
+    if earlier is not None:
+        draw_sweep(axes, earlier)
     draw_paths(axes, sweep)
     first = int(sweep.valid[0])
     draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handlelength=2.6)
+    if before is not None:
+        name_both(figure, before)
     return figure
+
+
+def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
+    """Paths of the instant centres that links have with the ground, by the links; a pin of the ground stays."""
+    found = {}
+    for name in centres.names if centres is not None else ():
+        pair, _, column = name.rpartition(".")
+        links = pair.split(".")
+        if column == "x" and GROUND in links and len(links) == 2 and centres is not None:
+            path = vector(centres[name], centres[f"{pair}.y"])[sweep.rows]
+            path[~np.isfinite(path)] = complex(np.nan, np.nan)
+            known = path[np.isfinite(path)]
+            if len(known) and np.abs(known - known[0]).max() > _STILL * sweep.mechanism.size:
+                found[next(link for link in links if link != GROUND)] = path
+    return found
+
+
+def _leaps(path: Complexes, side: float) -> Flags:
+    """Points from which a path leaps through infinity, by its places about the mechanism's middle."""
+    far = np.abs(path) > side
+    turned = (np.conj(path[:-1]) * path[1:]).real < 0
+    return np.append(far[:-1] & far[1:] & turned, False)
+
+
+def equal_times(sweep: Sweep) -> tuple[Ints, str] | None:
+    """Poses at equal steps of time, and how long these are in words; None where the swept drive has no one rate."""
+    section, poses = sweep.study.kinematics, sweep.poses
+    moving = moving_names(poses)
+    if section is None or not poses.motion or len(moving) != 1 or any(section.accelerations.values()):
+        return None
+    (name,) = moving
+    rates = {key: rate for key, rate in section.rates.items() if rate}
+    values = poses.values[name][sweep.rows]
+    steps = np.diff(values)
+    if set(rates) != {name} or np.ptp(steps) > _UNEVEN * abs(steps.mean()) or len(steps) < _FEWEST_TICKS:
+        return None
+    least = -(-len(steps) // _MOST_TICKS)
+    stride = next((k for k in range(least, 2 * least + 1) if len(steps) % k == 0), least)
+    step, units = abs(float(steps.mean())) * stride, sweep.study.units
+    unit = units.label(sweep.mechanism.quantity(name))
+    words = f"ticks every {step / abs(rates[name]):.3g} {units.time} ({step:.4g} {unit}".rstrip() + f" of {name})"
+    return np.arange(0, len(values) - sweep.closed, stride), words
+
+
+def _draw_ticks(axes: Axes, sweep: Sweep, rows: Ints, words: str) -> None:
+    """Short lines across the boldest paths, of a length on paper."""
+    ranked = ranks(sweep.study)
+    shown = paper(axes, np.array([0.0, 1.0], dtype=complex))
+    half, lines = _TICK / 2 / (shown[1, 0] - shown[0, 0]), []
+    for point, path in sweep.places.items():
+        if ranked[point] < max(ranked.values()):
+            continue
+        before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, len(path) - 1)
+        with np.errstate(invalid="ignore"):
+            along = np.where(np.isfinite(path[after]), path[after], path[rows])
+            along = along - np.where(np.isfinite(path[before]), path[before], path[rows])
+            across = 1j * half * along / np.abs(along)
+        ends = np.stack([path[rows] - across, path[rows] + across], axis=1)
+        lines += [np.column_stack([end.real, end.imag]) for end in ends if np.isfinite(end).all()]
+    axes.add_collection(LineCollection(lines, colors=style.INK, linewidths=1.2, zorder=2.8), autolim=False)
+    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2, label=words)
 
 
 def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
@@ -316,13 +461,13 @@ def modes_figure(study: Study, result: Result) -> Figure:
             axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=columns == 1, drives=False,
             travel=sweep.travel, size=_SMALL_SYMBOLS if columns > 1 else 1.0,
         )  # fmt: skip
-    figure.text(LEFT / style.WIDTH, 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
+    figure.text(LEFT / style.width(), 1 - 0.22 / figure.get_figheight(), "; ".join(notes), fontsize=10)
     return figure
 
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches: all of them on about one screen."""
-    width = (style.WIDTH - LEFT - RIGHT - _GAP * (columns - 1)) / columns
+    width = (style.width() - LEFT - RIGHT - _GAP * (columns - 1)) / columns
     return width, min(max(8.0 / rows, _MIN_HEIGHT), _MAX_HEIGHT)
 
 
@@ -345,7 +490,7 @@ def gif(sweep: Sweep) -> bytes:
     most = FRAMES + 1 if closed else FRAMES // 2 + 1
     some = valid[np.unique(np.linspace(0, len(valid) - 1, most).round().astype(int))]
     figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=HEIGHT, above=TITLE)
-    figure.set_dpi(_DPI)
+    figure.set_dpi(_GIF_WIDTH / style.width())
     draw_paths(axes, sweep)
     pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)
     pictures = pictures if closed else pictures + pictures[-2:0:-1]

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import solve_shown
+from mechdesign.analyses.poses import solve_pose, solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
@@ -17,6 +17,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
 from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.reliability.looks import best_probability, followed_in_words
 from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -37,7 +38,8 @@ _BEAM_ORDER = 3.3  # above links and slots, below pins and names
 def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -> Figure:
     """The sketch pose, under `title`, and the first pose of the study's kinematics, on one scale.
 
-    Where the result carries no motion, a few poses of it are solved. Use inside `style.context`.
+    Of a reliability it is the pose that its samples follow. Where the result carries no motion, a few poses of it are
+    solved. Use inside `style.context`.
     """
     mechanism = study.mechanism
     sketch = mechanism.sketch_configuration
@@ -47,6 +49,12 @@ def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -
         sweep = Sweep.of(result.drawn["motion"] if "motion" in result.drawn else solve_shown(study, _POSES))
     except MechdesignError:
         return _compose(study, panels, travels(scenes))
+    worst = _worst(study, result)
+    if worst is not None:
+        words, solved = worst
+        if (scene := pose(mechanism, solved)) is not None:
+            panels.append((words, solved, 0))
+            return _compose(study, panels, travels([*scenes, scene]))
     some = np.unique(np.linspace(0, len(sweep.rows) - 1, _POSES).round().astype(int)).tolist()
     poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
     first = next((k for k, scene in poses.items() if scene is not None), None)
@@ -58,6 +66,22 @@ def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
         scenes += poses.values()
     return _compose(study, panels, travels(scenes))
+
+
+def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
+    """The pose at which errors leave their limits most often, in words and solved; None where nothing is limited."""
+    table = result.tables.get("reliability")
+    if result.command != "reliability" or table is None:
+        return None
+    poses, rows = result.drawn["poses"], table.where(scope="pose", method=best_probability(table))
+    failure = table["failure"][rows]
+    if not np.isfinite(failure).any():
+        return None
+    samples = result.drawn["samples"]
+    row = int(np.nanargmax(failure)) if samples is None else samples.pose
+    # A line may be broken between coordinates only.
+    words = followed_in_words(study, poses, row).replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
+    return words, solve_pose(study, poses, row)
 
 
 def sketch_figure(study: Study) -> Figure:
@@ -114,7 +138,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    return (style.WIDTH - RIGHT - LEFT * columns) / columns, _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
+    return (style.width() - RIGHT - LEFT * columns) / columns, _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
 
 
 def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: int = 0) -> None:

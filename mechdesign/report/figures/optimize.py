@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from itertools import combinations
+from itertools import combinations, cycle
 from string import ascii_uppercase
 
 import numpy as np
@@ -21,6 +21,7 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.optimum import design_figure, designs_figure
+from mechdesign.report.figures.panels import fitting
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace import regions_figure, workspace_figure
 from mechdesign.report.figures.workspace.regions import regions
@@ -40,6 +41,7 @@ MAX_VALUES = 200
 FEWEST_OF_FIELD = 1000
 # Directions from the centre of what the workspace contains to its outline.
 _OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
+_LETTER = 0.08  # inches
 _NAME_LETTERS = 14  # of a name in one line below an axis
 _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 
@@ -146,7 +148,7 @@ def score_curves(designs: Designs) -> Figure:
     """
     winner = designs.best
     many, count, one = len(designs.goals) > 1, len(designs.variables), designs.goals[0]
-    across = min(count, 3) if count > 2 else 1
+    across = min(count, 3) if count > 2 and not style.narrow() else 1
     down = -(-count // across)
     figure = style.new_figure(0.9 + (2.9 if across == 1 else 2.5) * down)
     score = designs.cpi if many else designs.values[:, 0]
@@ -162,7 +164,9 @@ def score_curves(designs: Designs) -> Figure:
         axes.plot(column[best], score[best], color=style.INK, linewidth=1.6 if count > 1 else 2.0,
                   label="best near each value" if count > 1 else told)  # fmt: skip
         for k, color in zip(range(len(designs.goals)) if many and count == 1 else (), style.PALETTE, strict=False):
-            axes.plot(column[best], designs.share(k)[best], color=color, label=f"{designs.goals[k].name}, normalised")
+            dashes = style.DASHES[(k + 1) % len(style.DASHES)]
+            axes.plot(column[best], designs.share(k)[best], color=color, linestyle=dashes,
+                      label=f"{designs.goals[k].name}, normalised")  # fmt: skip
         axes.plot(column[winner], score[winner], "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
         axes.set_title(f"best: {name} = {column[winner]:.4g}", loc="right", fontsize=9, color=style.VERMILION)
         axes.set_xlabel(label(designs, name))
@@ -174,8 +178,9 @@ def score_curves(designs: Designs) -> Figure:
     among = "" if count == 1 else " over each variable"
     better = "" if many else f", {'less' if one.smallest else 'more'} is better"
     what = f"Composite performance index of ({', '.join(each.name for each in designs.goals)})" if many else one.name
-    figure.suptitle(f"{what}{among}{better}", x=0.01, ha="left", fontsize=11)
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
+    _head(figure, f"{what}{among}{better}")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower left", ncols=fitting(labels) if style.narrow() else 5)
     return figure
 
 
@@ -213,18 +218,22 @@ def score_surface(designs: Designs) -> Figure:
         shown.setdefault((x[row], y[row]), []).append(f"({', '.join(f'{weight:g}' for weight in weights)})")
     for k, (place, rows) in enumerate(shown.items()):
         words = f"{place[0]:.4g}, {place[1]:.4g}: " + (f"best for {' '.join(rows)}" if many else "best")
+        words = style.folded(words, 9.0, style.width() - 0.6)
         axes.plot(*place, MARKERS[k % len(MARKERS)], color=style.VERMILION, markeredgecolor="white", markersize=8,
                   linestyle="none", label=words, clip_on=False, zorder=5)  # fmt: skip
     title = f"CPI over the design variables, and the best designs for weights of ({', '.join(goals)})"
-    axes.set_title(title if many else f"{goals[0]} over the design variables", loc="left")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=2 if len(shown) > 3 else 1)
+    title = title if many else f"{goals[0]} over the design variables"
+    axes.set_title(style.folded(title, 11.0, 0.78 * style.width()), loc="left")
+    handles, labels = axes.get_legend_handles_labels()
+    columns = fitting(labels) if style.narrow() else 2 if len(shown) > 3 else 1
+    figure.legend(handles, labels, loc="outside lower left", ncols=columns)
     return figure
 
 
 def goal_maps(designs: Designs) -> Figure:
     """Each goal over two variables, side by side."""
     goals = designs.goals
-    columns = min(len(goals), 3)
+    columns = 1 if style.narrow() else min(len(goals), 3)
     rows = -(-len(goals) // columns)
     figure = style.new_figure(0.3 + 2.7 * rows)
     for number, goal in enumerate(goals):
@@ -281,7 +290,8 @@ def parallel_axes(designs: Designs) -> Figure:
     columns = np.column_stack([*designs.variables.values(), designs.values])
     low, high = columns[designs.feasible].min(axis=0), columns[designs.feasible].max(axis=0)
     heights = np.where(high > low, (columns - low) / np.where(high > low, high - low, 1.0), 0.5)
-    figure = style.new_figure(4.2)
+    upright, words = style.narrow(), [label(designs, name) for name in names]
+    figure = style.new_figure(4.2 + upright * _LETTER * max(map(len, words)))
     axes = figure.add_subplot()
     places = np.arange(len(names))
     lines = [np.column_stack([places, heights[row]]) for row in rows]
@@ -289,13 +299,14 @@ def parallel_axes(designs: Designs) -> Figure:
     axes.add_collection(drawn)
     axes.plot(places, heights[designs.best], "o-", color=style.VERMILION, linewidth=2.2, label="best", clip_on=False,
               zorder=4)  # fmt: skip
+    size = 7.0 if upright else 8.5
     for place, ends in enumerate(zip(low, high, strict=True)):
         axes.axvline(place, color=style.INK, linewidth=0.8, zorder=3)
-        axes.text(place, -0.03, f"{ends[0]:.4g}", ha="center", va="top", fontsize=8.5)
-        axes.text(place, 1.03, f"{ends[1]:.4g}", ha="center", va="bottom", fontsize=8.5)
+        axes.text(place, -0.03, f"{ends[0]:.4g}", ha="center", va="top", fontsize=size)
+        axes.text(place, 1.03, f"{ends[1]:.4g}", ha="center", va="bottom", fontsize=size)
     axes.set_xlim(-0.3, len(names) - 0.7)
     axes.set_ylim(-0.02, 1.02)
-    axes.set_xticks(places, [_folded(label(designs, name)) for name in names])
+    axes.set_xticks(places, words if upright else map(_folded, words), rotation=90 if upright else 0)
     axes.tick_params(axis="x", length=0, pad=18)
     axes.set_yticks([])
     axes.spines[["left", "bottom"]].set_visible(False)
@@ -323,11 +334,11 @@ def convergence(designs: Designs) -> Figure:
     axes = figure.add_subplot()
     count = np.arange(1, len(designs) + 1)
     if len(designs.goals) > 1:
-        for row in designs.weights:
+        for row, dashes in zip(designs.weights, cycle(style.DASHES), strict=False):
             so_far = np.maximum.accumulate(np.nan_to_num(designs.score(row), nan=-np.inf))
             known = np.isfinite(so_far)
             weights = ", ".join(f"{weight:g}" for weight in row)
-            axes.step(count[known], so_far[known] / so_far[-1], where="post", label=f"({weights})")
+            axes.step(count[known], so_far[known] / so_far[-1], where="post", label=f"({weights})", linestyle=dashes)
         axes.set_ylabel("best score so far / best")
         goals = ", ".join(each.name for each in designs.goals)
         axes.legend(title=f"weights of ({goals})", loc="upper left", bbox_to_anchor=(1.01, 1.0), title_fontsize=9,
@@ -354,16 +365,22 @@ def convergence(designs: Designs) -> Figure:
 def front_figure(designs: Designs, front: Table) -> Figure:
     """Every feasible design, those of the front, and the knee; a panel each pair of goals."""
     pairs = list(combinations(range(len(designs.goals)), 2))
-    columns = min(len(pairs), 3)
+    columns = 1 if style.narrow() else min(len(pairs), 3)
     rows = -(-len(pairs) // columns)
     figure = style.new_figure(4.8 if len(pairs) == 1 else 0.8 + 2.9 * rows)
     for number, pair in enumerate(pairs):
         _front(figure.add_subplot(rows, columns, number + 1), designs, front, pair)
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=1 if len(labels) > 2 else 3)
+    labels = [style.folded(words, 9.0, style.width() - 0.6) for words in labels]
+    figure.legend(handles, labels, loc="outside lower left", ncols=1 if len(labels) > 2 else fitting(labels))
     number = int(designs.feasible.sum())
-    figure.suptitle(f"Pareto front: {len(front)} of {number} feasible designs", x=0.01, ha="left", fontsize=11)
+    _head(figure, f"Pareto front: {len(front)} of {number} feasible designs")
     return figure
+
+
+def _head(figure: Figure, words: str) -> None:
+    """A title above all panels."""
+    figure.suptitle(style.folded(words, 11.0, style.width() - 0.2), x=0.01, ha="left", fontsize=11)
 
 
 def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) -> None:
@@ -383,7 +400,9 @@ def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) ->
                   clip_on=False)  # fmt: skip
     across, upwards = (f"{label(designs, g.name)}, {'less' if g.smallest else 'more'} is better" for g in goals)
     axes.set_xlabel(across)
-    axes.set_ylabel(upwards)
+    axes.set_ylabel(style.folded(upwards, 10.0, 2.8) if style.narrow() else upwards)
+    if style.narrow():
+        axes.locator_params(axis="x", nbins=4)
     # Designs far worse than the front would press it into a corner.
     for values, every, limit in ((along, x, axes.set_xlim), (up, y, axes.set_ylim)):
         low, high = float(values.min()), float(values.max())

@@ -74,14 +74,14 @@ def design_figure(study: Study, own: Result, words: str) -> Figure:
     """The mechanism along its motion or at its listed poses, the places wanted; below, curves wanted and reached."""
     sweep = Sweep.of(own.drawn["motion"])
     shown = reached(own.tables["motion"]) if "motion" in own.tables else []
-    title = textwrap.fill(words, int((style.WIDTH - LEFT) * _LETTERS_AN_INCH))
+    title = textwrap.fill(words, int((style.width() - LEFT) * _LETTERS_AN_INCH))
     above = _TITLE + _TITLE_LINE * title.count("\n")
     if sweep.poses.motion:
         figure = paths_figure(sweep, above=above)
     else:
         worst = _worst(shown, sweep.valid)
         title += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
-        title = textwrap.fill(title.replace("\n", " "), int((style.WIDTH - LEFT) * _LETTERS_AN_INCH))
+        title = textwrap.fill(title.replace("\n", " "), int((style.width() - LEFT) * _LETTERS_AN_INCH))
         above = _TITLE + _TITLE_LINE * title.count("\n")
         figure = _posed(sweep, worst, _wanted(own, shown), above)
     axes = figure.axes[0]
@@ -99,13 +99,17 @@ def designs_figure(parts: Sequence[tuple[str, Study, Result]]) -> Figure:
     sweeps = [Sweep.of(own.drawn["motion"]) for _, _, own in parts]
     places = np.concatenate([sweep.extent for sweep in sweeps])
     count = len(parts)
-    window = fit(places, (style.WIDTH - LEFT - RIGHT - _BESIDE * (count - 1)) / count, _MAX_BESIDE, 0.25)
+    columns = 1 if style.narrow() else count
+    wide = (style.width() - LEFT - RIGHT - _BESIDE * (columns - 1)) / columns
+    window = fit(places, wide, _MAX_BESIDE if columns > 1 else 8.0 / count, 0.25)
     titles = [
-        "\n".join(textwrap.fill(line, int(window.width * _LETTERS_AN_INCH)) for line in words.splitlines())
+        style.folded(words.replace("\n", ", "), 8.5, window.width)
+        if style.narrow()
+        else "\n".join(textwrap.fill(line, int(window.width * _LETTERS_AN_INCH)) for line in words.splitlines())
         for words, _, _ in parts
     ]
     above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
-    figure, grid = windows(window, sweeps[0].study.units.label("length"), count, count, gap=_BESIDE, above=above,
+    figure, grid = windows(window, sweeps[0].study.units.label("length"), count, columns, gap=_BESIDE, above=above,
                            below=_BELOW + _LEGEND)  # fmt: skip
     for axes, title, sweep, (_, _, own) in zip(grid, titles, sweeps, parts, strict=True):
         axes.set_title(title, loc="left", fontsize=8.5)
@@ -184,22 +188,26 @@ def _between(sweep: Sweep) -> dict[str, Complexes]:
     return found
 
 
+def _missed(each: Reached) -> str:
+    """An output and its largest error."""
+    words = f"{each.output}: reached less wanted, at most {each.worst:.3g} {each.unit}".rstrip()
+    return style.folded(words, 9.5, style.width() - LEFT)
+
+
 def _panels(figure: Figure, study: Study, own: Result, shown: Sequence[Reached]) -> None:
     """Below the drawing: scalar outputs as wanted and reached, and the error of every output, over the poses."""
     over = abscissa(study, own.drawn["poses"])
+    titles = {each.output: _missed(each) for each in shown}
+    gap = _PANEL_GAP + style.line(9.5) * max(title.count("\n") for title in titles.values())
     rows = [(each, part) for each in shown for part in ("curve", "error")
             if part == "error" or (each.values is not None and each.output[-2:] not in (".x", ".y"))]  # fmt: skip
-    room = len(rows) * (_PANEL + _PANEL_GAP) + _BELOW
-    before = figure.get_figheight()
-    height = before + room
-    boxes = [axes.get_position() for axes in figure.axes]
-    figure.set_figheight(height)
-    for axes, box in zip(figure.axes, boxes, strict=True):
-        axes.set_position((box.x0, (box.y0 * before + room) / height, box.width, box.height * before / height))
-    left, wide = LEFT / style.WIDTH, 1 - (LEFT + RIGHT) / style.WIDTH
+    room = len(rows) * (_PANEL + gap) + _BELOW
+    style.grow(figure, below=room)
+    height = figure.get_figheight()
+    left, wide = LEFT / style.width(), 1 - (LEFT + RIGHT) / style.width()
     look: dict[str, Any] = {"marker": "o", "markersize": 4.0} if len(over.values) <= _MAX_DOTS else {}
     for k, (each, part) in enumerate(rows):
-        low = _BELOW + (len(rows) - 1 - k) * (_PANEL + _PANEL_GAP)
+        low = _BELOW + (len(rows) - 1 - k) * (_PANEL + gap)
         axes = figure.add_axes((left, low / height, wide, _PANEL / height))
         if part == "curve" and each.values is not None:
             axes.plot(over.values, each.values - each.error, color=style.VERMILION, linestyle=(0, (5, 2)),
@@ -211,9 +219,7 @@ def _panels(figure: Figure, study: Study, own: Result, shown: Sequence[Reached])
         else:
             axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
             axes.plot(over.values, each.error, color=style.BLUE, **look)
-            unit = f" {each.unit}".rstrip()
-            axes.set_title(f"{each.output}: reached less wanted, at most {each.worst:.3g}{unit}", loc="left",
-                           fontsize=9.5)  # fmt: skip
+            axes.set_title(titles[each.output], loc="left", fontsize=9.5)
             axes.set_ylabel(style.axis_label("error", each.unit))
             axes.ticklabel_format(axis="y", scilimits=(-3, 4))
         axes.locator_params(axis="y", nbins=5)

@@ -40,8 +40,12 @@ _MAP_TOP = 0.7
 _MAP_GAP = 0.5
 _MAX_MAP_HEIGHT = 5.2
 _FLAT = 0.8  # height over width below which two maps stand one below the other
+_EDGE_OF_MAP = 0.02  # of its size, beyond the region
 _NARROW = 10.0  # ratio of values up to which levels are at even steps
 _LETTER = 0.56  # mean width of a letter in font sizes
+_LEGEND_LETTERS = 14.75  # an inch
+_LEGEND_ROW = 0.19  # inches
+_ABSCISSA_TICK = 0.47  # inches from one to the next
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
 
@@ -77,14 +81,19 @@ def coordinate_label(study: Study, name: str) -> str:
     return style.axis_label(name, study.units.label(study.mechanism.quantity(name)))
 
 
-def title(figure: Figure, text: str, note: str = "", left: float = _LEFT) -> None:
-    """A title at the top left, and a smaller line below it."""
-    height = figure.get_figheight()
-    room = 72 * (style.WIDTH - left - 0.1) / _LETTER
-    for words, size, below in ((text, 11.0, 0.1), (note, 8.5, 0.32)):
-        if words:
-            size = min(size, room / len(words))
-            figure.text(left / style.WIDTH, 1 - below / height, words, va="top", fontsize=size)
+def title(figure: Figure, text: str, *notes: str, left: float = _LEFT) -> None:
+    """A title at the top left, and smaller lines below it; a narrow page is made higher where they are folded."""
+    room, folds = style.width() - left - 0.1, 0.0
+    lines: list[tuple[str, float, float]] = []
+    for k, (words, size) in enumerate(((text, 11.0), *((note, 8.5) for note in notes if note))):
+        below = 0.1 + 0.18 * k + 0.04 * bool(k) + folds
+        if style.narrow():
+            words = style.folded(words, size, room)
+            folds += style.line(size) * words.count("\n")
+        lines.append((words, min(size, 72 * room / _LETTER / max(map(len, words.split("\n")))), below))
+    style.grow(figure, above=folds)
+    for words, size, below in lines:
+        figure.text(left / style.width(), 1 - below / figure.get_figheight(), words, va="top", fontsize=size)
 
 
 def stack(
@@ -98,7 +107,7 @@ def stack(
         # Given places: to find them from the tick labels would take as long as the rest of the picture.
         axis.set_title("", y=1.02)
         axis.locator_params(axis="y", nbins=5)
-        axis.yaxis.set_label_coords((_EDGE - _LEFT) / (style.WIDTH - _LEFT - _RIGHT), 0.5, transform=axis.transAxes)
+        axis.yaxis.set_label_coords((_EDGE - _LEFT) / (style.width() - _LEFT - _RIGHT), 0.5, transform=axis.transAxes)
         axis.yaxis.label.set_verticalalignment("top")
     axes[-1].xaxis.set_label_coords(0.5, -0.35 / tall, transform=axes[-1].transAxes)
     axes[-1].set_xlabel(label)
@@ -112,10 +121,10 @@ def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
     ]
     letters = max(len(text) if "$" not in text else _POWER_LETTERS for text in numbers)
     lines = 1 + max(axis.get_ylabel().count("\n") for axis in axes)
-    left = max(figure.subplotpars.left * style.WIDTH, _EDGE + _LINE * lines + _TICK + _DIGIT * letters)
-    figure.subplots_adjust(left=left / style.WIDTH)
+    left = max(figure.subplotpars.left * style.width(), _EDGE + _LINE * lines + _TICK + _DIGIT * letters)
+    figure.subplots_adjust(left=left / style.width())
     for axis in axes:
-        axis.yaxis.set_label_coords((_EDGE - left) / (axis.get_position().width * style.WIDTH), 0.5,
+        axis.yaxis.set_label_coords((_EDGE - left) / (axis.get_position().width * style.width()), 0.5,
                                     transform=axis.transAxes)  # fmt: skip
         axis.yaxis.label.set_verticalalignment("top")
 
@@ -123,13 +132,24 @@ def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
 def tick_abscissa(axis: Axes, swept: Along) -> None:
     """Places for the ticks of a sweep: over much of a turn its parts, such as 30 or 45 degrees."""
     turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
-    axis.xaxis.set_major_locator(MaxNLocator(nbins=9, steps=TURNS if turning else [1, 2, 2.5, 5, 10]))
+    inches = axis.get_position().width * style.width()
+    axis.xaxis.set_major_locator(
+        MaxNLocator(nbins=min(9, int(inches / _ABSCISSA_TICK)), steps=TURNS if turning else [1, 2, 2.5, 5, 10])
+    )
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
-    """One legend at the bottom, in as many columns as the width holds."""
+    """One legend at the bottom, in as many columns as the width holds; a narrow page is made higher for its rows."""
     if labels:
+        style.grow(figure, below=legend_room(labels))
         figure.legend(handles, labels, loc="lower center", ncols=fitting(labels), borderaxespad=0.2)
+
+
+def legend_room(labels: Sequence[str]) -> float:
+    """Inches below the panels that a legend needs beyond those it needs on a wide page."""
+    rows = (-(-len(labels) // fitting(labels, wide)) for wide in (style.width(), style.LOOKS["screen"].width))
+    narrow, wide = rows
+    return _LEGEND_ROW * (narrow - wide)
 
 
 def number(value: float) -> str:
@@ -152,9 +172,10 @@ def round_down(value: float) -> float:
     return float(power * max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-12)))
 
 
-def fitting(labels: Sequence[str]) -> int:
-    """Columns of a legend that the width of a figure holds."""
-    return max(1, min(len(labels), 118 // (8 + max(len(label) for label in labels))))
+def fitting(labels: Sequence[str], width: float | None = None) -> int:
+    """Columns of a legend that a width holds (inches), that of the page if none is given."""
+    letters = int(_LEGEND_LETTERS * (style.width() if width is None else width))
+    return max(1, min(len(labels), letters // (8 + max(len(label) for label in labels))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,9 +227,10 @@ def map_sheet(
     panels = [(", ".join(filter(None, (held, name))), sectors, part)
               for held, sectors in maps for part, (name, _) in enumerate(parts)]  # fmt: skip
     spans = np.ptp(over.x[np.isfinite(over.x)]), np.ptp(over.y[np.isfinite(over.y)])
-    columns = 1 if over.equal and spans[1] < _FLAT * spans[0] and len(panels) < 3 else min(len(panels), 2)
+    flat = over.equal and spans[1] < _FLAT * spans[0] and len(panels) < 3
+    columns = 1 if style.narrow() or flat else min(len(panels), 2)
     lines = -(-len(panels) // columns)
-    wide = (style.WIDTH - 0.1) / columns - _MAP_LEFT - _BAR
+    wide = (style.width() - 0.1) / columns - _MAP_LEFT - _BAR
     tall = min(_MAX_MAP_HEIGHT / min(lines, 2), wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
     tall = max(tall, 1.2)
     # Of equal scales the height decides: the bar stands beside the map.
@@ -228,9 +250,10 @@ def map_sheet(
         axes.set_xlabel(coordinate_label(study, over.names[0]))
         axes.set_ylabel(coordinate_label(study, over.names[1]))
         if len(maps) > 1 and over.equal:
-            # One part of the plane in all of them.
-            axes.set_xlim(float(np.nanmin(over.x)), float(np.nanmax(over.x)))
-            axes.set_ylim(float(np.nanmin(over.y)), float(np.nanmax(over.y)))
+            # One part of the plane in all of them, the boundary's line with it.
+            edge = _EDGE_OF_MAP * max(spans)
+            axes.set_xlim(float(np.nanmin(over.x) - edge), float(np.nanmax(over.x) + edge))
+            axes.set_ylim(float(np.nanmin(over.y) - edge), float(np.nanmax(over.y) + edge))
     return figure
 
 

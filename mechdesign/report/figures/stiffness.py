@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -23,7 +25,17 @@ from mechdesign.report.figures.drawing import ARC, Pen, draw_mechanism, point_la
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, TITLE, fit, framed, windows
 from mechdesign.report.figures.joint_forces import joint_force_figures, load_in_words
 from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.panels import Plane, along, map_sheet, plane, quantity, round_down, tick_abscissa
+from mechdesign.report.figures.panels import (
+    Plane,
+    along,
+    fitting,
+    legend_room,
+    map_sheet,
+    plane,
+    quantity,
+    round_down,
+    tick_abscissa,
+)
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.results import Result
@@ -40,6 +52,7 @@ _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
 _ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
 # Points of type times letters that fill a line above the curves.
 _LONGEST_NOTE = 900.0
+_NOTE_SHARE = 0.65  # of the width of a narrow page
 _FLAT = 0.02  # part of its value by which a stiffness changes that is written, not drawn
 _TAIL = 0.04  # share of stiffnesses at either end of which ...
 _BEYOND = 10.0  # ... no more is drawn than this ratio beyond the others
@@ -50,6 +63,7 @@ _MAIN_AXES: tuple[tuple[str, str, float, str, Any], ...] = (
     ("k_min", "softest", np.pi / 2, style.VERMILION, "-"),
     ("k_max", "stiffest", 0.0, style.BLUE, (0, (2, 1))),
 )
+_LETTERS_AN_INCH = 14.5  # of a panel's title
 # Inches.
 _PANEL_TITLE = 0.17  # a line
 _HEADING = 0.32
@@ -144,10 +158,15 @@ def _directions(study: Study, result: Result) -> Figure | None:
               for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
     words = f"{force:g} {style.printed(study.units.label('force'))}"
     heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
-    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=4)
+    wide = (style.width() - RIGHT) / min(len(scenes), 2) - LEFT
+    # Broken between coordinates only.
+    named = [re.sub("(?<!,) ", "\N{NO-BREAK SPACE}", pose_in_words(study, poses, int(row), 4)) for row in rows]
+    where = [textwrap.fill(words, int(wide * _LETTERS_AN_INCH)) for words in named]
+    lines = 4 + max(words.count("\n") for words in where)
+    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=lines)
     units = study.units.label("stiffness"), study.units.label("angle")
-    shapes = zip(panels, scenes.items(), rows, scales, ellipses, strict=True)
-    for axes, (k, scene), row, scale, ellipse in shapes:
+    shapes = zip(panels, scenes.items(), rows, scales, ellipses, where, strict=True)
+    for axes, (k, scene), row, scale, ellipse, words in shapes:
         at = scene.points[section.at]
         draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_small(len(panels)))
         axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
@@ -160,11 +179,11 @@ def _directions(study: Study, result: Result) -> Figure | None:
             toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
             said.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
         axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
-        said = [pose_in_words(study, poses, int(row)), *said, f"drawn {scale / force:g} times as large"]
+        said = [words, *said, f"drawn {scale / force:g} times as large"]
         axes.set_title("\n".join(said), loc="left", fontsize=8.5)
     handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{what} direction, {name}")
                for name, what, _, color, dashes in _MAIN_AXES]  # fmt: skip
-    figure.legend(handles=handles, loc="lower left", ncols=2, bbox_to_anchor=(LEFT / style.WIDTH - 0.02, 0.0))
+    _legend(figure, handles)
     return figure
 
 
@@ -179,14 +198,22 @@ def _panels(
     study: Study, places: Complexes, count: int, heading: str, lines: int = 3
 ) -> tuple[Figure, list[Axes]]:  # fmt: skip
     """Drawings of one scale, two in a row, under a heading, with room for titles of some lines and a legend."""
-    columns = min(count, 2)
-    window = fit(places, (style.WIDTH - RIGHT - LEFT * columns) / columns, MAX_HEIGHT if columns == 1 else 3.2)
+    columns = 1 if style.narrow() else min(count, 2)
+    heading = style.folded(heading[0].upper() + heading[1:], 11.0, style.width() - LEFT - RIGHT)
+    window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, _height(count, columns))
     above = _PANEL_TITLE * lines + ABOVE
-    figure, axes = windows(window, study.units.label("length"), count, columns, above=above, top=_HEADING,
+    top = _HEADING + style.line(11.0) * heading.count("\n")
+    figure, axes = windows(window, study.units.label("length"), count, columns, above=above, top=top,
                            below=BELOW + _LEGEND)  # fmt: skip
-    figure.text(LEFT / style.WIDTH, 1 - 0.1 / figure.get_figheight(), heading[0].upper() + heading[1:], va="top",
-                fontsize=11)  # fmt: skip
+    figure.text(LEFT / style.width(), 1 - 0.1 / figure.get_figheight(), heading, va="top", fontsize=11)
     return figure, axes
+
+
+def _height(count: int, columns: int) -> float:
+    """Largest height of one of some panels (inches), all of them on a page of paper."""
+    if count == 1:
+        return MAX_HEIGHT
+    return 3.2 if columns > 1 else min(3.2, 8.0 / count)
 
 
 def _small(panels: int) -> float:
@@ -245,11 +272,14 @@ def _curves(study: Study, result: Result) -> Figure | None:
         else:
             axis.set_ylim(0, 1.1 * high)
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    axes[0].set_title("Stiffness along the motion", loc="left", fontsize=10, pad=20 if notes else 6)
+    words = f"everywhere the same: {', '.join(notes)}"
+    size = 9.0 if style.narrow() else min(9.0, _LONGEST_NOTE / len(words))
+    if style.narrow():
+        words = style.folded(words, size, _NOTE_SHARE * style.width())
+    above = 20 + 72 * style.line(size) * words.count("\n")
+    axes[0].set_title("Stiffness along the motion", loc="left", fontsize=10, pad=above if notes else 6)
     if notes:
-        words = f"everywhere the same: {', '.join(notes)}"
-        axes[0].annotate(words, (0, 1), (0, 6), "axes fraction", "offset points",
-                         fontsize=min(9.0, _LONGEST_NOTE / len(words)))  # fmt: skip
+        axes[0].annotate(words, (0, 1), (0, 6), "axes fraction", "offset points", fontsize=size)
     axes[-1].set_xlabel(over.label)
     tick_abscissa(axes[-1], over)
     figure.align_ylabels(axes)
@@ -333,8 +363,10 @@ def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: obje
 
 def posed(study: Study, poses: Poses, drawn: Drawn, places: Complexes, what: str, **look: Any) -> tuple[Figure, Axes]:
     """The mechanism in a pose, in a window that holds these places, too."""
-    figure, axes = framed(places, study.units.label("length"), height=MAX_HEIGHT, above=TITLE)
-    axes.set_title(f"{what} at {pose_in_words(study, poses, drawn.row)}", loc="left")
+    title = style.folded(f"{what} at {pose_in_words(study, poses, drawn.row)}", 11.0, style.width() - LEFT)
+    above = TITLE + style.line(11.0) * title.count("\n")
+    figure, axes = framed(places, study.units.label("length"), height=MAX_HEIGHT, above=above)
+    axes.set_title(title, loc="left")
     draw_mechanism(axes, study.mechanism, drawn.configuration, **look)
     return figure, axes
 
@@ -373,8 +405,16 @@ def deflections(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     handles = [Line2D([], [], color=color, linewidth=width, label=words)
                for color, width, words in ((_PALE, 6.0, "without load"), (style.INK, 1.8, "under the load"),
                                            (style.VERMILION, 1.8, "load"))]  # fmt: skip
-    figure.legend(handles=handles, loc="lower left", ncols=3, bbox_to_anchor=(LEFT / style.WIDTH - 0.02, 0.0))
+    _legend(figure, handles)
     return figure
+
+
+def _legend(figure: Figure, handles: Sequence[Line2D]) -> None:
+    """Entries in a row below the panels, in a column of a narrow page."""
+    labels = [str(handle.get_label()) for handle in handles]
+    style.grow(figure, below=legend_room(labels))
+    columns = fitting(labels) if style.narrow() else len(handles)
+    figure.legend(handles, labels, loc="lower left", ncols=columns, bbox_to_anchor=(LEFT / style.width() - 0.02, 0.0))
 
 
 def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple, cast
 
 import matplotlib
 import numpy as np
 from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import Op, PdfFile, PdfPages
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import BoundaryNorm
 from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from PIL import Image
 
@@ -25,11 +29,32 @@ from mechdesign.numerics.arrays import Floats
 DPI = 120
 # Of zlib, 0 to 9: a tenth fewer bytes than its usual 6 for 10 ms a picture; 9 takes 40 ms for two hundredths more.
 DEFLATE_LEVEL = 8
-WIDTH = 8.0  # inches; 960 pixels, which a README shows at about 800
+
+
+class Look(NamedTuple):
+    """A page and how finely it is drawn: laid out with type of 10 points on so many inches, and then reduced."""
+
+    width: float
+    dots: int  # an inch of the layout
+    reduction: float
+
+
+_COLUMN = 88 / 25.4  # inches, of a journal
+_REDUCTION = 0.8  # to type of 8 points
+_NARROW = 6.0  # inches
+LOOKS = {
+    # 960 pixels, which a README shows at about 800.
+    "screen": Look(8.0, DPI, 1.0),
+    # 300 dots an inch of paper.
+    "paper": Look(_COLUMN / _REDUCTION, 240, _REDUCTION),
+}
 
 # Okabe and Ito: told apart with every kind of colour vision, and in grey by their order of brightness.
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#F0E442")
 BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW = PALETTE
+# For pictures in grey, where brightness tells few apart.
+DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (2, 1)), (0, (6, 1, 1.5, 1)), (0, (1, 1.5)), (0, (8, 1, 1, 1, 1, 1)))
+HATCHES = ("", "////", "....", "xxxx")
 INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
@@ -37,6 +62,9 @@ COLORMAP = "cividis"
 _PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
 
 _RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
+
+# A name, an equals sign, a number and its unit.
+_EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?")
 
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -60,8 +88,6 @@ _SETTINGS: dict[Any, Any] = {
     "xtick.color": INK,
     "ytick.color": INK,
     "image.cmap": COLORMAP,
-    "figure.dpi": DPI,
-    "savefig.dpi": DPI,
     # Names of clips in SVG follow from what they are; PDF has fonts that journals take.
     "svg.hashsalt": "mechdesign",
     "pdf.fonttype": 42,
@@ -69,12 +95,24 @@ _SETTINGS: dict[Any, Any] = {
 
 
 @contextmanager
-def context() -> Iterator[None]:
-    """Matplotlib's defaults and this style for the time of drawing and saving; the user's settings come back after."""
+def context(look: str = "screen") -> Iterator[None]:
+    """Matplotlib's defaults and one of `LOOKS` for the time of drawing and saving; the user's settings come back."""
+    wide, dots, reduction = LOOKS[look]
+    page = {"figure.figsize": (wide, wide), "figure.dpi": dots, "savefig.dpi": dots / reduction}
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_SETTINGS)
+        matplotlib.rcParams.update(_SETTINGS | page)
         yield
+
+
+def width() -> float:
+    """Width of the page, inches of its layout."""
+    return float(matplotlib.rcParams["figure.figsize"][0])
+
+
+def narrow() -> bool:
+    """Whether panels have no room side by side."""
+    return width() < _NARROW
 
 
 class Picture(Figure):
@@ -87,7 +125,7 @@ class Picture(Figure):
 
 def new_figure(height: float, *, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """An empty figure as wide as the page (inches) with the Agg canvas; use inside `context`."""
-    figure = Picture(figsize=(WIDTH, height), dpi=DPI, layout=layout)
+    figure = Picture(figsize=(width(), height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -102,15 +140,56 @@ def page(
     """
     rows = -(-count // columns)
     height = top + rows * tall + (rows - 1) * down + bottom
-    wide = (WIDTH - left - right - (columns - 1) * across) / columns
+    wide = (width() - left - right - (columns - 1) * across) / columns
     figure = new_figure(height, layout=None)
     figure.subplots_adjust(
-        left / WIDTH, bottom / height, 1 - right / WIDTH, 1 - top / height, across / wide, down / tall
+        left / width(), bottom / height, 1 - right / width(), 1 - top / height, across / wide, down / tall
     )
     panels = figure.subplots(rows, columns, squeeze=False, **shared).ravel()
     for surplus in panels[count:]:
         surplus.remove()
     return figure, list(panels[:count])
+
+
+def line(size: float) -> float:
+    """Height of a line of type of a size (points), inches."""
+    return 1.2 * size / 72
+
+
+def grow(figure: Figure, above: float = 0.0, below: float = 0.0) -> None:
+    """More room (inches) above and below all of a page without a layout engine; panels keep their sizes."""
+    if not above and not below:
+        return
+    before, after = figure.get_figheight(), figure.get_figheight() + above + below
+    boxes = [(axes, axes.get_position()) for axes in figure.axes]
+    figure.set_figheight(after)
+    low, high = ((end * before + below) / after for end in (figure.subplotpars.bottom, figure.subplotpars.top))
+    figure.subplots_adjust(bottom=low, top=high)
+    for axes, box in boxes:
+        axes.set_position((box.x0, (box.y0 * before + below) / after, box.width, box.height * before / after))
+    for text in figure.texts:
+        text.set_y((text.get_position()[1] * before + below) / after)
+
+
+def folded(words: str, size: float, room: float) -> str:
+    """Words of a size (points) in lines of at most so many inches; ``x = 2 mm`` is broken only where it has to be."""
+    font, lines = FontProperties(size=size), []
+
+    def fits(line: str) -> bool:
+        return bool(text_to_path.get_text_width_height_descent(line, font, False)[0] <= 72 * room)
+
+    def joined(equation: re.Match[str]) -> str:
+        return equation[0].replace(" ", "\N{NO-BREAK SPACE}") if fits(equation[0]) else equation[0]
+
+    for line in words.split("\n"):
+        lines.append("")
+        for word in _EQUATION.sub(joined, line).split(" "):
+            longer = f"{lines[-1]} {word}".lstrip()
+            if lines[-1] and not fits(longer):
+                lines.append(word)
+            else:
+                lines[-1] = longer
+    return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def color_bar(figure: Figure, drawn: ScalarMappable, label: str = "", **options: Any) -> Colorbar:
@@ -172,15 +251,47 @@ def encoded(figure: Figure, kind: str = "png") -> bytes:
 
     A PNG has at most 256 colours, a third of the size.
     """
-    stream = io.BytesIO()
-    if kind != "png":
-        nothing = dict.fromkeys(("Date",) if kind == "svg" else ("CreationDate", "Creator", "Producer"))
-        figure.savefig(stream, format=kind, metadata=nothing)
+    stream, dots = io.BytesIO(), matplotlib.rcParams["savefig.dpi"]
+    if kind == "svg":
+        figure.savefig(stream, format=kind, metadata={"Date": None})
+        return _reduced(stream.getvalue(), _reduction())
+    if kind == "pdf":
+        pages, reduced = cast(Any, PdfPages(stream)), cast(Any, _Reduced)
+        pages._file = reduced(stream, dict.fromkeys(("CreationDate", "Creator", "Producer")))
+        with pages:
+            figure.savefig(pages, format=kind)
         return stream.getvalue()
     pixels = io.BytesIO()
-    figure.savefig(pixels, format="rgba", dpi=DPI)
+    figure.savefig(pixels, format="rgba", dpi=figure.dpi)
     picture = Image.frombytes("RGBA", figure.canvas.get_width_height(), pixels.getvalue()).convert("RGB")
     # Of Pillow's ways this one keeps rare colours: no colour moves by more than some 15 of 255, measured.
     few = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    few.save(stream, format="png", dpi=(DPI, DPI), compress_level=DEFLATE_LEVEL)
+    few.save(stream, format="png", dpi=(dots, dots), compress_level=DEFLATE_LEVEL)
     return stream.getvalue()
+
+
+def _reduction() -> float:
+    """Inches of paper over those of the layout."""
+    return float(matplotlib.rcParams["figure.dpi"] / matplotlib.rcParams["savefig.dpi"])
+
+
+class _Reduced(PdfFile):
+    """A PDF whose page is smaller than its layout; Matplotlib has no scale for what it draws in points."""
+
+    def newPage(self, width: float, height: float) -> None:
+        page, share = cast(Any, super()), _reduction()
+        page.newPage(share * width, share * height)
+        if share != 1.0:
+            page.output(share, 0, 0, share, 0, 0, Op.concat_matrix)
+        self.width, self.height = width, height
+
+
+def _reduced(drawing: bytes, share: float) -> bytes:
+    """An SVG shown at a share of its size: its coordinates stay."""
+    if share == 1.0:
+        return drawing
+
+    def smaller(size: re.Match[bytes]) -> bytes:
+        return b'%s="%.6gpt"' % (size[1], share * float(size[2]))
+
+    return re.sub(rb'(width|height)="([0-9.]+)pt"', smaller, drawing, count=2)

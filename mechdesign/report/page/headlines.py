@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.report.figures.style import printed
 from mechdesign.report.requirements import unit_of
@@ -17,6 +18,8 @@ from mechdesign.results import Column, Result, Table
 MOST = 8
 # Meanings of the columns that make a pose.
 _POSE = ("drive", "given", "held coordinate")
+# Part of the numbers beside it below which one differs from zero by rounding alone.
+_NOISE = 1e-12
 _DIGITS = 4
 _SMALL, _LARGE = 1e-3, 1e7
 _RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
@@ -47,6 +50,7 @@ class _Rule:
     by: tuple[str, ...] = ()  # columns of words of which each value counts by itself
     bounds: tuple[str, str] | None = None  # columns of the ends between which it lies
     interval: str = "from {low} to {high}"
+    several: str = ""  # what the rows are, where the smallest of several is told beside the largest
 
 
 _RULES: dict[str, tuple[_Rule, ...]] = {
@@ -57,10 +61,10 @@ _RULES: dict[str, tuple[_Rule, ...]] = {
         _Rule("motion", "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
     ),
     "workspace": (
-        _Rule("indices", "area", "area of the region", "largest"),
-        _Rule("indices", "SUI", "area over that of the rectangle around it", "largest"),
-        _Rule("indices", "circle_radius", "radius of the largest circle inside", "largest"),
-        _Rule("indices", "*_mean", "mean {name}", "largest", "mean over *"),
+        _Rule("indices", "area", "area of the region", "largest", several="regions"),
+        _Rule("indices", "SUI", "area over that of the rectangle around it", "largest", several="regions"),
+        _Rule("indices", "circle_radius", "radius of the largest circle inside", "largest", several="regions"),
+        _Rule("indices", "*_mean", "mean {name}", "largest", "mean over *", several="regions"),
     ),
     "optimize": (
         _Rule("optimum", "*", "best {name}", "first", "design variable"),
@@ -124,20 +128,23 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
     if rule.row == "size":
         values = np.abs(values)
     groups = list(zip(*(table[name].tolist() for name in rule.by), strict=True)) or [()] * len(table)
-    finite = np.flatnonzero(np.isfinite(values)).tolist()
+    valid = table["valid"].astype(bool) if "valid" in table else np.ones(len(table), dtype=bool)
+    finite = np.flatnonzero(np.isfinite(values) & valid)
+    if rule.row == "size" and values[finite].max(initial=0.0) <= _NOISE * _scale(table, column.unit, finite):
+        return
     if rule.row in ("first", "each"):
-        rows = finite[: 1 if rule.row == "first" else None]
+        rows = finite[: 1 if rule.row == "first" else None].tolist()
     else:
-        sign = -1.0 if rule.row == "smallest" else 1.0
+        sign = 1.0 if rule.row == "smallest" else -1.0
         best: dict[tuple[Any, ...], int] = {}
-        for row in sorted(finite, key=lambda row: -sign * values[row]):
+        for row in finite[np.argsort(sign * values[finite], kind="stable")].tolist():
             best.setdefault(groups[row], row)
         rows = [best[group] for group in dict.fromkeys(groups) if group in best]
     for row in rows:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
         unit = unit_of(table, column.name, row)
         name = column.name.removesuffix("_effort").removesuffix("_mean")
-        label = rule.label.format(**words, name=name, meaning=column.meaning)
+        label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
         low, high = (float(table[each][row]) for each in rule.bounds or (column.name, column.name))
         if rule.table == "extremes" and low == high:
             # Of a motion of one pose.
@@ -146,7 +153,17 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
             if rule.row not in ("first", "each") and (place := _pose(table, row)):
                 notes.append(f"at {place}")
+            if rule.several and len(finite) > 1:
+                least = shown(values[finite].min())
+                notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
             yield Headline(label, shown(values[row]), unit, "; ".join(notes))
+
+
+def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
+    """The largest size of a table's numbers of a unit."""
+    alike = (each.values for each in table.columns if each.numeric and each.unit == unit)
+    sizes = (np.abs(np.asarray(values, dtype=float)[rows]) for values in alike)
+    return max(float(size.max(initial=0.0, where=np.isfinite(size))) for size in sizes)
 
 
 def _pose(table: Table, row: int) -> str:

@@ -40,6 +40,7 @@ from mechdesign.report.figures.scene import Guide, Scene
 WIDTH = 520.0
 MAX_HEIGHT = 470.0
 _PAD = 30.0
+_STRIP = 14.0  # below, for the bar of the scale
 _POINTS = 72.0
 _STEEL = "#777777"
 _RAIL_SPACING = 6.0
@@ -67,7 +68,7 @@ class Sheet:
         """A sheet that shows all of these places."""
         window = fit(places, WIDTH / _POINTS, MAX_HEIGHT / _POINTS, _PAD / _POINTS)
         scale, height = window.scale * _POINTS, window.height * _POINTS
-        return cls(window.middle + complex(-WIDTH, height) / 2 / scale, scale, WIDTH, height)
+        return cls(window.middle + complex(-WIDTH, height) / 2 / scale, scale, WIDTH, height + _STRIP)
 
     def at(self, place: complex) -> complex:
         """A place of the study in the drawing, whose y axis points down."""
@@ -263,9 +264,11 @@ class Sketcher:
         at, offset = self.sheet.at(middle), body.local(middle)
         looks = {"data-offset": _pair(offset), "class": "moving-name moving-off"}
         group = add(self.root, "g", data_at=body.point, data_turn=name, transform=_shift(at), **looks)
-        add(group, "text", name, y=-BAR / 2 - 3 if len(ends) < 3 else 0.35 * _NAME, text_anchor="middle",
-            font_size=_NAME - 2, font_style="italic", fill=to_hex(darker(self.colors[name])), stroke="white",
-            stroke_width=2.6, paint_order="stroke")  # fmt: skip
+        # Above the middle of a bar, in a plate, below a slider, whose point has its name above.
+        y = {1: SLIDER_SIZE[1] / 2 + _NAME, 2: -BAR / 2 - 3}.get(len(ends), 0.35 * _NAME)
+        color = to_hex(darker(self.colors[name]))
+        add(group, "text", name, y=y, text_anchor="middle", font_size=_NAME - 2, font_style="italic", fill=color,
+            stroke="white", stroke_width=2.6, paint_order="stroke")  # fmt: skip
 
     def _covered(self, scene: Scene) -> Complexes:
         """Places along the links of a pose, and its joints."""
@@ -280,7 +283,7 @@ class Sketcher:
     def ruler(self, unit: str) -> None:
         """A bar of the drawing's scale at its lower left corner."""
         length = rounded(_RULER * self.sheet.width / self.sheet.scale)
-        begin, wide = complex(12, self.sheet.height - 10), length * self.sheet.scale
+        begin, wide = complex(12, self.sheet.height - 6), length * self.sheet.scale
         add(self.root, "path", d=f"M{_pair(begin - 4j)}v4h{_number(wide)}v-4", stroke=_STEEL)
         add(self.root, "text", f"{length:g} {unit}".rstrip(), x=begin.real + wide / 2, y=begin.imag - 4,
             text_anchor="middle", font_size=10, fill="#555555")  # fmt: skip

@@ -69,7 +69,7 @@ def _motion(study: Study, result: Result, name: str) -> Moving | None:
     some = np.unique(np.linspace(0, len(whole.rows) - 1, min(len(whole.rows), MAX_POSES)).round().astype(int))
     shown = Shown(study, whole.poses, whole.rows[some], whole.configuration.take(some))
     sweep = Sweep.of(shown)
-    if not len(sweep.valid):
+    if not len(sweep.valid) or len(sweep.rows) < 2:
         return None
     table, begin = result.tables["motion"], int(sweep.valid[0])
     few = sweep.valid[np.unique(np.linspace(0, len(sweep.valid) - 1, _FEW_POSES).round().astype(int))]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -12,12 +13,18 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from PIL import Image
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import counted, explain
 from mechdesign.mechanism.describe import describe
 from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.framing import fit
+from mechdesign.report.figures.mechanism import sketch_figure
+from mechdesign.report.figures.scene import pose
 from mechdesign.report.manifest import computed_from
+from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import shown
 from mechdesign.report.page.pages import GENERATOR
 from mechdesign.report.requirements import Verdict, command_of
@@ -57,26 +64,29 @@ class Entry:
     failed: str = ""  # why there is none
 
 
-def report(study: Study, answers: Sequence[Answered], *, below: bool) -> bytes:
+def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: bool = True) -> bytes:
     """The page of a study.
 
     Parameters
     ----------
     below : bool
         Whether the files of each question stand in a folder of its name below that of the page, or else beside it.
+    plots : bool
+        Whether pictures are wanted.
     """
     sections = [each.section for each in answers if each.section is not None]
     warnings = [(f"{problem.key}: {problem.message}", "") for problem in study.warnings]
     warnings += [(warning, each["command"]) for each in sections for warning in each["warnings"]]
     moving = any(each["moving"] is not None for each in sections)
+    drawing = next((each["mechanism"] for each in sections if each["mechanism"]), "")
     required = _requirements(study, answers)
     return _page(
         "report.html.j2",
         moving=moving,
         study=study,
         about=_about(study),
-        drawing=next((each["mechanism"] for each in sections if each["mechanism"]), ""),
-        plots=all(each["plots"] for each in sections),
+        drawing=drawing or (_sketch(study) if plots else ""),
+        plots=plots,
         answers=answers,
         questions=COMMANDS,
         required=required,
@@ -92,16 +102,17 @@ def index(entries: Sequence[Entry]) -> bytes:
     return _page("index.html.j2", moving=False, entries=entries, version=version("mechdesign"))
 
 
+def _sketch(study: Study) -> str:
+    """The sketch where no question has drawn the mechanism; nothing where it cannot be drawn."""
+    try:
+        with style.context():
+            return vector.inline(sketch_figure(study), "sketch", "the sketch, assembled")
+    except Exception:
+        return ""
+
+
 def thumbnail(study: Study) -> str:
     """A small drawing of a study's mechanism as a data URI; empty where it cannot be drawn."""
-    import io
-
-    from PIL import Image
-
-    from mechdesign.report.figures.drawing import draw_mechanism
-    from mechdesign.report.figures.framing import fit
-    from mechdesign.report.figures.scene import pose
-
     try:
         with style.context():
             mechanism = study.mechanism
@@ -130,6 +141,7 @@ def _page(template: str, *, moving: bool, **content: Any) -> bytes:
         loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
     styles = _text("page.css") + (_text("moving.css") if moving else "")
     script = _text("moving.js") if moving else ""

@@ -49,7 +49,8 @@ def section(
             part = moving(study, result)
         except Exception as error:
             warnings = (*warnings, f"the mechanism cannot be shown moving: {explain(error)[1]}")
-    shown = {name: html for name, html in pictures.items() if part is None or name != CURVES}
+    doubled = CURVES if part is not None and part.beside else ""
+    shown = {name: html for name, html in pictures.items() if name != doubled}
     return {
         "command": result.command,
         "headlines": [dataclasses.asdict(each) for each in headlines(result)],
@@ -61,7 +62,6 @@ def section(
         "counts": plain(dict(result.counts)),
         "warnings": [*result.warnings, *warnings],
         "interrupted": result.interrupted,
-        "plots": plots,
     }, warnings
 
 

@@ -9,6 +9,8 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.errors import counted
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.study.building.section import TwoLinks
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.text import fields
@@ -264,9 +266,19 @@ class KinematicsSection(MotionSection):
     """Length as which a radian counts where the Jacobian mixes lengths and angles. Left out: that of workspace; without
     one inverse_condition is nan there. Example: 0.1
     """
+    instant_centres: tuple[TwoLinks, ...] = ()
+    """Pairs of links whose instant centre of velocity is found in every pose; of a telescopic leg the body at its begin
+    counts. With more than one drive it depends on their rates. Example: [[rod, ground], [crank, rocker]]
+    """
+    mechanical_advantage: dict[fields.CoordinateName, fields.CoordinateName] = Field(default_factory=dict)
+    """Outputs, each with its input: the force (of an angle the moment) that the output gives over that put in, without
+    friction; other drives are held. Example: {T.y: grip}
+    """
 
     def checked(self, checker: Checker) -> Self:
-        """Check the outputs as well, and what loads act on."""
+        """Check the outputs as well, what loads act on, pairs of links, and outputs with their inputs."""
+        self._check_centres(checker)
+        self._check_advantage(checker)
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))
         rows = [part for name in self.jacobian or () for part in checker.mechanism.coordinates_of(name)]
@@ -280,3 +292,33 @@ class KinematicsSection(MotionSection):
             if load.link is not None:
                 checker.known(load.link, checker.mechanism.moving, "moving link", (*path, "link"))
         return super().checked(checker)
+
+    def _check_centres(self, checker: Checker) -> None:
+        links, seen = [*checker.mechanism.moving, GROUND], set[frozenset[str]]()
+        for index, pair in enumerate(self.instant_centres):
+            path: KeyPath = ("kinematics", "instant_centres", index)
+            for k, name in enumerate(pair):
+                checker.known(name, links, "link", (*path, k))
+            if pair[0] == pair[1]:
+                checker.report(path, f"{pair[0]!r} has an instant centre with another link, not with itself")
+            elif frozenset(pair) in seen:
+                checker.report(path, f"{' and '.join(pair)} are listed twice")
+            seen.add(frozenset(pair))
+        drives = len(checker.mechanism.drives)
+        if self.instant_centres and drives > 1 and not any(self.rates.values()) and self.speed is None:
+            message = f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed'"
+            checker.report(("kinematics", "instant_centres"), message, at_key=True)
+
+    def _check_advantage(self, checker: Checker) -> None:
+        drives = checker.mechanism.drives
+        for output, given in self.mechanical_advantage.items():
+            path: KeyPath = ("kinematics", "mechanical_advantage", output)
+            quantities = checker.coordinate(output, path, at_key=True), checker.coordinate(given, path)
+            if output == given or (output in drives and given in drives):
+                checker.report(path, f"{output!r} is not moved by {given!r}: give an output, and its input")
+            elif "none" in quantities:
+                name = output if quantities[0] == "none" else given
+                checker.report(path, f"{name!r} is neither a length nor an angle: no force or moment acts along it")
+            elif given not in drives and len(drives) > 1:
+                message = f"with {len(drives)} drives the input is one of them, {', '.join(drives)}; others are held"
+                checker.report(path, message)

@@ -61,7 +61,9 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         if not np.isfinite(table["sobol_total"].reshape(poses.count, -1)[sobol]).all():
             notes.append("correlated sources have none")
     margin = 0.3 + 0.072 * max(len(names[k]) for k in ranked)
-    columns = max(1, min(len(pairs), 3 if len(names) < 9 else 2, int((style.WIDTH - margin) / (_ACROSS + _MIN_WIDTH))))
+    columns = max(
+        1, min(len(pairs), 3 if len(names) < 9 else 2, int((style.width() - margin) / (_ACROSS + _MIN_WIDTH)))
+    )
     tall = (0.15 + len(ranked)) * max(_SOURCE_HEIGHT, 0.1 * len(bars[0]) + 0.06)
     figure, grid = style.page(
         len(pairs), columns, tall, left=margin, right=0.2, top=0.75 + 0.2 * bool(notes), bottom=0.95, across=_ACROSS,
@@ -72,8 +74,10 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         for place, values in enumerate(shown[:, ranked]):
             height = 0.8 / len(shown)
             label = pose_in_words(study, poses, place) if len(shown) > 1 else "share, to the first order"
-            drawn = axis.barh(np.arange(len(ranked)) + (place + 0.5) * height - 0.4, values, height,
-                              color=style.PALETTE[place % len(style.PALETTE)])  # fmt: skip
+            look: dict[str, Any] = {"color": style.PALETTE[place % len(style.PALETTE)]}
+            if hatch := style.HATCHES[place % len(style.HATCHES)]:
+                look |= {"hatch": hatch, "edgecolor": "white", "linewidth": 0}
+            drawn = axis.barh(np.arange(len(ranked)) + (place + 0.5) * height - 0.4, values, height, **look)
             entries[label] = drawn
             if len(shown) == 1:
                 axis.bar_label(drawn, fmt="%.1f", padding=2, fontsize=8)
@@ -82,8 +86,7 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         _name(axis, [names[k] for k in ranked])
         axis.set_title(heading(*pairs[k]), loc="left", fontsize=9.5)
         axis.set_xlabel("share of the variance [%]" if k + columns >= len(pairs) else "")
-    title(figure, "Where the variance of the error comes from", where, left=margin)
-    figure.text(margin / style.WIDTH, 1 - 0.5 / figure.get_figheight(), "; ".join(notes), va="top", fontsize=8.5)
+    title(figure, "Where the variance of the error comes from", where, "; ".join(notes), left=margin)
     legend_below(figure, list(entries.values()), list(entries))
     return figure
 
@@ -140,7 +143,7 @@ def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:
     margin = 0.35 + 0.075 * max(10, *(len(name) for name in names))
     figure, (one, two) = style.page(
         2, 2, _TOLERANCE_HEIGHT * len(table), left=margin, right=0.2, top=0.8, bottom=_FAILURE_ROOM + 1.05,
-        across=0.45 * (style.WIDTH - margin - 0.2) / 2.45, sharey=True,
+        across=0.45 * (style.width() - margin - 0.2) / 2.45, sharey=True,
     )  # fmt: skip
     alike, given, allocated = len(set(units)) == 1, table["given"], table["allocated"]
     # Tolerances of several units do not share an axis: their ratios do.
@@ -158,10 +161,10 @@ def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:
     for axis in (one, two):
         axis.grid(visible=False, axis="y")
         axis.margins(x=0.16, y=0.02)
-        axis.locator_params(axis="x", nbins=5)
+        axis.locator_params(axis="x", nbins=3 if style.narrow() else 5)
     height = figure.get_figheight()
     below = figure.add_axes(
-        (margin / style.WIDTH, 1.0 / height, 1 - (margin + 0.2) / style.WIDTH, _FAILURE_HEIGHT / height)
+        (margin / style.width(), 1.0 / height, 1 - (margin + 0.2) / style.width(), _FAILURE_HEIGHT / height)
     )
     _failures(below, tables, 1.0 - section.allocate.reliability)
     title(figure, f"Cheapest tolerances for a reliability of {section.allocate.reliability:.10g}", note, left=margin)
@@ -194,10 +197,13 @@ def _failures(axis: Axes, tables: Mapping[str, Table], allowed: float) -> None:
     axis.set_yticks([0, 1], ["as given", "allocated"])
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0)
-    axis.set_xlabel("probability that an error leaves its limits, at the pose that fails most")
+    what = "probability that an error leaves its limits, at the pose that fails most"
+    axis.set_xlabel(style.folded(what, 10.0, axis.get_position().width * style.width()))
 
 
 def _pair(axis: Axes, given: Floats, allocated: Floats) -> None:
     places = np.arange(len(given))
-    axis.barh(places - 0.2, given, 0.36, color=style.FAINT, label="as given")
+    axis.barh(
+        places - 0.2, given, 0.36, color=style.FAINT, hatch="////", edgecolor="white", linewidth=0, label="as given"
+    )
     axis.barh(places + 0.2, allocated, 0.36, color=style.BLUE, label="allocated")

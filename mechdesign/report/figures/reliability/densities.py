@@ -32,6 +32,7 @@ _FAR_FROM_ERRORS = 5.0
 # Inches.
 _LEFT = 0.88
 _LEGEND = 2.75
+_LEGEND_ROW = 0.19
 _TOP = 0.75
 _BELOW = 0.6
 _MIN_HEIGHT = 2.6
@@ -60,9 +61,9 @@ def _contours(given: Sampled, labels: list[str]) -> Figure:
     alike = bool(units[0] == units[1])
     failed = ~samples.kept
     across, up, tall = _view([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near], alike)
-    figure, (axes,) = style.page(1, 1, tall, left=_LEFT, right=_LEGEND, top=_TOP, bottom=_BELOW)
+    figure, (axes,) = style.page(1, 1, tall, left=_LEFT, right=_beside(), top=_TOP, bottom=_BELOW)
     axes.set(xlim=across, ylim=up, xlabel=labels[0], ylabel=labels[1])
-    axes.locator_params(nbins=7)
+    axes.locator_params(nbins=4 if style.narrow() else 7)
     if alike:
         axes.set_aspect("equal")
     entries: dict[str, Any] = limits.draw(axes)
@@ -86,15 +87,26 @@ def _contours(given: Sampled, labels: list[str]) -> Figure:
     for words, (places, mark) in marks.items():
         if places.size:
             (entries[words],) = axes.plot(*places[:, :MAX_MARKS], linestyle="none", **mark)
-    right_of = (1 - (_LEGEND - 0.1) / style.WIDTH, axes.get_position().y1)
-    figure.legend(entries.values(), entries, loc="upper left", bbox_to_anchor=right_of, borderaxespad=0.0)
     count = f"{samples.errors.shape[1]:,} samples"
     if limits.words:
         count += f", {(number := int(failed.sum())):,} of them fail" + f" ({MAX_MARKS} marked)" * (number > MAX_MARKS)
     note = f"{method}: {count}" + (f", smoothed over {region.width:.2f} of their deviation" if region else "")
     note += "; " * bool(limits.far) + limits.far
     title(figure, f"Two errors of made mechanisms {given.where}", note, left=_LEFT)
+    place: dict[str, Any]
+    if style.narrow():
+        style.grow(figure, below=_LEGEND_ROW * len(entries))
+        place = {"loc": "lower left", "bbox_to_anchor": (_LEFT / style.width(), 0.01)}
+    else:
+        right_of = 1 - (_LEGEND - 0.1) / style.width(), axes.get_position().y1
+        place = {"loc": "upper left", "bbox_to_anchor": right_of}
+    figure.legend(entries.values(), entries, borderaxespad=0.0, **place)
     return figure
+
+
+def _beside() -> float:
+    """Inches at the right of the panel: on a wide page of the legend."""
+    return 0.15 if style.narrow() else _LEGEND
 
 
 def _ellipse(mean: Floats, covariance: Floats, share: float) -> Floats:
@@ -208,7 +220,7 @@ def _view(parts: Sequence[Floats], alike: bool) -> tuple[Ends, Ends, float]:
     places = np.concatenate([np.zeros((2, 1)), *parts], axis=1)
     low, high = places.min(axis=1), places.max(axis=1)
     middle, span = (low + high) / 2, 1.08 * (high - low)
-    wide = style.WIDTH - _LEFT - _LEGEND
+    wide = style.width() - _LEFT - _beside()
     tall = float(np.clip(wide * span[1] / span[0], _MIN_HEIGHT, _MAX_HEIGHT)) if alike else 0.9 * wide
     if alike:
         span = max(span[0] / wide, span[1] / tall) * np.array([wide, tall])
@@ -219,8 +231,11 @@ def _view(parts: Sequence[Floats], alike: bool) -> tuple[Ends, Ends, float]:
 def _surfaces(given: Sampled, labels: list[str]) -> Figure:
     """Both densities over the cells of the density's table [S2, Fig. 5]."""
     samples, table = given.samples, given.tables["density"].take(given.rows("density"))
-    figure = style.new_figure(4.2, layout=None)
-    figure.subplots_adjust(left=0.02, right=0.92, bottom=0.08, top=0.8, wspace=0.15)
+    shape = (2, 1) if style.narrow() else (1, 2)
+    figure = style.new_figure(1.0 + 3.2 * shape[0], layout=None)
+    figure.subplots_adjust(
+        left=0.02, right=0.82 if style.narrow() else 0.92, bottom=0.08, top=0.8, wspace=0.15, hspace=0.3
+    )
     x, y = (
         (samples.mean[k] + np.sqrt(samples.covariance[k, k]) * table[axis]).reshape(CELLS, CELLS)
         for k, axis in zip(samples.pair or (), "xy", strict=True)
@@ -230,7 +245,7 @@ def _surfaces(given: Sampled, labels: list[str]) -> Figure:
         f"simulation ({look(given.method).words})": table["simulated"].reshape(CELLS, CELLS),
     }
     top = max(density.max() for density in densities.values())
-    panels = figure.subplots(1, 2, subplot_kw={"projection": "3d"})
+    panels = figure.subplots(*shape, subplot_kw={"projection": "3d"})
     for axes, (name, density) in zip(panels, densities.items(), strict=True):
         axes.plot_surface(
             x, y, density, rstride=1, cstride=1, cmap=style.COLORMAP, edgecolor=style.INK, linewidth=0.25, vmax=top

@@ -43,6 +43,7 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS, Method
 
 MAX_OUTPUTS = 7
+_MARKS = ("o", "s", "^", "D", "v", "P", "X")  # of outputs, in grey
 MAX_MAPS = 4
 # A limit so many times as far out as all errors is named and not drawn.
 _FAR_FROM_ERRORS = 3.0
@@ -122,11 +123,13 @@ def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
     tick_abscissa(axes[-1], swept)
     single = all(len(outputs) == 1 for _, _, outputs in panels)
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
-        for output, color in zip(outputs, style.PALETTE, strict=False):
+        for output, color, mark in zip(outputs, style.PALETTE, _MARKS, strict=False):
             for method in known:
                 rows = moments.where(output=output, order=order, unit=unit, method=method)
                 shown = _line(look(method)) | ({} if single else {"color": color})
-                axis.plot(swept.values, moments[column][rows], markersize=3.2, **shown)
+                if not single and not look(method).sampled:
+                    shown |= {"marker": mark, "markersize": 6, "markevery": max(len(swept.values) // 8, 1)}
+                axis.plot(swept.values, moments[column][rows], **({"markersize": 3.2} | shown))
         _name_outputs(axis, outputs, [style.INK] if single else style.PALETTE)
         axis.set_ylabel(style.axis_label(order, unit))
         if column == "sigma":
@@ -155,7 +158,7 @@ def _difference(moments: Table, swept: Along, reference: str, computed: Sequence
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
         axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
         named = []
-        for output, color in zip(outputs, style.PALETTE, strict=False):
+        for output, color, mark in zip(outputs, style.PALETTE, _MARKS if len(outputs) > 1 else ".", strict=False):
             true = moments["sigma"][moments.where(output=output, order=order, unit=unit, method=reference)]
             apart = []
             for method in computed:
@@ -164,8 +167,8 @@ def _difference(moments: Table, swept: Along, reference: str, computed: Sequence
                     percent = 100.0 * (moments["sigma"][rows] / true - 1.0)
                 mean = np.nanmean(np.abs(percent)) if np.isfinite(percent).any() else np.nan
                 apart.append(f"{mean:.2f} %")
-                axis.plot(swept.values, percent, look(method).dashes, marker=".", markersize=4, linewidth=1.2,
-                          color=color)  # fmt: skip
+                axis.plot(swept.values, percent, look(method).dashes, marker=mark, markersize=4, linewidth=1.2,
+                          color=color, markevery=max(len(percent) // 24, 1) if len(outputs) > 1 else None)  # fmt: skip
             named.append(f"{output} ({', '.join(apart)})")
         axis.set_ylabel(f"{order} [%]")
         _name_outputs(axis, named, style.PALETTE)
@@ -180,7 +183,8 @@ def _name_outputs(axis: Axes, outputs: Sequence[str], colors: Sequence[str]) -> 
     if len(outputs) == 1:
         axis.set_title(outputs[0], loc="left", fontsize=9.5)
         return
-    handles = [Line2D([], [], color=color) for color, _ in zip(colors, outputs, strict=False)]
+    handles = [Line2D([], [], color=color, marker=mark, markersize=6)
+               for color, mark, _ in zip(colors, _MARKS, outputs, strict=False)]  # fmt: skip
     axis.legend(handles, outputs, loc="lower left", bbox_to_anchor=(-0.01, 0.98), ncols=len(outputs), borderaxespad=0.0,
                 handlelength=1.2, columnspacing=1.2)  # fmt: skip
 
@@ -221,7 +225,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
     known, unseen = methods(table), _unseen(table)
     count = poses.count if swept is not None else min(poses.count, MAX_LISTED)
     values = np.arange(count, dtype=np.float64) if swept is None else swept.values
-    written = swept is None and count * len(known) <= MAX_WRITTEN
+    written = swept is None and count * len(known) <= (MAX_WRITTEN // 2 if style.narrow() else MAX_WRITTEN)
     # Methods stand beside each other at a listed pose; of a sweep those that are simulated, a little.
     beside = known if swept is None else [method for method in known if look(method).sampled]
     step = min(0.3 if written else 0.14, 0.8 / len(known)) if swept is None else 0.2 * np.ptp(values) / count

@@ -46,10 +46,11 @@ class _Histogram(NamedTuple):
 def histogram_figure(given: Sampled) -> Figure:
     """Each error, the distance from no error where a circle limits it, the limits, and below each its tail."""
     shown = _histograms(given)
-    columns = min(len(shown), 2 if len(shown) == 4 else 3)
+    columns = 1 if style.narrow() else min(len(shown), 2 if len(shown) == 4 else 3)
     blocks = [shown[k : k + columns] for k in range(0, len(shown), columns)]
     figure, grid = style.page(
-        2 * columns * len(blocks), columns, 1.75, left=0.8, right=0.15, top=0.95, bottom=0.95, across=0.75, down=0.5,
+        2 * columns * len(blocks), columns, 1.75, left=0.8, right=0.15, top=0.95, bottom=0.95, across=0.75,
+        down=0.5 if len(blocks) == 1 else 0.68,
     )  # fmt: skip
     entries: dict[str, Any] = {}
     for place, block in enumerate(blocks):
@@ -148,7 +149,7 @@ def convergence_figure(given: Sampled) -> Figure:
     table, moments = given.tables["convergence"], given.tables["moments"]
     shown = channels(table)[:MAX_PANELS]
     figure, axes = stack(len(shown), "Mean of made mechanisms as samples are added", "samples",
-                         note=f"at {given.where}; {look(given.method).words}")  # fmt: skip
+                         note=f"{given.where}; {look(given.method).words}")  # fmt: skip
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
         rows = table.where(output=output, order=order, unit=unit)
         samples, mean = table["samples"][rows], table["mean"][rows]
@@ -173,7 +174,7 @@ def trend_figure(given: Sampled) -> Figure:
     """Failure probability against the number of samples with its interval, beside what other methods say."""
     table, reliability = given.tables["estimate"], given.tables["reliability"]
     known = [method for method in methods(reliability) if method != "monte_carlo"]
-    figure, (axis,) = stack(1, "Failure probability as samples are added", "samples", note=f"at {given.where}",
+    figure, (axis,) = stack(1, "Failure probability as samples are added", "samples", note=given.where,
                             tall=2.8, bottom=0.65 + 0.1 * (len(known) + 3))  # fmt: skip
     samples, value, low, high = (table[name] for name in ("samples", "failure", "failure_low", "failure_high"))
     late = len(samples) // 20

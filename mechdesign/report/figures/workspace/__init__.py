@@ -21,9 +21,11 @@ from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.workspace.tables import curves
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.report.before import Before, known
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.overlay import draw_line, draw_pose, name_both
 from mechdesign.report.figures.panels import (
     MAX_PANELS,
     Along,
@@ -92,7 +94,7 @@ def figures(study: Study, result: Result) -> Mapping[str, Figure]:
         drawn.add("workspace", workspace_figure, study, result, found[0])
         drawn.add("ellipses", ellipses_figure, study, found[0], result.drawn["ellipses"])
     else:
-        drawn.add("workspace", _side_by_side, study, found)
+        drawn.add("workspace", _side_by_side, study, found, known(result.drawn))
     drawn.add("inscribed", inscribed_figure, study, result, found)
     if any(len(region.boundary) for region in found):
         drawn.add("drives", drives_figure, study, found)
@@ -105,17 +107,52 @@ def workspace_figure(study: Study, result: Result, region: Region, title: str = 
     assert section is not None
     configuration: Configuration = result.drawn["along"]
     reached = [configuration.point(point) for point in mechanism.points]
-    extent = np.concatenate([region.places(), *(place[np.isfinite(place)] for place in reached), _sketch(study)])
+    before = known(result.drawn)
+    extent = np.concatenate(
+        [region.places(), *(place[np.isfinite(place)] for place in reached), _sketch(study), _places_before(before)]
+    )
     where = f" at {region.title}" if region.title else ""
     title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
     page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
     (axes,) = page.axes
     fill(axes, region.local)
     page.ends([region])
+    if before is not None:
+        _draw_before(axes, before)
     for index in range(len(configuration.reason)):
         draw_mechanism(axes, mechanism, configuration, index, faint=True)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
+    if before is not None:
+        name_both(page.figure, before)
     return page.figure
+
+
+def _lines_before(before: Before, held: Mapping[str, float] | None = None) -> list[Complexes]:
+    """Curves that end the region of the study before, for values of held coordinates if they are given; its path."""
+    tables, found = before.result.tables, []
+    if "path" in tables:
+        path = tables["path"]
+        found = [(path["x"] + 1j * path["y"])[rows] for rows in _pieces(path)]
+    elif "boundary" in tables:
+        edge = tables["boundary"]
+        edge = edge.take(edge.where(**{name: value for name, value in (held or {}).items() if name in edge}))
+        found = [(edge["x"] + 1j * edge["y"])[rows] for rows in curves(edge)]
+    return found
+
+
+def _places_before(before: Before | None) -> Complexes:
+    places = [*_lines_before(before), _sketch(before.study)] if before is not None else []
+    return np.concatenate([np.empty(0, dtype=complex), *places])
+
+
+def _draw_before(axes: Axes, before: Before, held: Mapping[str, float] | None = None) -> None:
+    """The boundary or the path of the study before; where nothing is held, its mechanism in its sketch pose."""
+    for line in _lines_before(before, held):
+        draw_line(axes, line, 1.8)
+    if held:
+        return
+    mechanism = before.study.mechanism
+    draw_pose(axes, mechanism, mechanism.sketch_configuration)
 
 
 def _sketch(study: Study) -> Complexes:
@@ -124,25 +161,30 @@ def _sketch(study: Study) -> Complexes:
     return np.concatenate([np.ravel(mechanism.sketch_configuration.point(point)) for point in mechanism.points])
 
 
-def _side_by_side(study: Study, found: Sequence[Region]) -> Figure:
+def _side_by_side(study: Study, found: Sequence[Region], before: Before | None) -> Figure:
     """The region and its boundary for several values of held coordinates, each with the mechanism in a pose there."""
     title = "the mechanism where it is best conditioned"
-    return regions_figure([(region.title, study, region) for region in some(found)], title)
+    return regions_figure([(region.title, study, region) for region in some(found)], title, before)
 
 
-def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str) -> Figure:
+def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, before: Before | None = None) -> Figure:
     """Regions of some studies side by side on one scale, each under its words with the mechanism in a pose there."""
     study, shown = parts[0][1], [region for _, _, region in parts]
     assert study.workspace is not None
     poses = [_pose_inside(own, region) for _, own, region in parts]
     reached = [np.ravel(each.point(point)) for each in poses for point in study.mechanism.points]
-    places = np.concatenate([*(region.places() for region in shown), *(z[np.isfinite(z)] for z in reached)])
+    places = np.concatenate([*(region.places() for region in shown), *(z[np.isfinite(z)] for z in reached),
+                             _places_before(before)])  # fmt: skip
     title = f"workspace of point {study.workspace.point}, {title}"
     page = sheet(study, places, [words for words, _, _ in parts], title, bar=False, pad=ROOM)
     for axes, (_, own, region), configuration in zip(page.axes, parts, poses, strict=True):
         fill(axes, region.local)
         draw_mechanism(axes, own.mechanism, configuration, faint=True, size=_SMALL_SYMBOLS)
+        if before is not None:
+            _draw_before(axes, before, region.held)
     page.ends(shown)
+    if before is not None:
+        name_both(page.figure, before)
     return page.figure
 
 
@@ -232,7 +274,7 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
 def path_figures(study: Study, result: Result) -> dict[str, Figure]:
     """``path``: the mechanism with the point's path, coloured by its speed ratio; ``speed_ratio`` over the drive."""
     path = result.tables["path"]
-    return {"path": _path(study, path), "speed_ratio": _speed(study, path)}
+    return {"path": _path(study, path, known(result.drawn)), "speed_ratio": _speed(study, path)}
 
 
 def _pieces(path: Table) -> list[Ints]:
@@ -250,12 +292,12 @@ def _label(path: Table) -> str:
     return style.axis_label("speed ratio", path.column("speed_ratio").unit)
 
 
-def _path(study: Study, path: Table) -> Figure:
+def _path(study: Study, path: Table, before: Before | None) -> Figure:
     mechanism, section = study.mechanism, study.workspace
     assert section is not None
     z = path["x"] + 1j * path["y"]
     title = f"path of point {section.point}, by its speed over the drive's"
-    page = sheet(study, np.concatenate([z, _sketch(study)]), [""], title, bar=True, pad=ROOM)
+    page = sheet(study, np.concatenate([z, _sketch(study), _places_before(before)]), [""], title, bar=True, pad=ROOM)
     (axes,) = page.axes
     ratio = path["speed_ratio"]
     top, tail = _ends(ratio)
@@ -263,7 +305,11 @@ def _path(study: Study, path: Table) -> Figure:
     for rows in _pieces(path):
         axes.plot(z[rows].real, z[rows].imag, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=3.25)
         coloured(axes, z[rows], ratio[rows], norm, 4)
+    if before is not None:
+        _draw_before(axes, before)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration)
+    if before is not None:
+        name_both(page.figure, before)
     page.color_bar(ScalarMappable(norm, style.COLORMAP), _label(path), extend="max" if tail else "neither")
     return page.figure
 
@@ -309,7 +355,7 @@ def range_figures(study: Study, result: Result) -> dict[str, Figure]:
     title = f"point {section.point} {'at every' if over.all else 'at some'} {ends}"
     tables = [table for _, table in shown]
     return {
-        "workspace": _region(study, tables, titles, title),
+        "workspace": _region(study, shown, titles, title, known(result.drawn)),
         "range": _deciding(study, tables, titles, name, style.axis_label(name, unit)),
     }
 
@@ -318,16 +364,30 @@ def _places(tables: Sequence[Table]) -> Complexes:
     return np.concatenate([table["x"] + 1j * table["y"] for table in tables])
 
 
-def _region(study: Study, tables: Sequence[Table], titles: Sequence[str], title: str) -> Figure:
-    mechanism = study.mechanism
-    page = sheet(study, np.concatenate([_places(tables), _sketch(study)]), titles, title, bar=False, pad=ROOM)
+def _region(
+    study: Study, found: Sequence[tuple[Mapping[str, float], Table]], titles: Sequence[str], title: str,
+    before: Before | None,
+) -> Figure:  # fmt: skip
+    mechanism, tables = study.mechanism, [table for _, table in found]
+    page = sheet(
+        study,
+        np.concatenate([_places(tables), _sketch(study), _places_before(before)]),
+        titles,
+        title,
+        bar=False,
+        pad=ROOM,
+    )
     seen: set[str] = set()
-    for axes, table in zip(page.axes, tables, strict=True):
+    for axes, (held, table) in zip(page.axes, found, strict=True):
+        if before is not None:
+            _draw_before(axes, before, held)
         axes.add_patch(PathPatch(_area(table), facecolor=PALE, linewidth=0, zorder=0.5))
         seen |= outline_of(axes, table)
         alone = len(tables) == 1
         draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=alone, drives=False, faint=not alone)
     page.legend(seen)
+    if before is not None:
+        name_both(page.figure, before)
     return page.figure
 
 

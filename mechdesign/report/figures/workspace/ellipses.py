@@ -69,9 +69,13 @@ def ellipses_figure(study: Study, region: Region, found: Ellipses | None) -> Fig
             thin |= small
     if thin:
         handles.append(Line2D([], [], color=style.FAINT, linewidth=0.7, label="thin: longer than drawn"))
+    if style.narrow():
+        for handle in handles:
+            handle.set_label(style.folded(str(handle.get_label()), 9.0, style.width() - LEFT - 0.5))
+        style.grow(page.figure, below=style.line(9.0) * sum(str(each.get_label()).count("\n") for each in handles))
     height = page.figure.get_figheight()
     page.figure.legend(handles=handles, loc="lower left", borderaxespad=0.3,
-                       bbox_to_anchor=(LEFT / style.WIDTH - 0.02, _ABOVE_ENDS / height))  # fmt: skip
+                       bbox_to_anchor=(LEFT / style.width() - 0.02, _ABOVE_ENDS / height))  # fmt: skip
     return page.figure
 
 

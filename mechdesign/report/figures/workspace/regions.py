@@ -19,6 +19,7 @@ from mechdesign.analyses.workspace.tables import curves
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, windows
+from mechdesign.report.figures.panels import fitting, legend_room
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
@@ -50,6 +51,7 @@ _PANEL_TITLE = 0.34
 _TITLE_LINE = 0.17  # more of it
 _TITLE = 0.4
 _ROW_GAP = 0.28
+_BESIDE = 0.15  # of a panel without labels of its own
 _MAX_HEIGHT = 6.5
 
 
@@ -212,8 +214,11 @@ class Sheet:
         entries = [Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=words)
                    for name, (color, dashes, width, words) in LOOKS.items() if name in seen]  # fmt: skip
         if entries:
-            self.figure.legend(handles=entries, loc="lower left", ncols=4, columnspacing=1.4, borderaxespad=0.3,
-                               bbox_to_anchor=(LEFT / style.WIDTH - 0.02, 0.0))  # fmt: skip
+            labels = [str(entry.get_label()) for entry in entries]
+            style.grow(self.figure, below=legend_room(labels))
+            columns = fitting(labels) if style.narrow() else 4
+            self.figure.legend(handles=entries, loc="lower left", ncols=columns, columnspacing=1.4, borderaxespad=0.3,
+                               bbox_to_anchor=(LEFT / style.width() - 0.02, 0.0))  # fmt: skip
 
     def color_bar(self, drawn: ScalarMappable, label: str, **options: Any) -> None:
         """What the colours of the panels mean."""
@@ -231,28 +236,35 @@ def sheet(
     """
     number = len(titles)
     columns = number if number < 4 else 2 if number == 4 else 3
+    if style.narrow():
+        columns = 1 if number < 3 else 2
+    title = style.folded(title[0].upper() + title[1:], 11.0, style.width() - LEFT - 0.1)
     rows = -(-number // columns)
-    room = style.WIDTH - RIGHT - (_BAR if bar else 0.0)
+    room = style.width() - RIGHT - (_BAR if bar else 0.0)
     middle, wide, tall = extent(places)
     wide, tall = wide + 2 * pad * max(wide, tall), tall + 2 * pad * max(wide, tall)
-    scale = min((room - LEFT * columns) / columns / wide, (_MAX_HEIGHT if rows == 1 else 7.5 / rows) / tall)
+    pitch = (room - LEFT) / columns
+    inside = pitch - _BESIDE if style.narrow() else room / columns - LEFT
+    scale = min(inside / wide, (_MAX_HEIGHT if rows == 1 else 7.5 / rows) / tall)
     window, above, down = Window(middle, scale, scale * wide, scale * tall), 0.0, _ROW_GAP
     if number > 1:
+        titles = [style.folded(words, 9.5, inside - 0.15) if style.narrow() else words for words in titles]
         above = _PANEL_TITLE + _TITLE_LINE * max(name.count("\n") for name in titles)
         down = above + _ROW_GAP
     figure, panels = windows(
-        window, study.units.label("length"), number, columns, gap=(room - LEFT) / columns - window.width, above=down,
-        top=_TITLE + above - down, below=BELOW + _LEGEND + below,
+        window, study.units.label("length"), number, columns, gap=pitch - window.width, above=down,
+        top=_TITLE + style.line(11.0) * title.count("\n") + above - down, below=BELOW + _LEGEND + below,
     )  # fmt: skip
     outer = figure.get_figheight()
     for axes, name in zip(panels, titles, strict=True):
         axes.grid(visible=False)
         axes.set_title(name, loc="left", fontsize=9.5)
-    figure.text(LEFT / style.WIDTH, 1 - 0.12 / outer, title[0].upper() + title[1:], va="top", fontsize=11)
+    figure.text(LEFT / style.width(), 1 - 0.12 / outer, title, va="top", fontsize=11)
     colors = None
     if bar:
         edge = (LEFT + window.width if number == 1 else room) + 0.15
         every = rows * window.height + (rows - 1) * down
         long, middle_up = min(every, 4.0), BELOW + _LEGEND + below + every / 2
-        colors = figure.add_axes((edge / style.WIDTH, (middle_up - long / 2) / outer, 0.16 / style.WIDTH, long / outer))
+        low = (middle_up - long / 2) / outer
+        colors = figure.add_axes((edge / style.width(), low, 0.16 / style.width(), long / outer))
     return Sheet(figure, tuple(panels), colors)

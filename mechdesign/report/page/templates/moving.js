@@ -129,8 +129,8 @@
       [moved.x[point], moved.y[point], ...parts.map(part => decode(part, data.poses, PLACES)), make("path", {}, layer)]);
     if (found.length) {
       const size = drawing.viewBox.baseVal, [length, words] = data.arrow;
-      make("path", {d: `M${size.width - 14 - length} ${size.height - 12}h${length}m-8 -4l8 4l-8 4`}, layer);
-      const text = make("text", {x: size.width - 14, y: size.height - 20, "text-anchor": "end", "font-size": 10,
+      make("path", {d: `M${size.width - 14 - length} ${size.height - 10}h${length}m-8 -4l8 4l-8 4`}, layer);
+      const text = make("text", {x: size.width - 14, y: size.height - 18, "text-anchor": "end", "font-size": 10,
         fill: "#D55E00", stroke: "none"}, layer);
       text.textContent = words;
     }
@@ -240,7 +240,7 @@
     }
 
     function frame(now) {
-      const spent = Math.min(now - clock, 100) / 1000 / data.seconds * speed.value * whole;
+      const spent = Math.max(0, Math.min(now - clock, 100)) / 1000 / data.seconds * speed.value * whole;
       if (!calm.matches) { clock = now; show(ahead(spent)); }
       else if (now - clock >= SLOW_PAUSE / speed.value) { clock = now; show(Math.round(ahead(whole / SLOW_STEPS)) % data.poses); }
       playing = requestAnimationFrame(frame);
@@ -250,7 +250,6 @@
       cancelAnimationFrame(playing);
       playing = 0;
       button.textContent = "Play";
-      button.setAttribute("aria-pressed", "false");
       if (at % 1) show(Math.round(at) % data.poses);
     }
 
@@ -258,7 +257,6 @@
       if (gap(Math.round(at))) show(data.first);
       clock = performance.now();
       button.textContent = "Pause";
-      button.setAttribute("aria-pressed", "true");
       playing = requestAnimationFrame(frame);
     }
 

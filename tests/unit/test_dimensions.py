@@ -1,0 +1,72 @@
+"""The drawing with dimensions: its numbers are the lengths of the links, apart from each other, and so is its table."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import pytest
+from helpers.pages import faults
+from helpers.studies import study_of
+from matplotlib.text import Text
+
+import mechdesign
+from mechdesign.report.figures import style
+from mechdesign.report.figures.dimensions import dimensions_figure, table_rows
+from mechdesign.report.figures.scene import pose
+
+FOUR_BAR = """
+mechanism:
+  parameters: {e: 45}
+  links:
+    ground: {O: [0, 0], D: [80, 60]}
+    crank: [O, A, 30]
+    rod: {from: A, to: B, length: 90, points: {C: [e, 60]}}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [75, 105]}
+reliability:
+  dimensions: {crank.length: 0.05, rocker.length: {tolerance: [-0.1, 0.2]}, e: {sigma: 0.01}, theta: 0.5}
+  outputs: [C]
+  poses: [{theta: 90}]
+stiffness: {at: C, sections: {bar: {E: 70 GPa, diameter: 8}}, elastic: {rocker: bar}, actuators: {theta: 1e6 N*mm/rad}}
+"""
+
+
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_numbers_of_a_four_bar_are_its_lengths_and_stand_apart(look):
+    with style.context(look):
+        figure = dimensions_figure(study_of(FOUR_BAR))
+        figure.canvas.draw()
+        assert not list(faults(figure))
+        numbers = [text for text in figure.axes[0].texts if text.get_text()[:1].isdigit()]
+        boxes = [Text.get_window_extent(text) for text in numbers]
+    # The triangle's sides by Pythagoras: 45 and 60, twice; the ground's 80 and 60.
+    assert sorted(text.get_text() for text in numbers) == sorted(
+        ["30", "60", "75", "75", "90", "100 \N{ANGLE} 36.9\N{DEGREE SIGN}"]
+    )
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+
+
+def test_the_table_tells_tolerances_and_sections():
+    study = study_of(FOUR_BAR)
+    rows = table_rows(study, pose(study.mechanism, study.mechanism.sketch_configuration))
+    assert rows[0] == ("link", "between", "length", "tolerance", "section")
+    by_link = {row[0]: row for row in rows if row[0]}
+    assert by_link["crank"][2:] == ("30", "\N{PLUS-MINUS SIGN}0.05", "")
+    assert by_link["rocker"][2:] == ("60", "+0.2 / -0.1", "bar \N{DIAMETER SIGN}8")
+    assert by_link["e"][2:4] == ("45", "\N{GREEK SMALL LETTER SIGMA} = 0.01")
+    assert by_link["theta"][3] == "\N{PLUS-MINUS SIGN}0.5 deg"
+
+
+def test_the_pose_that_fails_most_is_drawn_beside_the_sketch():
+    from mechdesign.report.figures.mechanism import mechanism_figure
+
+    study = study_of(FOUR_BAR.replace("poses: [{theta: 90}]", "poses: [{theta: 90}, {theta: 40}]\n"
+                                      "  limits: {C: {radius: 0.2}}\n  samples: 2000"))  # fmt: skip
+    result = mechdesign.reliability(study)
+    table = result.tables["reliability"]
+    rows = table.take(table.where(scope="pose", method="monte_carlo"))
+    worst = rows["theta"][rows["failure"].argmax()]
+    with style.context():
+        titles = [axes.get_title(loc="left") for axes in mechanism_figure(study, result).axes]
+    assert any("the pose that fails most" in title and f"{worst:g}" in title for title in titles)
