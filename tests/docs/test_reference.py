@@ -49,6 +49,7 @@ mechanism:
   drives: [crank]
   limits: [{drive: crank, min: 0, max: 90}]
   sketch: {A: [0, 30], B: [75, 55]}
+kinematics: {instant_centres: [[ground, rod]], mechanical_advantage: {rocker.angle: crank}}
 workspace: {point: B}
 """
 ARM = """
@@ -80,6 +81,7 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
         ("target", mechdesign.kinematics(bar), bar),
         ("path", mechdesign.workspace(four), four),
         ("modes", mechdesign.kinematics(four, all_modes=True), four),
+        ("centres", mechdesign.kinematics(four), four),
         ("range", mechdesign.workspace(ranged), ranged),
         ("eigen", mechdesign.stiffness(stiff), stiff),
     )
