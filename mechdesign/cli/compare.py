@@ -75,11 +75,12 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
     """
     assert options.verify is not None
     path = options.verify
-    alone = Options(verify=path, jobs=options.jobs, json=options.json, quiet=options.quiet, junit=options.junit)
+    beside = {name: getattr(options, name) for name in ("jobs", "json", "quiet", "junit", "allow_files")}
+    alone = Options(verify=path, **beside)
     if studies or dataclasses.replace(options, overrides=options.overrides or ()) != alone:
         raise StudyError(
             "--verify repeats what a manifest says; beside it stand no studies, and no options but --jobs, --junit, "
-            "--json and --quiet"
+            "--json, --quiet and --allow-files"
         )
     root = path.parent if path.name == manifest.NAME else path
     recorded = comparing.results(root)
@@ -108,7 +109,7 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
     if content.get("interrupted"):
         raise StudyError(f"{where}: its run was interrupted, which cannot be repeated; run it again with --resume")
     try:
-        study = mechdesign.load(content["study"]["resolved"], seed=content["seed"])
+        study = mechdesign.load(content["study"]["resolved"], seed=content["seed"], allow_files=options.allow_files)
     except (KeyError, TypeError):
         raise StudyError(f"{where}: is not a manifest that mechdesign wrote; run the study again") from None
     except StudyError as error:

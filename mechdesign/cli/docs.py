@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import textwrap
@@ -13,7 +14,7 @@ import typer
 
 from mechdesign.cli.terminal import emit
 from mechdesign.errors import StudyError, explain
-from mechdesign.reference import Entry, below, entries, find, near, place
+from mechdesign.reference import Entry, below, entries, find, find_messages, holding, near, place
 
 _INDENT = "  "
 # Words of mistakes that are named to be looked up.
@@ -21,7 +22,7 @@ _NAMED = 3
 _NO_WRAPPING = 10_000
 _OVERVIEW = (
     "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
-    "part (sweep), a command, an option, or one of the words below."
+    "part (sweep), a column, a command, an option, one of the words below, or a part of a message (in quotes)."
 )
 
 
@@ -34,7 +35,7 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
         If a word is not known; the message names the nearest.
     """
     known = entries(commands(group))
-    found = [(word, find(known, word)) for word in words]
+    found = [(word, find(known, word) or [*holding(known, word), *find_messages(word)]) for word in words]
     for word, hits in found:
         if not hits:
             close = near(known, word)
@@ -77,7 +78,8 @@ def _told(known: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
         alike.setdefault(replace(hit, word=""), []).append(hit)
     for entry, same in alike.items():
         for each in same:
-            yield f"{typer.style(each.word, bold=True) if sys.stdout.isatty() else each.word} ({each.kind})"
+            bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+            yield f"{typer.style(each.word, bold=True) if bold else each.word} ({each.kind})"
         yield from (_INDENT + line for line in _body(entry, same[0].last))
         keys = below(known, same[0]) if len([each for each in alike if each.kind == entry.kind]) == 1 else []
         if keys:
