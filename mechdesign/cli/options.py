@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from mechdesign.commands import MAX_JOBS
 from mechdesign.errors import StudyError
 from mechdesign.files import formats_of
 
@@ -43,9 +44,11 @@ def _out(meaning: str) -> Parameter:
 
 
 STUDY = _study(Path, "STUDY", "The study file; - is standard input.")
-STUDIES = _study(list[Path], "STUDY...", "The study files; - is standard input.")
+STUDIES = _study(list[Path], "STUDY...", "The study files, folders of *.yaml or patterns; - is standard input.")
 OUT = _out("Folder for tables, pictures and manifest. Default: results/<study>/<command>.")
-OUT_ALL = _out("Folder that gets one folder a command (several studies: <study>/<command>). Default: results/<study>.")
+OUT_ALL = _out(
+    "Folder that gets one folder a command (several studies: <study>/<command>, summary.csv). Default: results/<study>."
+)
 OUT_DRAWINGS = _out("Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.")
 OVERRIDES = _text(
     "overrides",
@@ -62,6 +65,7 @@ JOBS = _text(
     "N",
     "Threads to compute on; the results do not depend on it. Default: every processor.",
     min=1,
+    max=MAX_JOBS,
 )
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
@@ -78,6 +82,9 @@ ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path
 REPORT = _flag("report", "--report", "Also write report.html: one page with all of it, which moves.")
 REPORTS = _flag(
     "report", "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
+)
+ALLOW_FILES = _flag(
+    "allow_files", "--allow-files", "Also read files that the study names and that lie outside its folder."
 )
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
 BEFORE = _text(
@@ -98,7 +105,7 @@ RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
 # What every question takes, and what only some of them do.
-COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE)
+COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
 
 
@@ -128,6 +135,7 @@ class Options:
     junit: Path | None = None
     fail_fast: bool = False
     resume: bool = False
+    allow_files: bool = False
 
     def __post_init__(self) -> None:
         if self.animate and self.no_plots:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from mechdesign.errors import printable_lines
 from mechdesign.progress import Progress
 from mechdesign.report.tables import cells, to_csv, to_json
 from mechdesign.results import Table
@@ -25,16 +25,13 @@ _BAR_DELAY = 1.0  # seconds before a bar appears
 def say(text: str, *, quiet: bool = False) -> None:
     """A line to stderr, unless the user wants quiet."""
     if not quiet:
-        print(text, file=sys.stderr, flush=True)
+        print(printable_lines(text), file=sys.stderr, flush=True)
 
 
 def emit(text: str) -> None:
-    """Data to stdout; whoever closed the pipe early (``| head``) has had enough, which is no error."""
-    try:
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    """Data to stdout."""
+    sys.stdout.write(text)
+    sys.stdout.flush()
 
 
 def show(table: Table, *, as_json: bool, rest: str = "") -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError, Problem, StudyError
+from mechdesign.errors import AssemblyError, Problem, StudyError, few_comparisons
 from mechdesign.results import Result, Table
 from mechdesign.rows import IN_UNIT, UnknownColumnError, choose
 from mechdesign.study import Study
@@ -76,6 +76,7 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
         raise StudyError(problems)
 
 
+@few_comparisons()
 def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[Verdict, ...]:
     """Verdicts on those requirements of a study that concern a result, in the order of the study.
 

@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import MechanismError, Problem, StudyError
+from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
@@ -38,8 +38,9 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
-from mechdesign.study.text.document import Document, KeyPath, Mark, leaves, plain, read
+from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
+from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 
@@ -80,6 +81,7 @@ class Study:
     stiffness: StiffnessSection | None
     requirements: tuple[Requirement, ...]  #: in the order of the file
     targets: Mapping[str, Target]  # by the coordinate or point
+    allow_files: bool = False  #: whether files that it names may lie outside its folder
     warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
@@ -92,20 +94,21 @@ class Study:
         """The name of its folder of results, that of its file or else its own."""
         return self.path.stem if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
 
+    @property
+    def folder(self) -> Folder:
+        """Where the files lie that it names."""
+        return _folder(self.path, self.allow_files)
+
     def __repr__(self) -> str:
         questions = ", ".join(self.questions) or "no question"
         return f"<Study {shown(self.name)}: mobility {self.mechanism.mobility}; {questions}>"
 
     def inputs(self) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
         """Files that the study reads: the keys of their names, the file, and what it holds."""
-        folder = self.path.parent if self.path is not None else pathlib.Path()
-        for keys, value in leaves(self.resolved):
-            if isinstance(value, str) and ({"path", "targets"}.intersection(keys[:-1]) or keys[-1] == "measured"):
-                try:
-                    content = (folder / value).read_text(encoding="utf-8-sig")
-                except (OSError, ValueError):
-                    continue
-                yield keys, folder / value, content
+        for keys, name in files(self.resolved, self.questions):
+            # One that is gone since has been read nevertheless.
+            with contextlib.suppress(StudyError):
+                yield keys, self.folder.path / name, self.folder.text(name)
 
     def unit_of(self, name: str) -> str | None:
         """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
@@ -126,11 +129,16 @@ class Study:
         """A mistake at a path of the data, with its place in the text."""
         if not self.text:
             return Problem(message, ".".join(map(str, keys)))
-        document = read(self.text, str(self.path or _TEXT))
-        override(document, self.overrides)
-        reporter = Reporter(document)
+        reporter = Reporter(self._document)
         reporter.report(keys, message)
         return reporter.problems[-1]
+
+    @cached_property
+    def _document(self) -> Document:
+        """The text once more, with the places of its entries."""
+        document = read(self.text, str(self.path or _TEXT))
+        override(document, self.overrides)
+        return document
 
 
 def load(
@@ -139,6 +147,7 @@ def load(
     seed: int | None = None,
     *,
     text: str | bytes | None = None,
+    allow_files: bool = False,
 ) -> Study:
     """Load a study from a file, a mapping or a text in YAML.
 
@@ -153,6 +162,8 @@ def load(
     text : str or bytes
         The study in YAML, in place of `source`. Files that it names are looked for in the working directory, as are
         those of a mapping.
+    allow_files : bool
+        Whether files that the study names may lie outside its folder.
 
     Raises
     ------
@@ -163,20 +174,23 @@ def load(
     if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):
         raise StudyError("give a study as one of a file's name, a mapping, or text=... in YAML")
     if text is not None:
-        return load_bytes(text.encode() if isinstance(text, str) else text, None, overrides, seed)
+        content = text.encode(errors="surrogateescape") if isinstance(text, str) else text
+        return load_bytes(content, None, overrides, seed, allow_files=allow_files)
     if isinstance(source, Mapping):
         data = _plain_data(source, "the study")
         document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
         override(document, changes)
         sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-        return load_document(document, None, b"", sha256, changes, seed)
+        return load_document(document, None, b"", sha256, changes, seed, allow_files=allow_files)
     assert source is not None
     file = pathlib.Path(source)
     try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise StudyError([Problem(f"cannot be read: {error.strerror or error}", file=str(source))]) from None
-    return load_bytes(content, file, overrides, seed)
+        with file.open("rb") as stream:
+            whole = stream.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise StudyError([Problem(f"cannot be read: {why}", file=str(source))]) from None
+    return load_bytes(whole, file, overrides, seed, allow_files=allow_files)
 
 
 @one_thread()
@@ -185,12 +199,14 @@ def load_bytes(
     path: pathlib.Path | None,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     seed: int | None = None,
+    *,
+    allow_files: bool = False,
 ) -> Study:
     """Load a study from the bytes of a file; see `load`."""
     document, changes = read(content, str(path or _TEXT)), _texts(overrides)
     override(document, changes)
     sha256 = hashlib.sha256(content).hexdigest()
-    return load_document(document, path, content, sha256, changes, seed)
+    return load_document(document, path, content, sha256, changes, seed, allow_files=allow_files)
 
 
 def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
@@ -221,6 +237,7 @@ def _plain_data(value: Any, what: str) -> Any:
         raise StudyError([Problem(message)]) from None
 
 
+@few_comparisons()
 def load_document(
     document: Document,
     path: pathlib.Path | None,
@@ -229,6 +246,8 @@ def load_document(
     changes: tuple[str, ...] = (),
     seed: int | None = None,
     original: Mechanism | None = None,
+    *,
+    allow_files: bool = False,
 ) -> Study:
     """Load a study from the data of a file, overrides applied; see `load`.
 
@@ -236,7 +255,7 @@ def load_document(
     """
     if seed is not None and seed < 0:
         raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
-    folder = path.parent if path is not None else pathlib.Path()
+    folder = _folder(path, allow_files)
     reporter = Reporter(document)
     data = _sections(document, reporter)
     context, formulas = _context(data, reporter)
@@ -274,8 +293,13 @@ def load_document(
         **{command: parts.get(command) for command in COMMANDS},
         requirements=parts["requirements"],
         targets=parts["targets"],
+        allow_files=allow_files,
         warnings=tuple(reporter.warnings),
     )
+
+
+def _folder(path: pathlib.Path | None, allow_files: bool) -> Folder:
+    return Folder(path.parent if path is not None else pathlib.Path(), allow_files)
 
 
 def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
@@ -353,7 +377,7 @@ def _checked(checker: Checker) -> dict[str, Any]:
     return found
 
 
-def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path) -> None:
+def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: Folder) -> None:
     """Check that the coordinates that poses give determine the mechanism, that they are not too many, and that the
     targets fit those of kinematics.
     """
