@@ -3,7 +3,8 @@
 In a page
 - a block of YAML with a caption is a file of that name; a caption "NAME, continued" adds to it; it must pass `check`;
 - a block of YAML without one is a part of a study: laid over the page's last file, it must pass `check`;
-- a `console` block holds commands after `$ `, each with what a terminal shows; a line `...` stands for any lines;
+- a `console` block holds commands after `$ `, each with what a terminal shows; a line `...` stands for any lines, and
+  numbers agree to six digits;
 - a `python` block runs with those before it; what it prints stands in the `text` block that follows, if there is one.
 
     python docs/examples.py [PAGE...]     writes what the commands print now into the pages
@@ -13,12 +14,15 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import os
 import pty
 import re
+import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+import threading
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,7 +38,12 @@ FOLDERS = ("tutorials", "howto", "theory", "reference", "contributing")
 # Where the examples of a page were run: its pictures come from there.
 RUN = ROOT / "_run"
 ANY = "..."
+# Two numbers are the same to six digits.
+DIGITS = 1e-6
 _FENCE = re.compile(r"(?ms)^(?P<fence>`{3,})(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=fence)[ ]*$")
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w])")
+# Python of one page at a time: the folder it runs in and what it prints are those of the whole process.
+_PYTHON = threading.Lock()
 _CAPTION = re.compile(r":caption: (?P<name>\S+?)(?P<more>, continued)?\n")
 
 
@@ -91,10 +100,40 @@ def _read(terminal: int) -> bytes:
 
 
 def agree(told: str, shown: str) -> bool:
-    """Whether an output is the one in the page, whose lines `...` stand for any lines."""
-    parts = [re.escape(line) if line.strip() != ANY else None for line in told.splitlines()]
-    pattern = "".join(r"(?:.*\n)*?" if part is None else rf"{part}\n" for part in parts)
-    return re.fullmatch(pattern, shown) is not None
+    """Whether an output is the one in the page, whose lines `...` stand for any lines; numbers agree to six digits."""
+    lines = shown.splitlines()
+    first, *others = _split(told.splitlines())
+    if not _same(first, lines[: len(first)]) or (not others and len(lines) != len(first)):
+        return False
+    at = len(first)
+    for number, part in enumerate(others, 1):
+        last = len(lines) - len(part)
+        starts = range(at, last + 1) if number < len(others) else range(max(last, at), last + 1)
+        start = next((start for start in starts if _same(part, lines[start : start + len(part)])), None)
+        if start is None:
+            return False
+        at = start + len(part)
+    return True
+
+
+def _split(told: Iterable[str]) -> Iterator[list[str]]:
+    """The runs of lines between those that stand for any lines."""
+    part: list[str] = []
+    for line in told:
+        if line.strip() == ANY:
+            yield part
+            part = []
+        else:
+            part.append(line)
+    yield part
+
+
+def _same(told: Sequence[str], shown: Sequence[str]) -> bool:
+    """Whether lines are the same: words to the letter, numbers to six digits, as machines differ in the last ones."""
+    if len(told) != len(shown) or [_NUMBER.sub("", line) for line in told] != [_NUMBER.sub("", line) for line in shown]:
+        return False
+    pairs = zip(_NUMBER.findall("\n".join(told)), _NUMBER.findall("\n".join(shown)), strict=True)
+    return all(math.isclose(float(a), float(b), rel_tol=DIGITS) for a, b in pairs)
 
 
 def _commands(body: str) -> Iterator[tuple[str, str]]:
@@ -140,24 +179,25 @@ def _yaml(page: Page, body: str, where: int) -> None:
 
 def _python(page: Page, body: str, where: int) -> None:
     stream = io.StringIO()
-    before = Path.cwd()
-    try:
-        os.chdir(page.folder)
-        with contextlib.redirect_stdout(stream):
-            exec(compile(body, str(page.path), "exec"), page.names)
-    except Exception as error:
-        page.fail(where, f"{type(error).__name__}: {error}")
-    finally:
-        os.chdir(before)
+    with _PYTHON:
+        before = Path.cwd()
+        try:
+            os.chdir(page.folder)
+            with contextlib.redirect_stdout(stream):
+                exec(compile(body, str(page.path), "exec"), page.names)
+        except Exception as error:
+            page.fail(where, f"{type(error).__name__}: {error}")
+        finally:
+            os.chdir(before)
     page.printed = stream.getvalue()
 
 
 def _run(path: Path) -> tuple[str, list[str]]:
     """The text of a page as it would be true, and what is wrong with it as it is."""
     folder = RUN / path.relative_to(ROOT).with_suffix("")
-    folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob("*.yaml"):
-        old.unlink()
+    # What an earlier run has left could make a page true that is not.
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     page = Page(path, folder)
 
     def block(found: re.Match[str]) -> str:
@@ -188,7 +228,8 @@ def pages(names: Iterable[str] = ()) -> list[Path]:
 
 def wrong(paths: Iterable[Path]) -> list[str]:
     """Run the examples of these pages; what is wrong with them, in words."""
-    return [words for path in paths for words in _run(path)[1]]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return [words for _, told in pool.map(_run, paths) for words in told]
 
 
 def main() -> None:

@@ -77,7 +77,7 @@ def section(found: list[Entry]) -> str:
     parts = [*_told(first)]
     for entry in keys:
         path = entry.word.partition(".")[2]
-        parts += [f"{'###' if '.' in path else '##'} {code(path)}", *_told(entry)]
+        parts += [f"{'###' if '.' in path.removeprefix('*.') else '##'} {code(path)}", *_told(entry)]
     return _page(code(first.word), parts)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+MAX_JOBS = 512  # threads or processes of one command
+
 
 @dataclass(frozen=True)
 class Command:

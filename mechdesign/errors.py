@@ -25,7 +25,7 @@ EXIT_CODES = {
     2: "the command or the study file is wrong; nothing was computed",
     3: "the study is right, but the mechanism cannot do it: a pose that cannot be assembled, no feasible design",
     4: "a numerical failure, or results that could not be written",
-    130: "interrupted; what was finished is whole",
+    130: "interrupted (143 by SIGTERM, 129 by SIGHUP); what was finished is whole",
 }
 
 
@@ -198,6 +198,8 @@ def explain(error: Exception) -> tuple[int, str]:
         return error.exit_code, printable_lines(str(error))
     if isinstance(error, MemoryError):
         return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
+    if "BrokenExecutor" in [kind.__name__ for kind in type(error).__mro__]:
+        return 4, "a process that computed was killed, as where memory runs out; use fewer --jobs"
     frames = [
         frame for frame in traceback.extract_tb(error.__traceback__) if "mechdesign" in Path(frame.filename).parts
     ]

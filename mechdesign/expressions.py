@@ -201,7 +201,7 @@ class Expression:
             if name == "/" and arguments[1] == 0:
                 raise ExpressionError(f"division by zero in {self.text!r}")
             if np.isposinf(result):
-                raise ExpressionError(f"{self.text!r} is too large a number")
+                raise ExpressionError(f"{self.text!r} is too large a number; choose a larger unit")
             shown = ", ".join(f"{argument:g}" for argument in arguments)
             raise ExpressionError(f"{name}({shown}) in {self.text!r} is not a number")
         return float(result)

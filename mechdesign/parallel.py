@@ -20,6 +20,8 @@ from functools import cache
 from itertools import islice
 from typing import Any, TypeVar
 
+from mechdesign.commands import MAX_JOBS
+
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 
@@ -29,6 +31,10 @@ _LOOK_AHEAD = 3
 _TRIM_THRESHOLD = -1
 _MMAP_THRESHOLD = -3
 _MEBIBYTE = 2**20
+# Option of Linux's prctl, from prctl.h: the signal that a process gets when its parent ends.
+_PR_SET_PDEATHSIG = 1
+# Sent to a whole group of processes, workers too.
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if sys.platform != "win32" else ()
 # Read by a library of linear algebra when it is loaded: SciPy's may be so in the middle of a computation.
 _VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
@@ -43,12 +49,12 @@ def worker_count(jobs: int | None) -> int:
     Raises
     ------
     ValueError
-        If `jobs` is less than 1.
+        If `jobs` is less than 1 or more than `MAX_JOBS`.
     """
     if jobs is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if jobs < 1:
-        raise ValueError(f"jobs must be at least 1, not {jobs}")
+    if not 1 <= jobs <= MAX_JOBS:
+        raise ValueError(f"jobs must be from 1 to {MAX_JOBS}, not {jobs}")
     return jobs
 
 
@@ -86,16 +92,27 @@ def workers(
     call: Callable[[Item], Value]
     if processes and sys.platform == "linux":
         fork = multiprocessing.get_context("fork")
-        pool = ProcessPoolExecutor(count, mp_context=fork, initializer=_adopt, initargs=(function,))
+        pool = ProcessPoolExecutor(count, mp_context=fork, initializer=_adopt, initargs=(function, os.getpid()))
         call = _call
     else:
         pool = ThreadPoolExecutor(count, thread_name_prefix="mechdesign")
         call = function
     with pool:
         try:
+            if call is _call:
+                _fork_all(pool)
             yield lambda items: _in_order(pool, call, items, _LOOK_AHEAD * count)
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _fork_all(pool: Executor) -> None:
+    """Fork the workers, which the first work does; a signal waits until they know what to do with it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    try:
+        pool.submit(os.getpid)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _in_order(pool: Executor, call: Callable[[Item], Value], items: Iterable[Item], ahead: int) -> Iterator[Value]:
@@ -111,11 +128,18 @@ def _in_order(pool: Executor, call: Callable[[Item], Value], items: Iterable[Ite
 _adopted: Callable[[Any], Any] | None = None
 
 
-def _adopt(function: Callable[[Any], Any]) -> None:
+def _adopt(function: Callable[[Any], Any], parent: int) -> None:
     global _adopted
     _adopted = function
+    # However the parent ends, its workers end with it.
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
     # An interrupt is the parent's to handle: it lets the chunks under way finish.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
 
 
 def _call(item: Any) -> Any:

@@ -11,13 +11,14 @@ from typing import Annotated, Any
 import typer
 
 from mechdesign.cli import options as given
+from mechdesign.cli import process
 from mechdesign.cli.options import BUILT_IN, Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
     name="mechdesign",
-    help="Design studies of planar mechanisms: one study file, four questions, tables and pictures.",
+    help="Design studies of planar mechanisms: one study file, five questions, tables and pictures.",
     epilog="Exit codes: " + ". ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     add_completion=False,
     no_args_is_help=True,
@@ -159,9 +160,5 @@ def schema() -> None:
 
 
 def main() -> None:
-    """Entry point of the `mechdesign` command."""
-    for stream in (sys.stdout, sys.stderr):
-        # A name in a study must not fail on a terminal that lacks its letters.
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")
-    app()
+    """The command in a process of its own."""
+    process.run(app)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -12,9 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechdesign.cli import terminal
+from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     OUTCOMES,
+    RESULTS,
     Outcome,
     answer,
     claim,
@@ -27,12 +30,14 @@ from mechdesign.cli.execution import (
 )  # fmt: skip
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Interrupted, StudyError, printable, printable_lines
+from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable, printable_lines
+from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, foresee
-from mechdesign.report.writer import write_file, write_sketch
+from mechdesign.report.tables import to_csv
+from mechdesign.report.writer import check_writable, write_file, write_sketch
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
@@ -40,12 +45,37 @@ from mechdesign.study.schema.reliability import in_words
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
+SUMMARY = "summary.csv"  # of several studies, beside their folders
+
 
 def questions(study: Study) -> tuple[str, ...]:
     """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing."""
     judged = {command_of(requirement) for requirement in study.requirements}
     asked = [command for command in COMMANDS if command in study.questions or command in judged]
     return tuple(asked) or ("kinematics",)
+
+
+def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
+    """Files of studies: those that are named, every ``*.yaml`` of a folder, and those of a pattern, each once.
+
+    Raises
+    ------
+    StudyError
+        If a folder or pattern has none.
+    """
+    if not paths:
+        return [None]
+    found: dict[Path | None, None] = {}
+    for path in paths:
+        here = [path]
+        if path.is_dir():
+            here = sorted(file for file in path.glob("*.yaml") if file.is_file())
+        elif glob.has_magic(str(path)) and not path.exists():
+            here = sorted(map(Path, glob.glob(str(path), recursive=True)))
+        if not here:
+            raise StudyError(f"{path}: there are no studies, which are files *.yaml")
+        found |= dict.fromkeys(here)
+    return list(found)
 
 
 @one_thread()
@@ -56,7 +86,7 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
     summary and the JUnit file then show what was finished.
     """
     answers: list[Outcome] = []
-    asked: Sequence[Path | None] = paths or [None]
+    asked = found_studies(paths)
     book = Book(options, several=len(asked) > 1)
     try:
         with closing(_answers(asked, options, book)) as found:
@@ -67,10 +97,16 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
     except KeyboardInterrupt:
         terminal.say("interrupted; what was finished is whole")
         answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
-    terminal.show(_summary(answers), as_json=options.json)
     if options.junit is not None:
-        write_file(options.junit, _junit(answers).encode())
+        book.file(options.junit, _junit(answers).encode())
+    summary = _summary(answers)
+    if book.several and any(given.written for given in answers):
+        book.file((options.out or RESULTS) / SUMMARY, to_csv(summary).encode())
+    terminal.show(summary, as_json=options.json)
     book.close()
+    told = [_in_brief(given) for given in answers if given.command and given.exit_code]
+    if len(summary) > 1 and told:
+        terminal.say("\n".join([f"failed: {len(told)} of {counted(len(summary), 'question')}", *told]))
     return max(book.exit_code, *(given.exit_code for given in answers))
 
 
@@ -79,7 +115,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     worst = 0
     owners: dict[str, Path | None] = {}
-    asked: Sequence[Path | None] = paths or [None]
+    asked = found_studies(paths)
     for path in asked:
         try:
             study = load_study(path, options)
@@ -120,20 +156,24 @@ def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Gene
         try:
             claim(owners, study)
         except StudyError as error:
-            yield book.missing(_failure(label, "check", Path(), error))
+            yield book.missing(_failure(label, "check", Path(), error, study))
             continue
         root = folder(study, "", options, several=len(paths) > 1)
         told: list[Outcome] = []
         try:
             for command in questions(study):
                 try:
-                    given = replace(answer(study, command, root / command, options), result=None)
+                    check_writable(root / command)
+                    with owned(root / command):
+                        given = replace(answer(study, command, root / command, options), result=None)
                     tell(given, options)
+                    annotate("error", of_verdicts(study, command, given.verdicts))
+                    annotate("warning", of_warnings(study, command, given.warnings))
                 except KeyboardInterrupt as error:
                     told.append(interrupted(study, command, root / command, error))
                     raise
                 except Exception as error:
-                    given = _failure(label, command, root / command, error)
+                    given = _failure(label, command, root / command, error, study)
                 told.append(given)
                 yield given
         finally:
@@ -179,11 +219,17 @@ class Book:
         from mechdesign.report.page.page import index
 
         path = self._folder / pages.INDEX
-        try:
-            write_file(path, index(self._entries))
+        if self.file(path, index(self._entries)):
             terminal.say(f"index of the reports in {path}", quiet=self.options.quiet)
-        except Exception as error:
-            self._fail(explained(error)[1], error)
+
+    def file(self, path: Path, data: bytes) -> bool:
+        """Write a file about all studies; whether it is there, for the run goes on without it."""
+        try:
+            write_file(path, data)
+        except OutputError as error:
+            self._fail(str(error), error)
+            return False
+        return True
 
     def _entry(self, study: Study, told: Sequence[Outcome]) -> Entry:
         from mechdesign.report.page.page import Entry, thumbnail
@@ -205,10 +251,18 @@ class Book:
         self.exit_code = max(self.exit_code, explained(error)[0])
 
 
-def _failure(label: str, command: str, directory: Path, error: Exception) -> Outcome:
+def _failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
     code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
+    annotate("error", of_error(error, message, study))
     return Outcome(label, command, directory, code, 0, failed=message)
+
+
+def _in_brief(given: Outcome) -> str:
+    """What a question failed by, in a line."""
+    why = [given.failed.splitlines()[0]] if given.failed else []
+    why += [str(verdict) for verdict in given.verdicts if not verdict.met]
+    return f"  {given.study}: {given.command}: {OUTCOMES[given.exit_code]}: {'; '.join(why)}"
 
 
 def _summary(answers: Sequence[Outcome]) -> Table:

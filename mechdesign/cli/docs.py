@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import textwrap
@@ -77,7 +78,8 @@ def _told(known: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
         alike.setdefault(replace(hit, word=""), []).append(hit)
     for entry, same in alike.items():
         for each in same:
-            yield f"{typer.style(each.word, bold=True) if sys.stdout.isatty() else each.word} ({each.kind})"
+            bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+            yield f"{typer.style(each.word, bold=True) if bold else each.word} ({each.kind})"
         yield from (_INDENT + line for line in _body(entry, same[0].last))
         keys = below(known, same[0]) if len([each for each in alike if each.kind == entry.kind]) == 1 else []
         if keys:

@@ -17,6 +17,7 @@ from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
 from mechdesign.cli.options import BUILT_IN, STYLES, Options
 from mechdesign.errors import Interrupted, MechdesignError, StudyError
+from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
 from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer
@@ -30,6 +31,7 @@ from mechdesign.study import Study, load, template_path
 from mechdesign.study.text.document import MAX_BYTES
 
 STANDARD_INPUT = Path("-")
+RESULTS = Path("results")  # where no other folder is asked for
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -81,7 +83,7 @@ def load_study(path: Path | None, options: Options) -> Study:
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
     """Where the results of a command go, given alone; of several studies each has a folder in that of the option."""
     if options.out is None:
-        return Path("results") / study.label / name
+        return RESULTS / study.label / name
     return options.out / study.label if several else options.out
 
 
@@ -107,7 +109,6 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         Whatever the analysis, the requirements or the files run into.
     """
     begun = time.perf_counter()
-    writer.check_writable(directory)
     asked = extras(command, options)
     before = None
     if options.before is not None:
@@ -172,17 +173,22 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     if content is None:
         return None
     numbers = {"worst": math.nan, "margin": math.nan}
-    verdicts = [
-        Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
-        for entry in content["requirements"]
-    ]
+    try:
+        verdicts = [
+            Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
+            for entry in content["requirements"]
+        ]
+        rows = len(_main_table(directory))
+        warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
+    except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
+        # Damaged: of another hand than ours.
+        return None
     if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
         return None
-    rows = next(iter(content["tables"].values()))["rows"]
-    code = _exit_code(content["failed"], verdicts)
+    settle(directory)
+    code = _exit_code(failed, verdicts)
     return Outcome(
-        study.label, command, directory, code, rows, content["warnings"], content["failed"], verdicts, kept=True,
-        written=True,
+        study.label, command, directory, code, rows, warnings, failed, verdicts, kept=True, written=True
     )  # fmt: skip
 
 
@@ -273,15 +279,17 @@ def ask(command: str, path: Path | None, options: Options) -> int:
     """One command from end to end; returns its exit code."""
     study = load_study(path, options)
     directory = folder(study, command, options)
-    try:
-        given = answer(study, command, directory, options)
-    except Interrupted as error:
+    writer.check_writable(directory)
+    with owned(directory):
+        try:
+            given = answer(study, command, directory, options)
+        except Interrupted as error:
+            if options.report:
+                write_report(directory, study, [interrupted(study, command, directory, error)], options)
+            raise
         if options.report:
-            write_report(directory, study, [interrupted(study, command, directory, error)], options)
-        raise
-    if options.report:
-        write_report(directory, study, [given], options)
-    table = given.result.main if given.result is not None else _main_table(directory)
+            write_report(directory, study, [given], options)
+        table = given.result.main if given.result is not None else _main_table(directory)
     terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))
     tell(given, options)
     return given.exit_code

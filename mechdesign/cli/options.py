@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from mechdesign.commands import MAX_JOBS
 from mechdesign.errors import StudyError
 from mechdesign.files import formats_of
 
@@ -43,9 +44,11 @@ def _out(meaning: str) -> Parameter:
 
 
 STUDY = _study(Path, "STUDY", "The study file; - is standard input.")
-STUDIES = _study(list[Path], "STUDY...", "The study files; - is standard input.")
+STUDIES = _study(list[Path], "STUDY...", "The study files, folders of *.yaml or patterns; - is standard input.")
 OUT = _out("Folder for tables, pictures and manifest. Default: results/<study>/<command>.")
-OUT_ALL = _out("Folder that gets one folder a command (several studies: <study>/<command>). Default: results/<study>.")
+OUT_ALL = _out(
+    "Folder that gets one folder a command (several studies: <study>/<command>, summary.csv). Default: results/<study>."
+)
 OUT_DRAWINGS = _out("Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.")
 OVERRIDES = _text(
     "overrides",
@@ -62,6 +65,7 @@ JOBS = _text(
     "N",
     "Threads to compute on; the results do not depend on it. Default: every processor.",
     min=1,
+    max=MAX_JOBS,
 )
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from types import TracebackType
@@ -30,12 +29,9 @@ def say(text: str, *, quiet: bool = False) -> None:
 
 
 def emit(text: str) -> None:
-    """Data to stdout; whoever closed the pipe early (``| head``) has had enough, which is no error."""
-    try:
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    """Data to stdout."""
+    sys.stdout.write(text)
+    sys.stdout.flush()
 
 
 def show(table: Table, *, as_json: bool, rest: str = "") -> None:

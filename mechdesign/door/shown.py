@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechdesignError, StudyError, counted, explain, suggestion
-from mechdesign.files import formats_of
+from mechdesign.files import formats_of, owned
 from mechdesign.report import writer
 from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict, requirements
@@ -148,7 +148,9 @@ class Answer(Result):
         asked = Extras(plots, formats_of(formats, "formats"), animate, self.all_modes)
         folder = Path(directory)
         writer.check_writable(folder)
-        for warning in writer.write(folder, self.study, self, self.verdicts, asked):
+        with owned(folder):
+            undrawn = writer.write(folder, self.study, self, self.verdicts, asked)
+        for warning in undrawn:
             warnings.warn(warning, stacklevel=2)
         return folder
 

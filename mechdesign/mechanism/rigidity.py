@@ -305,4 +305,7 @@ def check_independent(equations: Equations, structure: Structure) -> None:
             if not singular:
                 return
     if singular:
-        raise Undetermined("the given coordinates fix one part of the mechanism twice and leave another free")
+        raise Undetermined(
+            "the given coordinates fix one part of the mechanism twice and leave another free; give one of the other "
+            "part instead"
+        )

@@ -110,7 +110,7 @@ class _Ties:
         """Tie class `frame` to `reference` with theta_frame = theta_reference + step."""
         a, b = self.find(frame), self.find(reference)
         if a.root == b.root:
-            raise Undetermined("the given angles contradict each other: two of them fix the same angle")
+            raise Undetermined("the given angles contradict each other: two of them fix the same angle; leave one out")
         if a.root == 0:
             # The ground stays the root.
             self.join(reference, frame, step.reversed(frame))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -47,7 +47,7 @@ PART = 0
 _PART = "a part of an error or a warning"
 _WARNING = "a warning: the results are there, and this is to be known of them"
 # Calls that are given a message, besides errors; and lists that messages are put on.
-_GIVEN = ("Problem", "failure", "problem", "report", "_unexpected", "UnknownColumnError", "Undetermined")
+_GIVEN = ("Problem", "failure", "problem", "report", "_note", "_unexpected", "UnknownColumnError", "Undetermined")
 _LISTS = ("warnings", "problems", "notes", "told", "found")
 # Functions that give texts, in these rooms; of a single text it may be a part of a message.
 _TEXTS = ("Iterator[str]", "list[str]", "str | None", "str")
@@ -58,7 +58,7 @@ _WORDS = 5
 _SENTENCE = re.compile(r"[A-Za-z]{2,}[,;:')]* +['(]?[A-Za-z]")
 _PLACE = re.compile(r"<[^<>]*>")
 # Fewest letters of a message outside of its places by which a text is known to be that message.
-_LETTERS = 12
+_LETTERS = 10
 
 
 class Message(NamedTuple):
@@ -118,6 +118,7 @@ class _Reader(ast.NodeVisitor):
     def __init__(self, rooms: bool) -> None:
         self.found: list[tuple[str, int | None]] = []
         self.names: dict[str, list[ast.expr]] = {}
+        self.functions: dict[str, list[ast.expr]] = {}
         # What functions give that are read for their texts.
         self.given = _TEXTS if rooms else ()
         self.texts = ""
@@ -125,8 +126,11 @@ class _Reader(ast.NodeVisitor):
     @staticmethod
     def read(source: str, *, texts: bool) -> list[tuple[str, int | None]]:
         """Messages of a file and their exit codes; with `texts` also what its functions return."""
-        reader = _Reader(texts)
-        reader.visit(ast.parse(source))
+        reader, tree = _Reader(texts), ast.parse(source)
+        for function in (each for each in tree.body if isinstance(each, ast.FunctionDef)):
+            returned = (each.value for each in ast.walk(function) if isinstance(each, ast.Return))
+            reader.functions[function.name] = [value for value in returned if value is not None]
+        reader.visit(tree)
         return reader.found
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
@@ -180,9 +184,12 @@ class _Reader(ast.NodeVisitor):
                     self.found.append((text.strip(" ;"), code))
 
     def _written(self, node: ast.expr, *, known: bool = True) -> Iterator[str]:
-        """What an expression may read, ``<...>`` for what is not written there; a name's values are looked up once."""
+        """What an expression may read, ``<...>`` for what is not written there; names are looked up once."""
         if isinstance(node, ast.Name) and known:
             for value in self.names.get(node.id, ()):
+                yield from self._written(value, known=False)
+        elif isinstance(node, ast.Call) and known:
+            for value in self.functions.get(_last(node.func), ()):
                 yield from self._written(value, known=False)
         elif isinstance(node, ast.IfExp):
             yield from self._written(node.body, known=known)
@@ -193,18 +200,21 @@ class _Reader(ast.NodeVisitor):
             for part in node.elts:
                 yield from self._written(part, known=known)
         elif isinstance(node, ast.Constant | ast.JoinedStr | ast.BinOp):
-            yield _text(node)
+            yield _text(node, self.names)
 
 
-def _text(node: ast.expr) -> str:
+def _text(node: ast.expr, names: Mapping[str, Sequence[ast.expr]]) -> str:
+    """What an expression reads; texts that have a name of their own are put in where there is one of that name."""
     if isinstance(node, ast.Constant):
         return str(node.value)
     if isinstance(node, ast.JoinedStr):
-        return "".join(_text(part) for part in node.values)
+        return "".join(_text(part, names) for part in node.values)
     if isinstance(node, ast.FormattedValue):
-        return _text(node.value)
+        return _text(node.value, names)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-        return _text(node.left) + _text(node.right)
+        return _text(node.left, names) + _text(node.right, names)
+    if isinstance(node, ast.Name) and [type(value) for value in names.get(node.id, ())] == [ast.JoinedStr]:
+        return _text(names[node.id][0], {})
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult) and isinstance(node.left, ast.Constant):
         return node.left.value if isinstance(node.left.value, str) else f"<{_place(node)}>"
     return f"<{_place(node)}>"
@@ -220,7 +230,7 @@ def _place(node: ast.expr) -> str:
         owner = [node.func.value] if isinstance(node.func, ast.Attribute) else [node.func]
         return _place([*parts, *owner][0])
     if isinstance(node, ast.IfExp):
-        kinds = [_text(part) for part in (node.body, node.orelse)]
+        kinds = [_text(part, {}) for part in (node.body, node.orelse)]
         return "|".join(kind.strip("<>") for kind in kinds if kind)
     if isinstance(node, ast.Subscript):
         return _place(node.value)

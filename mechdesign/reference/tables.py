@@ -31,14 +31,17 @@ class ColumnText:
     unit: str = ""
     formula: str = ""
 
+    def named(self, name: str) -> re.Match[str] | None:
+        """What the ``<names>`` are where a column of this name is this one; None where it is another."""
+        return next(filter(None, (re.fullmatch(_pattern(own), name) for own in self.name.split(", "))), None)
+
     def says(self, name: str, meaning: str) -> bool:
         """Whether a column of a manifest is this one, with this meaning."""
-        for own in self.name.split(", "):
-            if found := re.fullmatch(_pattern(own), name):
-                told = _PLACE.sub(lambda place: found.groupdict().get(_group(place[1]), place[0]), self.meaning)
-                if re.fullmatch(_pattern(told), meaning):
-                    return True
-        return False
+        found = self.named(name)
+        if found is None:
+            return False
+        told = _PLACE.sub(lambda place: found.groupdict().get(_group(place[1]), place[0]), self.meaning)
+        return re.fullmatch(_pattern(told), meaning) is not None
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -11,6 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from mechdesign.files import proper
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import plain
 from mechdesign.results import Result
@@ -35,7 +37,11 @@ class Extras:
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
-    files = {file.name: hashlib.sha256(text.encode()).hexdigest() for _, file, text in study.inputs()}
+    folder = study.path.parent if study.path is not None else Path()
+    files = {
+        Path(os.path.relpath(file, folder)).as_posix(): hashlib.sha256(text.encode()).hexdigest()
+        for _, file, text in study.inputs()
+    }
     return {
         "tool": {"name": "mechdesign", "version": version("mechdesign")},
         "libraries": {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES},
@@ -87,7 +93,7 @@ def read(directory: Path) -> dict[str, Any] | None:
     """The manifest in a folder, or None where there is none that can be read."""
     try:
         content = json.loads((directory / NAME).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) else None
 
@@ -97,7 +103,7 @@ def recorded_files(content: Mapping[str, Any]) -> dict[str, str]:
     files = content.get("files")
     if not isinstance(files, dict):
         return {}
-    return {name: str(digest) for name, digest in files.items() if Path(name).name == name}
+    return {name: str(digest) for name, digest in files.items() if proper(name)}
 
 
 def is_current(directory: Path, study: Study, command: str, asked: Extras) -> dict[str, Any] | None:

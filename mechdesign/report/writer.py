@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError, explain
-from mechdesign.files import replace
+from mechdesign.files import Transaction, replace, unsettled
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
@@ -55,8 +55,8 @@ def check_writable(directory: Path) -> None:
 def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Extras) -> tuple[str, ...]:
     """Write a result into a directory and return a warning for each picture that could not be drawn.
 
-    Each file appears whole or not at all. The tables come first, with a manifest that vouches for them alone: whatever
-    becomes of the pictures, they are there. Of an interrupted computation no pictures are drawn. Files of an older
+    The tables come first, all of them or none, with a manifest that vouches for them alone: whatever becomes of the
+    pictures, they are there. Of an interrupted computation no pictures are drawn. Files of an older
     result that the new one does not have are removed, so that the directory never shows two results at once.
 
     Raises
@@ -68,16 +68,16 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
         f"{table.name}.csv": map(str.encode, csv_blocks(table)) for table in result.tables.values()
     }
     files |= {name: (text.encode(),) for name, text in result.files.items()}
-    stale = manifest.recorded_files(manifest.read(directory) or {}).keys() - files.keys()
+    stale = manifest.recorded_files(manifest.read(directory) or {}).keys() | unsettled(directory)
     pages.remove(directory / pages.REPORT)
     warnings: tuple[str, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        digests = {name: replace(directory / name, blocks) for name, blocks in files.items()}
-        for name in stale:
-            (directory / name).unlink(missing_ok=True)
         tables = dataclasses.replace(asked, plots=False, animate=False, report=False)
-        replace(directory / manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
+        with Transaction(directory) as written:
+            digests = {name: written.stage(name, blocks) for name, blocks in files.items()}
+            written.stage(manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
+            written.commit(stale, voucher=manifest.NAME)
         drawn: dict[str, bytes] = {}
         plots = asked.plots and not result.interrupted
         if plots:
@@ -90,9 +90,11 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
             part, warnings = section.section(study, result, inline, mechanism, warnings, plots=asked.plots)
             drawn[section.NAME] = section.encoded(part)
         if drawn or plots:
-            digests |= {name: replace(directory / name, [data]) for name, data in drawn.items()}
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
-            replace(directory / manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
+            with Transaction(directory) as written:
+                digests |= {name: written.stage(name, [data]) for name, data in drawn.items()}
+                written.stage(manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
+                written.commit(voucher=manifest.NAME)
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
     return warnings

@@ -171,7 +171,7 @@ def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> 
 
 def _path(path: Mapping[str, paths.PathSection], folder: Folder) -> Poses:
     if not path:
-        raise StudyError("an empty path")
+        raise StudyError("an empty path; give its points, [[x, y], ...]")
     columns: dict[str, Floats] = {}
     found: dict[str, paths.PointPath] = {}
     for name, given in path.items():

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from helpers.pages import faults
-from helpers.tables import said
+from helpers.tables import unsaid
 from matplotlib.figure import Figure
 
 from mechdesign.commands import COMMANDS
@@ -66,7 +66,7 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
         folder = tmp_path / command
         manifest = json.loads((folder / "manifest.json").read_text())
         assert not manifest["failed"]
-        assert not said(manifest)[1], "mechdesign/reference/tables.yaml says otherwise"
+        assert unsaid(manifest) == []
         assert not [warning for warning in manifest["warnings"] if "could not be drawn" in warning]
         files = {path.name for path in folder.iterdir()}
         assert files == {*manifest["files"], "manifest.json"}

@@ -74,7 +74,7 @@ def test_words_are_found_by_path_by_last_part_by_kind_and_in_any_case():
     assert words("mechanism.joints.guide.angle") == words("mechanism.joints.angle") == ["mechanism.joints.*.angle"]
     assert words("pin") == ["reliability.clearances.*.pin"]
     assert set(words("angle")) == {
-        "units.angle", *(f"mechanism.{part}.*.angle" for part in ("joints", "drives", "measures", "limits"))
+        "angle", "units.angle", *(f"mechanism.{part}.*.angle" for part in ("joints", "drives", "measures", "limits"))
     }  # fmt: skip
     assert words("gii") == ["GII"]
     assert words("sigma_min_mean") == ["*_mean"]
@@ -88,7 +88,8 @@ def test_words_are_found_by_path_by_last_part_by_kind_and_in_any_case():
 def test_what_is_said_of_a_word():
     (pin,) = find(ENTRIES, "pin")
     assert [word for word, _ in pin.words] == ["normal", "normal_in_disc", "uniform", "contact"]
-    (index,) = find(ENTRIES, "inverse_condition")
+    index, column = find(ENTRIES, "inverse_condition")
+    assert column.where == ("motion.csv",)
     assert (index.source, index.unit) == ("S1, eq. 23", "Pure number")
     assert "sigma_min/sigma_max" in index.formula
     (clearances,) = find(ENTRIES, "reliability.clearances")

@@ -233,7 +233,7 @@ QUESTIONS = [
     ("reliability: {samples: 0}", "must be at least 2, not 0"),
     ("reliability: {samples: many}", "unknown name 'many'"),
     ("reliability: {correlation: [[r, theta, 1]]}", "a correlation lies between -1 and 1, not 1"),
-    ("reliability: {correlation: [[r, r, 0.1]]}", "'r' is correlated with itself"),
+    ("reliability: {correlation: [[r, r, 0.1]]}", "'r' is correlated with itself; name two different ones"),
     ("reliability: {correlation: [[r, 0.1]]}", "a correlation is [name, name, coefficient]"),
     ("reliability: {dimensions: {r: 1}, correlation: [[r, theta, 0.1]]}", "no varying dimension 'theta'"),
     ("reliability: {allocate: {reliability: 1}}", "a reliability lies between 0 and 1, not 1"),

@@ -136,7 +136,8 @@ class Evaluator:
         """Find the tables of a command's goals, before anything is computed but the study's own design."""
         goals = [each for each in self.goals if each.command == command and not each.regional]
         if command == "optimize":
-            yield self.study.problem("an optimisation cannot judge itself", *self._keys.get(goals[0], ()))
+            mistake = "an optimisation cannot judge itself; name a result of another command"
+            yield self.study.problem(mistake, *self._keys.get(goals[0], ()))
             return
         assert self.study.optimize is not None
         together = command in stacked.TABLES and stacked.possible(self.study, command, self.study.optimize.variables)

@@ -125,7 +125,7 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     assert section is not None
     (start, stop), margin = found[0].scan, section.margin * study.units.angle_factor
     if stop - start <= 2 * margin:
-        raise problem(study, "margin", "the margin leaves nothing of the scan")
+        raise problem(study, "margin", "the margin leaves nothing of the scan; give a smaller one")
     integrate_by = section.integrate
     if "tolerance" in integrate_by.model_fields_set:
         tolerance = integrate_by.tolerance

@@ -231,7 +231,8 @@ def _drives(builder: Builder) -> dict[str, Drive]:
             if right and kind == "angle":
                 right = builder.check_name(reference, builder.section.links, "link", ("drives", name, "from"))
                 if reference == item:
-                    builder.report(("drives", name, "from"), "the angle of a link from itself never changes")
+                    mistake = "the angle of a link from itself never changes; name another link"
+                    builder.report(("drives", name, "from"), mistake)
         if right:
             found[name] = Drive(name, kind, item, reference)
     return found

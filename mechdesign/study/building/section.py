@@ -109,7 +109,7 @@ class Link(fields.Model):
             if self.length is not None or self.telescopic:
                 raise failure("a length belongs to a link with 'from' and 'to'")
             if not self.points:
-                raise failure("a link needs at least one point")
+                raise failure("a link needs at least one point, such as {A: [0, 0]}")
         elif self.from_ == self.to:
             raise failure(f"a link from {self.from_!r} to itself")
         elif self.telescopic and self.length is not None:

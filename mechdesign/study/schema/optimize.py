@@ -207,7 +207,7 @@ def _weights_that_choose(row: tuple[float, ...]) -> tuple[float, ...]:
     if any(weight < 0 for weight in row):
         raise failure("a weight is not negative: name the goal under 'minimize' instead of 'maximize', or the reverse")
     if row and not any(row):
-        raise failure("all weights are zero: no design would be better than another")
+        raise failure("all weights are zero: no design would be better than another; give one that is positive")
     return row
 
 

@@ -81,7 +81,7 @@ def _through(raw: Any, context: Context) -> tuple[tuple[float, ...], ...]:
     rule = "a list of [x, y] (of a point) or a list of numbers, not a mixture, is expected"
     if not isinstance(raw, list):
         return read_rows([raw], context, 1, rule, "")
-    return read_rows(raw, context, 2, rule, "an empty path")
+    return read_rows(raw, context, 2, rule, "an empty path; give its points, [[x, y], ...]")
 
 
 class PathSection(fields.Model):

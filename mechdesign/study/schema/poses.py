@@ -61,7 +61,7 @@ def _poses(raw: Any) -> Any:
     if raw == "workspace":
         return ()
     if isinstance(raw, list) and not raw:
-        raise failure("an empty list of poses")
+        raise failure("an empty list of poses; give one or more, such as [{theta: 30}]")
     return raw
 
 

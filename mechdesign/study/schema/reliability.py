@@ -160,7 +160,7 @@ def _correlation(raw: Any, context: Context) -> Correlated:
     if abs(coefficient) >= 1.0:
         raise failure(f"a correlation lies between -1 and 1, not {coefficient:g}; what is the same is one parameter")
     if raw[0] == raw[1]:
-        raise failure(f"{raw[0]!r} is correlated with itself")
+        raise failure(f"{raw[0]!r} is correlated with itself; name two different ones")
     return Correlated(raw[0], raw[1], coefficient)
 
 
@@ -238,7 +238,7 @@ class ReliabilitySection(MotionSection):
         pairs = [frozenset(pair[:2]) for pair in self.correlation]
         for index, pair in enumerate(pairs):
             if pair in pairs[:index]:
-                checker.report(("reliability", "correlation", index), "this pair is given twice")
+                checker.report(("reliability", "correlation", index), "this pair is given twice; leave one out")
         if not self.methods:
             checker.report(("reliability", "methods"), "name at least one method")
         for index, method in enumerate(self.methods):
@@ -261,7 +261,7 @@ class ReliabilitySection(MotionSection):
         plain = {name: split_link(checker.mechanism, name)[1] for name in (*(self.outputs or ()), *self.limits)}
         limits = {plain[name]: limit for name, limit in self.limits.items()}
         if len(limits) < len(self.limits):
-            checker.report(("reliability", "limits"), "the same error is limited twice")
+            checker.report(("reliability", "limits"), "the same error is limited twice; leave one out")
         outputs = None if self.outputs is None else tuple(plain[name] for name in self.outputs)
         checker.outputs(outputs, ("reliability", "outputs"))
         filled = {"dimensions": dimensions, "clearances": clearances, "load": load}

@@ -124,12 +124,13 @@ class WorkspaceSection(fields.Model):
         checker.coordinates(self.at, (*root, "at"))
         ranges = [name for name, values in self.at.items() if isinstance(values, Over)]
         if len(ranges) > 1:
-            checker.report((*root, "at", ranges[1]), "only one held coordinate can range", at_key=True)
+            mistake = "only one held coordinate can range; give the others single values"
+            checker.report((*root, "at", ranges[1]), mistake, at_key=True)
         for name, values in self.at.items():
             if isinstance(values, Over):
                 checker.range(values.from_, values.to, (*root, "at", name))
             elif not values:
-                checker.report((*root, "at", name), "an empty list of values")
+                checker.report((*root, "at", name), "an empty list of values; give one or more, such as [0, 15]")
         for index, name in enumerate(self.indices or ()):
             checker.needs(needed_section(name), f"the index {name!r}", (*root, "indices", index))
         if (self.scan.from_ is None) != (self.scan.to is None):

@@ -252,7 +252,7 @@ def _unit(unit: str) -> tuple[Powers, float]:
     angle, time = dimensions.get("[angle]", 0), dimensions.get("[time]", 0)
     exponents = (length - mass, angle, time + 2 * mass, mass)
     if any(exponent != int(exponent) for exponent in exponents):
-        raise QuantityError(f"the unit {unit!r} has a broken power")
+        raise QuantityError(f"the unit {unit!r} has a broken power; powers are whole, as in mm^2")
     # The registry's base of mass is the gram.
     return tuple(map(int, exponents)), float(base.magnitude) * 1e-3**mass
 

@@ -1,0 +1,52 @@
+"""Mistakes and warnings as GitHub shows them beside the lines of a change, where it is GitHub that runs the command."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+
+from mechdesign.cli import terminal
+from mechdesign.errors import MechdesignError, Problem, StudyError
+from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.study import Study
+
+# https://docs.github.com/en/actions/reference/workflow-commands-for-github-actions
+_DATA = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
+_PROPERTY = _DATA | str.maketrans({":": "%3A", ",": "%2C"})
+
+
+def annotate(level: str, problems: Iterable[Problem]) -> None:
+    """Say an ``error`` or ``warning`` on stderr for each problem, if GitHub listens."""
+    if os.environ.get("GITHUB_ACTIONS") != "true":
+        return
+    for problem in problems:
+        # A text that is no file has a name in brackets.
+        file = "" if problem.file.startswith("<") else problem.file
+        place = {"file": file, "line": problem.line or "", "col": problem.column or ""}
+        where = ",".join(f"{name}={str(value).translate(_PROPERTY)}" for name, value in place.items() if value)
+        message = ": ".join(filter(None, (problem.key, problem.message)))
+        terminal.say(f"::{level}{' ' * bool(where)}{where}::{message.translate(_DATA)}")
+
+
+def of_error(error: Exception, message: str, study: Study | None = None) -> Sequence[Problem]:
+    """What went wrong, with its places where it has any, else that of the study's file."""
+    if isinstance(error, StudyError) and any(problem.file for problem in error.problems):
+        return error.problems
+    file = str(study.path) if study is not None and study.path is not None else ""
+    return [Problem(str(error) if isinstance(error, MechdesignError) else message, file=file)]
+
+
+def of_verdicts(study: Study, command: str, verdicts: Sequence[Verdict]) -> Iterator[Problem]:
+    """The requirements of a command that are not met, with their places in the study."""
+    own = [index for index, each in enumerate(study.requirements) if command_of(each) == command]
+    for index, verdict in zip(own, verdicts, strict=True):
+        if not verdict.met:
+            yield study.problem(f"requirement: {verdict}", "requirements", index)
+
+
+def of_warnings(study: Study, command: str, warnings: Sequence[str]) -> Iterator[Problem]:
+    """Warnings of a command with their places; what the study's file is warned of stands there."""
+    known = {str(problem): problem for problem in study.warnings}
+    for warning in warnings:
+        file = str(study.path) if study.path is not None else ""
+        yield known.get(warning) or Problem(f"{study.label}: {command}: {warning}", file=file)

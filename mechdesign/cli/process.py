@@ -1,0 +1,125 @@
+"""The process of a command: its signals, and streams that cannot fail it. Imports nothing heavy."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+from collections.abc import Callable
+from types import FrameType
+from typing import Any, TextIO
+
+# Of interrupts, on systems that have them.
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+_BY_SIGNAL = 128  # exit code of a process that a signal ended, less the signal's number
+_RETRY = 0.02  # seconds until an interrupt that came amiss is tried again
+
+
+def run(command: Callable[[], Any]) -> None:
+    """Call a command and exit with its code; a signal's is 128 and its number.
+
+    Not in a library's process: signals and streams become the command's.
+    """
+    _open_streams()
+    signals = Signals()
+    code: Any = 0
+    try:
+        try:
+            command()
+        finally:
+            signals.ignore()
+    except KeyboardInterrupt:
+        signals.ignore()
+        print("interrupted", file=sys.stderr)
+        code = _BY_SIGNAL + signal.SIGINT
+    except SystemExit as end:
+        code = end.code
+    if code and signals.number is not None:
+        code = _BY_SIGNAL + signals.number
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    sys.exit(code)
+
+
+class Signals:
+    """Interrupts, terminations and hang-ups are all a KeyboardInterrupt, at the first place that is fit for one.
+
+    Inside an import or a finaliser it would be lost or become another error. A signal that was ignored from the start
+    (``nohup``) stays so. The second Ctrl-C interrupts again; the second of the others is that of ``timeout``, which
+    sends it to the process and to its group.
+    """
+
+    def __init__(self) -> None:
+        self.number: int | None = None  # of the signal that came first
+        self._heard = [each for each in SIGNALS if signal.getsignal(each) is not signal.SIG_IGN]
+        for each in self._heard:
+            signal.signal(each, self._hear)
+        if hasattr(signal, "SIGALRM"):
+            signal.signal(signal.SIGALRM, self._interrupt)
+
+    def ignore(self) -> None:
+        """The command is done: what comes now changes nothing."""
+        for each in self._heard:
+            signal.signal(each, signal.SIG_IGN)
+        if hasattr(signal, "SIGALRM"):
+            signal.signal(signal.SIGALRM, signal.SIG_IGN)
+
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        if self.number is None or number == signal.SIGINT:
+            self.number = self.number or number
+            self._interrupt(number, frame)
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        if hasattr(signal, "SIGALRM") and _unfit(frame):
+            signal.setitimer(signal.ITIMER_REAL, _RETRY)
+        else:
+            raise KeyboardInterrupt
+
+
+def _unfit(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib") or frame.f_code.co_name == "__del__":
+            return True
+        frame = frame.f_back
+    return False
+
+
+class _Unfailing(io.FileIO):
+    """A stream whose reader may have gone, or whose disk may be full; the first error but a closed pipe is told."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number, "w", closefd=False)
+        self._failed = False
+
+    def write(self, data: Any) -> int:
+        if not self._failed:
+            try:
+                return super().write(data) or 0
+            except OSError as error:
+                self._failed = True
+                if self.fileno() == 1 and not isinstance(error, BrokenPipeError):
+                    print(f"warning: standard output is not whole: {error.strerror}", file=sys.stderr)
+        return memoryview(data).nbytes
+
+
+def _open_streams() -> None:
+    """Put streams that cannot fail in place of the standard ones; a closed one leads nowhere.
+
+    A name in a study must not fail either, on a terminal that lacks its letters.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # Else the next file that is opened would be this stream.
+            os.open(os.devnull, os.O_RDWR)
+    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115
+    sys.stdout, sys.stderr = _stream(1, sys.stdout), _stream(2, sys.stderr)
+
+
+def _stream(number: int, old: TextIO | None) -> TextIO:
+    encoding = old.encoding if old is not None else "utf-8"
+    buffer = io.BufferedWriter(_Unfailing(number))
+    at_once = number == 2 or buffer.isatty()
+    return io.TextIOWrapper(buffer, encoding, errors="replace", line_buffering=at_once)

@@ -1,0 +1,366 @@
+"""Faults of processes and files: signals, streams that fail, full disks, two runs in one folder."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import platform
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mechdesign.files import Transaction
+from mechdesign.results import Column, Result, Table
+
+from .conftest import SLIDER, answer
+from .test_optimize_resume import METHODS, STUDY
+
+if sys.platform != "linux":
+    pytest.skip("processes are looked at in /proc", allow_module_level=True)
+
+ARM = STUDY.replace("METHOD", "grid").replace("NUMBER", METHODS["grid"].replace("40", "3000"))
+COMMAND = [sys.executable, "-m", "mechdesign"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.yaml").write_text(ARM)
+    (tmp_path / "slider.yaml").write_text(SLIDER)
+    return tmp_path
+
+
+def children(pid):
+    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def until(condition, seconds=30.0):
+    """Wait for a condition, and give what it gives."""
+    end = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < end
+        time.sleep(0.005)
+    return found
+
+
+def alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+def test_workers_end_with_their_parent(here, number):
+    command = [*COMMAND, "optimize", "arm.yaml", "--no-plots", "--jobs", "2", "--out", "out"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        workers = until(lambda: len(found := children(process.pid)) == 2 and found)
+        time.sleep(0.3)
+        process.send_signal(number)
+        # Ends when nobody holds the other end.
+        told = process.stderr.read()
+        code = process.wait(30)
+    until(lambda: not any(map(alive, workers)), 5)
+    if number == signal.SIGKILL:
+        assert code == -number
+    else:
+        assert code == 128 + number
+        assert "interrupted" in told
+    assert "Traceback" not in told
+    assert not [path for path in here.rglob("*") if ".tmp" in path.name]
+
+
+def hears(pid):
+    """Whether a process handles SIGTERM, as Python does by itself not."""
+    caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{pid}/status").read_text())
+    return int(caught[1], 16) >> (signal.SIGTERM - 1) & 1
+
+
+@pytest.mark.parametrize("module", ["", "_multiarray_umath", "pydantic_core"])
+def test_an_interrupt_during_imports(here, module):
+    """It comes while a module is loaded, which its library in the memory shows."""
+    command = [*COMMAND, "kinematics", "slider.yaml", "--no-plots"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        until(lambda: hears(process.pid))
+        until(lambda: process.poll() is not None or module in Path(f"/proc/{process.pid}/maps").read_text())
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=30)
+    assert process.returncode in (0, 130)
+    assert "Traceback" not in told
+    assert "rror" not in told
+
+
+BAD = ("closed", "full", "broken")
+
+
+@pytest.mark.parametrize("stream", [1, 2])
+@pytest.mark.parametrize("how", BAD)
+def test_no_stream_can_fail_a_run(here, stream, how):
+    def spoil():
+        if how == "closed":
+            os.close(stream)
+        elif how == "full":
+            os.dup2(os.open("/dev/full", os.O_WRONLY), stream)
+        else:
+            reader, writer = os.pipe()
+            os.close(reader)
+            os.dup2(writer, stream)
+
+    (here / "wrong.yaml").write_text(SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]"))
+    command = [*COMMAND, "run", "slider.yaml", "wrong.yaml", "--no-plots", "--junit", "junit.xml"]
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=spoil, check=False)
+    assert done.returncode == 2
+    assert 'tests="2"' in (here / "junit.xml").read_text()
+    assert (here / "results/slider/kinematics/manifest.json").exists()
+    if stream == 2:
+        assert done.stdout.startswith("study,command")
+    else:
+        assert "wrong.yaml:6:19" in done.stderr
+        assert "Traceback" not in done.stderr
+        assert ("not whole" in done.stderr) == (how == "full")
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def forked(call):
+    """Process that calls a function with what this one has imported, and says nothing."""
+    pid = os.fork()
+    if not pid:
+        try:
+            call()
+        finally:
+            os._exit(9)
+    return pid
+
+
+def table(value, columns=3):
+    """A result of several tables, large enough to be cut off in."""
+    names = [f"t{k}" for k in range(columns)]
+    made = {name: Table(name, (Column("x", np.full(20_000, float(value))),)) for name in names}
+    return Result("kinematics", made)
+
+
+def test_a_kill_at_any_instant_leaves_whole_files(here, analysis, invoke):
+    """Old results of other tables are there; the resumed ones are those of an undisturbed run."""
+    arguments = ("kinematics", "slider.yaml", "--no-plots", "--quiet", "--out")
+    analysis(lambda study, **options: table(study.seed, 5 - study.seed))
+    begun = time.monotonic()
+    invoke(*arguments, "new", "--seed", 2)
+    took = time.monotonic() - begun
+    new = contents(here / "new")
+    broken = []
+    for part in np.random.default_rng(1).random(8):
+        shutil.rmtree(here / "out", ignore_errors=True)
+        invoke(*arguments, "out", "--seed", 1)
+        old = contents(here / "out")
+        pid = forked(lambda: invoke(*arguments, "out", "--seed", 2))
+        time.sleep(part * took)
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        left = contents(here / "out")
+        for name, data in left.items():
+            assert name.startswith(".") or data in (old.get(name), new.get(name)), name
+        if "manifest.json" in left:
+            whole = {name: data for name, data in left.items() if not name.startswith(".")}
+            assert whole in (old, new)
+        broken.append({*left} - {*old})
+        assert invoke(*arguments, "out", "--seed", 2).exit_code == 0
+        assert contents(here / "out") == new
+    assert any(broken)
+
+
+@pytest.mark.parametrize("instant", range(0, 10, 2))
+def test_a_kill_between_two_files(here, analysis, invoke, monkeypatch, instant):
+    """The n-th step on the way of files into place is the last one."""
+    arguments = ("run", "slider.yaml", "--no-plots", "--quiet", "--resume", "--out")
+    analysis(lambda study, **options: table(study.seed, 5 - study.seed))
+    invoke(*arguments, "new", "--seed", 2)
+    invoke(*arguments, "out", "--seed", 1)
+    old, new = contents(here / "out"), contents(here / "new")
+    steps = []
+
+    def last(step):
+        def counted(*given, **options):
+            if len(steps) == instant:
+                os.kill(os.getpid(), signal.SIGKILL)
+            steps.append(step)
+            return step(*given, **options)
+
+        return counted
+
+    def killed():
+        os.replace, Path.unlink = last(os.replace), last(Path.unlink)
+        invoke(*arguments, "out", "--seed", 2)
+
+    os.waitpid(forked(killed), 0)
+    left = contents(here / "out")
+    assert "manifest.json" not in left or {name: left[name] for name in left if name[0] != "."} in (old, new)
+    assert invoke(*arguments, "out", "--seed", 2).exit_code == 0
+    assert contents(here / "out") == new
+
+
+def test_a_full_disk_leaves_the_old_results(here, analysis, invoke, monkeypatch):
+    analysis(lambda study, **options: table(study.seed))
+    arguments = ("run", "slider.yaml", "--no-plots", "--out", "out", "--seed")
+    assert invoke(*arguments, 1).exit_code == 0
+    old = contents(here / "out")
+    stage = Transaction.stage
+
+    def full(self, name, blocks):
+        def some():
+            yield next(iter(blocks))
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        return stage(self, name, some() if name == "t1.csv" else blocks)
+
+    monkeypatch.setattr(Transaction, "stage", full)
+    done = invoke(*arguments, 2, "--junit", "junit.xml")
+    assert done.exit_code == 4
+    assert "results could not be written: No space left on device" in done.stderr
+    assert "No space left" in (here / "junit.xml").read_text()
+    assert contents(here / "out") == old
+
+
+def test_a_folder_is_of_one_process(here, analysis, invoke):
+    """While one run computes another is told who it is; a killed one is in nobody's way."""
+    reader, writer = os.pipe()
+
+    def slow(study, **options):
+        os.write(writer, b"x")
+        time.sleep(60)
+
+    quick = table(1)
+    analysis(slow)
+    arguments = ("run", "slider.yaml", "--no-plots", "--out", "out")
+    pid = forked(lambda: invoke(*arguments))
+    os.read(reader, 1)
+    (here / "out/kinematics/.t0.csv.99999999.tmp").write_text("half")
+    analysis(lambda study, **options: quick)
+    done = invoke(*arguments)
+    assert done.exit_code == 4
+    assert f"process {pid} on {platform.node()} writes there" in done.stderr
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    assert invoke(*arguments).exit_code == 0
+    assert set(contents(here / "out")) == {"t0.csv", "t1.csv", "t2.csv", "manifest.json"}
+
+
+@pytest.mark.parametrize(
+    "damage", ["", "[]", "{}", "[" * 100_000, '{"files": {"..": "", "": "", "a\\u0000b": ""}}', "tables", "bytes"]
+)
+def test_a_damaged_manifest_is_no_manifest(here, analysis, invoke, damage):
+    analysis(lambda study, **options: table(1))
+    arguments = ("run", "slider.yaml", "--no-plots", "--resume", "--out", "out")
+    invoke(*arguments)
+    whole = contents(here / "out")
+    path = here / "out/kinematics/manifest.json"
+    if damage == "tables":
+        damage = json.dumps({key: value for key, value in json.loads(path.read_text()).items() if key != "tables"})
+    path.write_bytes(b"\xff" if damage == "bytes" else damage.encode())
+    done = invoke(*arguments)
+    assert done.exit_code == 0, done.stderr
+    assert "kept" not in done.stdout
+    assert contents(here / "out") == whole
+
+
+def test_folders_and_patterns(here, invoke):
+    (here / "deep").mkdir()
+    for name in ("b", "a", "c"):
+        (here / f"deep/{name}.yaml").write_text(SLIDER)
+    (here / "deep/notes.txt").write_text("none")
+    done = invoke("run", "deep", "deep/[ab].yaml", "deep/c.yaml", "--no-plots", "--out", "out")
+    assert done.exit_code == 0, done.stderr
+    assert [row.split(",")[0] for row in done.stdout.splitlines()] == ["study", "a", "b", "c"]
+    assert (here / "out/summary.csv").read_text() == done.stdout
+    (here / "empty").mkdir()
+    for nothing in ("empty", "deep/*.yml"):
+        done = invoke("run", nothing)
+        assert (done.exit_code, "no studies" in done.stderr) == (2, True)
+
+
+def test_failures_are_told_at_the_end_and_to_github(here, analysis, invoke, monkeypatch):
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    analysis(lambda study, **options: answer(warnings=["50 % play, mind the gap"]))
+    gate = "requirements:\n  - {result: kinematics.theta, at_least: 0}\n  - {result: kinematics.theta, at_most: 80}\n"
+    (here / "gate.yaml").write_text(SLIDER + gate)
+    (here / "wrong.yaml").write_text(SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]"))
+    done = invoke("run", "gate.yaml", "wrong.yaml", "slider.yaml", "--no-plots", "--quiet")
+    assert done.exit_code == 2
+    lines = done.stderr.splitlines()
+    assert any(line.startswith("::error file=wrong.yaml,line=6,col=19::mechanism.links.crank") for line in lines)
+    assert any(line.startswith("::error file=gate.yaml,line=16,col=") and "theta at most 80" in line for line in lines)
+    assert "::warning file=gate.yaml::gate: kinematics: 50 %25 play, mind the gap" in lines
+    at = lines.index("failed: 2 of 3 questions")
+    assert [line.split(":")[0].strip() for line in lines[at + 1 :]] == ["wrong", "gate"]
+
+
+def test_inputs_of_one_name_are_told_apart(here, invoke):
+    """Results are kept by what the files hold, each of them."""
+    for name in ("one", "two"):
+        (here / name).mkdir()
+        (here / name / "line.csv").write_text("P.x,P.y\n6,4\n5,5\n")
+    text = STUDY[: STUDY.index("kinematics:")] + "kinematics:\n  path: {P.x: one/x.csv, P.y: two/x.csv}\n"
+    for name in ("one", "two"):
+        (here / name / "x.csv").write_text("6\n5\n")
+    (here / "two_inputs.yaml").write_text(text)
+    arguments = ("run", "two_inputs.yaml", "--no-plots", "--resume")
+    assert invoke(*arguments).exit_code == 0
+    assert "kept" in invoke(*arguments).stdout
+    for name in ("one", "two"):
+        (here / name / "x.csv").write_text("6\n4\n")
+        assert "kept" not in invoke(*arguments).stdout
+
+
+def test_a_poor_environment(here):
+    """No home, no locale, few files: names of other letters stay whole on the disk."""
+    (here / "größe.yaml").write_text("name: Größe → µm\n" + SLIDER.partition("\n")[2], encoding="utf-8")
+    command = [*COMMAND, "run", "größe.yaml", "slider.yaml", "--out", "aus/größe", "--jobs", "4"]
+
+    def few():
+        resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+
+    done = subprocess.run(command, env={"LC_ALL": "C"}, capture_output=True, preexec_fn=few, check=False)
+    assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
+    manifest = json.loads((here / "aus/größe/größe/kinematics/manifest.json").read_text(encoding="utf-8"))
+    assert manifest["study"]["name"] == "Größe → µm"
+    assert any(name.endswith(".png") for name in manifest["files"])
+
+
+def test_places_that_are_no_folders(here, invoke):
+    (here / "loop").symlink_to("loop")
+    for out in ("slider.yaml", "slider.yaml/deep", "loop", "loop/deep"):
+        done = invoke("run", "slider.yaml", "--no-plots", "--out", out)
+        assert done.exit_code == 4, out
+        assert "results cannot be written there" in done.stderr
+        assert "internal" not in done.stderr
+    assert invoke("run", "loop/slider.yaml").exit_code == 2
+    assert invoke("run", "slider.yaml", "--jobs", 100_000).exit_code == 2
+    assert (here / "slider.yaml").read_text() == SLIDER
+
+
+def test_a_study_that_is_edited_while_it_runs(here, analysis, invoke):
+    """The results are those of the text that was read, and say so."""
+
+    def edit(study, **options):
+        (here / "slider.yaml").write_text(SLIDER + "# edited\n")
+        return table(1)
+
+    analysis(edit)
+    arguments = ("run", "slider.yaml", "--no-plots", "--resume", "--out", "out")
+    assert invoke(*arguments).exit_code == 0
+    told = json.loads((here / "out/kinematics/manifest.json").read_text())
+    assert told["study"]["sha256"] == hashlib.sha256(SLIDER.encode()).hexdigest()
+    assert "kept" not in invoke(*arguments).stdout
+    assert "kept" in invoke(*arguments).stdout
