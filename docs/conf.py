@@ -28,8 +28,14 @@ myst_heading_anchors = 3
 
 html_theme = "furo"
 html_title = "mechdesign"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
+napoleon_use_param = False
+napoleon_use_rtype = False
+autodoc_class_signature = "separated"
+autodoc_preserve_defaults = True

@@ -130,10 +130,10 @@ def _yaml(page: Page, body: str, where: int) -> None:
             if file.suffix == ".yaml" and "mechanism:" in page.study:
                 mechdesign.load(file)
         else:
-            (page.folder / "part.yaml").write_text(
-                yaml.safe_dump(merged(yaml.safe_load(page.study) or {}, yaml.safe_load(text))), encoding="utf-8"
-            )
-            mechdesign.load(page.folder / "part.yaml")
+            study = merged(yaml.safe_load(page.study) or {}, yaml.safe_load(text))
+            part = page.folder / "part.yaml"
+            part.write_text(yaml.safe_dump(study, sort_keys=False), encoding="utf-8")
+            mechdesign.load(part)
     except (MechdesignError, yaml.YAMLError) as error:
         page.fail(where, str(error))
 
@@ -181,7 +181,8 @@ def _run(path: Path) -> tuple[str, list[str]]:
 def pages(names: Iterable[str] = ()) -> list[Path]:
     """Pages with examples: those named, or all."""
     return [Path(name).resolve() for name in names] or [
-        path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.md"))
+        *sorted(ROOT.glob("*.md")),
+        *(path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.md"))),
     ]
 
 

@@ -22,7 +22,7 @@ GROUPS = {
                "rrr_platform", "rrr_orientations"),
     "Reliability": ("two_link_arm", "two_link_arm_uniform", "slider_crank_tolerances", "function_generator_made",
                     "bored_in_one_setting", "cheapest_tolerances", "one_in_a_billion", "five_bar_precision_map"),
-    "Stiffness": ("planar_3rpr", "planar_2rpr_rp", "planar_rp_rr", "press_stiffness", "loaded_arm"),
+    "Stiffness": ("planar_3rpr", "planar_2rpr_rp", "planar_rp_rr", "press_stiffness", "stiffness_map", "loaded_arm"),
 }  # fmt: skip
 # The picture that says most, where there are several; paths of a group without one.
 PICTURES = ("optimum", "allocation", "deflections", "failure_map", "density_contours", "springs", "workspace", "paths",

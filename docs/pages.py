@@ -6,13 +6,15 @@ from pathlib import Path
 
 import examples
 import gallery
+import lists
+import papers
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.typing import ExtensionMetadata
 
 ROOT = Path(__file__).parent
 # What makes pages: functions that give their texts by their paths.
-MAKERS = (gallery.pages,)
+MAKERS = (gallery.pages, lists.pages, papers.pages)
 
 
 def write(app: Sphinx) -> None:

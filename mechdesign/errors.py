@@ -6,8 +6,11 @@ Each class maps to one exit code of the command line (`exit_code`).
 from __future__ import annotations
 
 import difflib
+import re
 import traceback
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,11 +29,65 @@ EXIT_CODES = {
 }
 
 
+# Mistakes that a message lists, the names of one study that are compared with those known, and the characters of a
+# text that a message repeats.
+MAX_LISTED = 100
+MAX_COMPARED = 20
+MAX_ECHO = 60
+
+_compared: ContextVar[set[str] | None] = ContextVar("names compared", default=None)
+_QUOTED = re.compile(r"""(?<!\w)(?:'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*")""", re.DOTALL)
+_LONG_SEGMENT = re.compile(rf"[^.]{{{MAX_ECHO + 1},}}")
+
+
+@contextmanager
+def few_comparisons() -> Iterator[None]:
+    """Within, `nearest` looks for the first `MAX_COMPARED` names only: of thousands it would take minutes."""
+    token = _compared.set(set())
+    try:
+        yield
+    finally:
+        _compared.reset(token)
+
+
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name that resembles this one most, None where none does."""
+    compared = _compared.get()
+    if compared is not None:
+        if len(compared) >= MAX_COMPARED and name not in compared:
+            return None
+        compared.add(name)
     folded = {candidate.casefold(): candidate for candidate in known}
     close = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.6)
     return folded[close[0]] if close else None
+
+
+def printable(text: str) -> str:
+    """A text in one line, without characters that a terminal, an XML or a CSV file would take for more than letters.
+
+    Those of control, of direction, and of no meaning are written as escapes, such as ``\\x1b``.
+    """
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def printable_lines(text: str) -> str:
+    """The same of a text of several lines, which it keeps."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
+def cut(text: str, most: int = MAX_ECHO) -> str:
+    """A text that is echoed in a message, at most this long."""
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def _brief(message: str) -> str:
+    """A message in one line, in which quoted texts are cut."""
+
+    def shorter(found: re.Match[str]) -> str:
+        text = found[0]
+        return text if len(text) <= MAX_ECHO + 2 else cut(text[:-1], MAX_ECHO + 1) + text[-1]
+
+    return printable(_QUOTED.sub(shorter, message))
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
@@ -59,17 +116,18 @@ class MechdesignError(Exception):
 class Problem:
     """One mistake in a study: where it stands and what would mend it."""
 
-    message: str
-    key: str = ""
+    message: str  #: what is wrong, and what to write instead
+    key: str = ""  #: path of the key, with points between its words
     file: str = ""
-    line: int = 0
-    column: int = 0
+    line: int = 0  #: from 1; 0 where the study is not a text
+    column: int = 0  #: from 1
 
     def __str__(self) -> str:
-        place = self.file
+        place = printable(self.file)
         if self.line:
             place += f":{self.line}:{self.column}"
-        return ": ".join(part for part in (place, self.key, self.message) if part)
+        key = printable(_LONG_SEGMENT.sub(lambda found: cut(found[0]), self.key))
+        return ": ".join(part for part in (place, key, _brief(self.message)) if part)
 
 
 class StudyError(MechdesignError):
@@ -87,7 +145,9 @@ class StudyError(MechdesignError):
 
     def __init__(self, problems: Sequence[Problem] | str) -> None:
         self.problems = (Problem(problems),) if isinstance(problems, str) else tuple(problems)
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        listed = [str(problem) for problem in self.problems[:MAX_LISTED]]
+        more = len(self.problems) - len(listed)
+        super().__init__("\n".join([*listed, *([f"and {more} more"] if more else [])]))
 
 
 class MechanismError(MechdesignError):
@@ -135,7 +195,7 @@ class Interrupted(KeyboardInterrupt):
 def explain(error: Exception) -> tuple[int, str]:
     """Exit code and message of an exception; what nobody foresaw asks to be reported."""
     if isinstance(error, MechdesignError):
-        return error.exit_code, str(error)
+        return error.exit_code, printable_lines(str(error))
     if isinstance(error, MemoryError):
         return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
     if "BrokenExecutor" in [kind.__name__ for kind in type(error).__mro__]:
@@ -144,5 +204,5 @@ def explain(error: Exception) -> tuple[int, str]:
         frame for frame in traceback.extract_tb(error.__traceback__) if "mechdesign" in Path(frame.filename).parts
     ]
     place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
-    detail = " ".join(str(error).split())
+    detail = printable(" ".join(str(error).split()))
     return 4, f"internal error: {type(error).__name__}: {detail}{place}; please report it, with the study"

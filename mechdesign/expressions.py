@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mechdesign.errors import cut
 from mechdesign.numerics.arrays import Floats
 
 Number = float | Floats
@@ -267,7 +268,7 @@ class _Parser:
             if match is None:
                 rest = text[position:].lstrip()
                 hint = "; powers are written **" if rest.startswith("^") else ""
-                raise ExpressionError(f"{rest[0]!r} has no meaning in the expression {_short(text)!r}{hint}")
+                raise ExpressionError(f"{rest[0]!r} has no meaning in the expression {cut(text)!r}{hint}")
             tokens.append((str(match.lastgroup), match.group(str(match.lastgroup))))
             position = match.end()
         return [*tokens, ("end", "")]
@@ -284,8 +285,8 @@ class _Parser:
     def _unexpected(self) -> ExpressionError:
         kind, token = self._peek()
         if kind == "end":
-            return ExpressionError(f"the expression {_short(self.text)!r} ends too early")
-        return ExpressionError(f"unexpected {token!r} in the expression {_short(self.text)!r}")
+            return ExpressionError(f"the expression {cut(self.text)!r} ends too early")
+        return ExpressionError(f"unexpected {token!r} in the expression {cut(self.text)!r}")
 
     def _operand_chain(self, binding: int) -> None:
         self.depth += 1
@@ -350,9 +351,5 @@ class _Parser:
     def _close(self) -> None:
         if not self._take(")"):
             if self._peek()[0] == "end":
-                raise ExpressionError(f"a parenthesis is not closed in the expression {_short(self.text)!r}")
+                raise ExpressionError(f"a parenthesis is not closed in the expression {cut(self.text)!r}")
             raise self._unexpected()
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -18,12 +18,18 @@ MAX_SHOWN = 8
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Column:
-    """One column of a table."""
+    """One column of a table.
 
-    name: str  # header in the CSV file, fixed by the study format
-    values: NDArray[Any]  # floats, integers, booleans (written as 1 and 0) or strings, one a row
-    unit: str = ""  # as the study declares it; empty for pure numbers and text
-    meaning: str = ""  # one line for the manifest
+    >>> import numpy as np
+    >>> from mechdesign.results import Column
+    >>> Column("P.x", np.array([1.5, 2.5]), "mm", "coordinate of a point")
+    <Column P.x in mm: 2 values>
+    """
+
+    name: str  #: header in the CSV file, fixed by the study format
+    values: NDArray[Any]  #: floats, integers, booleans (written as 1 and 0) or strings, one a row
+    unit: str = ""  #: as the study declares it; empty for pure numbers and text
+    meaning: str = ""  #: one line for the manifest
 
     def __repr__(self) -> str:
         unit = f" in {self.unit}" if self.unit else ""
@@ -41,6 +47,19 @@ class Table:
 
     Iteration gives its rows as dictionaries, so that ``pandas.DataFrame(table)`` is the same table; `to_pandas` has its
     units as well. Polars takes ``polars.DataFrame(table.to_dict())``.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
+    ... kinematics: {poses: [{arm: 0}, {arm: 60}], outputs: [P]}
+    ... ''')
+    >>> motion = mechdesign.kinematics(study).tables["motion"]
+    >>> motion
+    <Table motion: 2 rows of arm, P.x, P.y, conditioning, valid>
+    >>> motion["P.x"].round(6), motion.column("P.x").unit
+    (array([100.,  50.]), 'mm')
+    >>> len(motion.take(motion.where(arm=60)))
+    1
     """
 
     name: str
@@ -127,15 +146,15 @@ class Table:
 class Result:
     """Answer of one command."""
 
-    command: str  # its name in `mechdesign.commands.COMMANDS`
-    tables: Mapping[str, Table]  # named as their files; the first is the main table
-    warnings: Sequence[str] = ()  # what the user must know: poses that failed, near singularities, shared parameters
-    counts: Mapping[str, int] = field(default_factory=dict)  # poses, samples, designs; how many of them were invalid
-    failed: str = ""  # why a pose that a person asked for could not be assembled (exit code 3); tables are whole
-    files: Mapping[str, str] = field(default_factory=dict)  # texts to be written with the tables, by their file names
-    interrupted: str = ""  # how far it came, where it is the finished part of an interrupted computation
-    drawn: Mapping[str, Any] = field(default_factory=dict)  # what pictures show besides: solved poses, springs; by name
-    absent: Mapping[str, str] = field(default_factory=dict)  # columns and tables without values, by name: why
+    command: str  #: its name in `mechdesign.commands.COMMANDS`
+    tables: Mapping[str, Table]  #: named as their files; the first is the main table
+    warnings: Sequence[str] = ()  #: what the user must know, such as poses that failed
+    counts: Mapping[str, int] = field(default_factory=dict)  #: poses, samples, designs; how many of them were invalid
+    failed: str = ""  #: why a pose that a person asked for could not be assembled (exit code 3); tables are whole
+    files: Mapping[str, str] = field(default_factory=dict)  #: texts to be written with the tables, by their file names
+    interrupted: str = ""  #: how far it came, where it is the finished part of an interrupted computation
+    drawn: Mapping[str, Any] = field(default_factory=dict)  #: what pictures show besides, by name
+    absent: Mapping[str, str] = field(default_factory=dict)  #: why columns and tables have no values, by their names
 
     def __repr__(self) -> str:
         tables = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())

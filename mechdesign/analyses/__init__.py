@@ -1,1 +1,1 @@
-"""The four questions, a package each; an analysis is a pure function of the study and a seed."""
+"""The five questions, a package each; an analysis is a pure function of the study and a seed."""

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +69,7 @@ def study_poses(study: Study, section: str) -> Poses:
 
             return workspace_nodes(study)
         if asked is not None:
-            found = expand(asked, study.path.parent if study.path else Path())
+            found = expand(asked, study.folder)
             if found is not None:
                 return found
     return default(study.mechanism.description)

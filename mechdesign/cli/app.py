@@ -18,7 +18,7 @@ from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
     name="mechdesign",
-    help="Design studies of planar mechanisms: one study file, four questions, tables and pictures.",
+    help="Design studies of planar mechanisms: one study file, five questions, tables and pictures.",
     epilog="Exit codes: " + ". ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     add_completion=False,
     no_args_is_help=True,
@@ -104,6 +104,7 @@ _add(
         given.NO_PLOTS,
         given.FORMAT,
         given.STYLE,
+        given.ALLOW_FILES,
     ),
     "Validate only: joints, mobility, plan of solution.",
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",

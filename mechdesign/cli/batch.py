@@ -30,7 +30,7 @@ from mechdesign.cli.execution import (
 )  # fmt: skip
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Interrupted, OutputError, StudyError, counted
+from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable, printable_lines
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
@@ -122,7 +122,8 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             label = study.label
             if not options.quiet:
                 clearances = in_words(study.reliability, study.mechanism.graph)
-                terminal.emit("\n".join([f"{label}: {study.name}", describe(study.mechanism), *clearances, ""]))
+                head = printable(f"{label}: {study.name}")
+                terminal.emit("\n".join([head, describe(study.mechanism), *clearances, ""]))
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS, goals=True)
@@ -294,21 +295,22 @@ def _junit(answers: Sequence[Outcome]) -> str:
 
     report = JUnitXml("mechdesign")
     for study, group in groupby(answers, key=lambda given: given.study):
+        study = printable(study)
         suite, name = TestSuite(study or "mechdesign"), f"mechdesign.{study}".rstrip(".")
         for given in group:
             case = TestCase(given.command or "run", classname=name, time=round(given.seconds, 3))
             if given.exit_code > 1:
-                words = given.failed.splitlines()[0] if given.failed else "failed"
-                error = Error(words, type_=f"exit code {given.exit_code}")
-                error.text = given.failed
+                failed = printable_lines(given.failed)
+                error = Error(failed.partition("\n")[0] or "failed", type_=f"exit code {given.exit_code}")
+                error.text = failed
                 case.result = [error]
             if given.warnings:
-                case.system_out = "\n".join(f"warning: {warning}" for warning in given.warnings)
+                case.system_out = "\n".join(f"warning: {printable(warning)}" for warning in given.warnings)
             suite.add_testcase(case)
             for verdict in given.verdicts:
-                case = TestCase(f"{given.command}: {verdict.requirement}", classname=name, time=0)
+                case = TestCase(f"{given.command}: {printable(verdict.requirement)}", classname=name, time=0)
                 if not verdict.met:
-                    case.result = [Failure(str(verdict), type_="requirement")]
+                    case.result = [Failure(printable(str(verdict)), type_="requirement")]
                 suite.add_testcase(case)
         report.add_testsuite(suite)
     report.update_statistics()  # type: ignore[no-untyped-call]

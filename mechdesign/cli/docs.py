@@ -13,7 +13,7 @@ import typer
 
 from mechdesign.cli.terminal import emit
 from mechdesign.errors import StudyError, explain
-from mechdesign.reference import Entry, below, entries, find, near, place
+from mechdesign.reference import Entry, below, entries, find, find_messages, holding, near, place
 
 _INDENT = "  "
 # Words of mistakes that are named to be looked up.
@@ -21,7 +21,7 @@ _NAMED = 3
 _NO_WRAPPING = 10_000
 _OVERVIEW = (
     "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
-    "part (sweep), a command, an option, or one of the words below."
+    "part (sweep), a column, a command, an option, one of the words below, or a part of a message (in quotes)."
 )
 
 
@@ -34,7 +34,7 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
         If a word is not known; the message names the nearest.
     """
     known = entries(commands(group))
-    found = [(word, find(known, word)) for word in words]
+    found = [(word, find(known, word) or [*holding(known, word), *find_messages(word)]) for word in words]
     for word, hits in found:
         if not hits:
             close = near(known, word)

@@ -28,6 +28,7 @@ from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.report.tables import from_csv
 from mechdesign.results import Result, Table
 from mechdesign.study import Study, load, template_path
+from mechdesign.study.text.document import MAX_BYTES
 
 STANDARD_INPUT = Path("-")
 RESULTS = Path("results")  # where no other folder is asked for
@@ -74,8 +75,9 @@ def load_study(path: Path | None, options: Options) -> Study:
         terminal.say(f"study: {what}", quiet=options.quiet)
     overrides = options.overrides or ()
     if path == STANDARD_INPUT:
-        return load(text=sys.stdin.buffer.read(), overrides=overrides, seed=options.seed)
-    return load(path, overrides, options.seed)
+        content = sys.stdin.buffer.read(MAX_BYTES + 1)
+        return load(text=content, overrides=overrides, seed=options.seed, allow_files=options.allow_files)
+    return load(path, overrides, options.seed, allow_files=options.allow_files)
 
 
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
@@ -108,7 +110,9 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     """
     begun = time.perf_counter()
     asked = extras(command, options)
-    before = load(options.before, seed=options.seed) if options.before is not None else None
+    before = None
+    if options.before is not None:
+        before = load(options.before, seed=options.seed, allow_files=options.allow_files)
     if before is not None:
         asked = dataclasses.replace(asked, before=manifest.shown_before(before))
     if options.resume and (kept := _finished(study, command, directory, asked)) is not None:

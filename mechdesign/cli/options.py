@@ -83,6 +83,9 @@ REPORT = _flag("report", "--report", "Also write report.html: one page with all 
 REPORTS = _flag(
     "report", "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
 )
+ALLOW_FILES = _flag(
+    "allow_files", "--allow-files", "Also read files that the study names and that lie outside its folder."
+)
 ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
 BEFORE = _text(
     "before",
@@ -102,7 +105,7 @@ RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
 # What every question takes, and what only some of them do.
-COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE)
+COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
 
 
@@ -132,6 +135,7 @@ class Options:
     junit: Path | None = None
     fail_fast: bool = False
     resume: bool = False
+    allow_files: bool = False
 
     def __post_init__(self) -> None:
         if self.animate and self.no_plots:

@@ -7,6 +7,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from mechdesign.errors import printable_lines
 from mechdesign.progress import Progress
 from mechdesign.report.tables import cells, to_csv, to_json
 from mechdesign.results import Table
@@ -24,7 +25,7 @@ _BAR_DELAY = 1.0  # seconds before a bar appears
 def say(text: str, *, quiet: bool = False) -> None:
     """A line to stderr, unless the user wants quiet."""
     if not quiet:
-        print(text, file=sys.stderr, flush=True)
+        print(printable_lines(text), file=sys.stderr, flush=True)
 
 
 def emit(text: str) -> None:

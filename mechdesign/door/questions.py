@@ -23,6 +23,7 @@ def load(
     seed: int | None = None,
     *,
     text: str | bytes | None = None,
+    allow_files: bool = False,
 ) -> ShownStudy:
     """Load a study from a file, a mapping or a text in YAML.
 
@@ -37,6 +38,8 @@ def load(
     text : str or bytes
         The study in YAML, in place of `source`. Files that it names are looked for in the working directory, as are
         those of a mapping.
+    allow_files : bool
+        Whether files that the study names may lie outside its folder.
 
     Returns
     -------
@@ -60,7 +63,7 @@ def load(
     >>> study.mechanism.mobility
     1
     """
-    return ShownStudy.of(studies.load(source, overrides, seed, text=text))
+    return ShownStudy.of(studies.load(source, overrides, seed, text=text, allow_files=allow_files))
 
 
 def kinematics(

@@ -65,8 +65,8 @@ class ShownStudy(Study):
 class Answer(Result):
     """The result of one command that knows its study."""
 
-    study: Study  # with the seed that was computed with
-    all_modes: bool = False  # whether every assembly mode was asked
+    study: Study  #: with the seed that was computed with
+    all_modes: bool = False  #: whether every assembly mode was asked
 
     @classmethod
     def of(cls, study: Study, result: Result, seed: int | None = None, *, all_modes: bool = False) -> Answer:

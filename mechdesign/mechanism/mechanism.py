@@ -46,13 +46,13 @@ class Mechanism(Core):
         if len(description.drives) != self.mobility:
             drives = [self.coordinate(name) for name in description.drives]
             raise diagnosis.wrong_count(description, self.equations, self.sketch, self.mobility, drives)
-        self.drives: tuple[str, ...] = tuple(description.drives)
+        self.drives: tuple[str, ...] = tuple(description.drives)  #: names of what is given, as many as the mobility
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
 
     @property
     def mobility(self) -> int:
-        """Degrees of freedom by counting: unknowns of the vector loops less their equations."""
+        """Degrees of freedom by counting, unknowns of the vector loops less their equations."""
         graph = self.graph
         return (graph.classes - 1) + len(graph.slides) + 2 * (len(graph.nodes) - 1) - 2 * len(graph.edges)
 
@@ -161,6 +161,17 @@ class Mechanism(Core):
             If a single pose cannot be assembled; in a batch it is nan with ``valid`` False.
         MechanismError
             If the coordinates do not determine the mechanism.
+
+        Examples
+        --------
+        >>> import mechdesign
+        >>> study = mechdesign.load(
+        ...     text="mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}"
+        ... )
+        >>> study.mechanism.solve({"arm": [0, 60, 90]})["P.x"].round(6)
+        array([100.,  50.,   0.])
+        >>> study.mechanism.solve({"arm": 60}, {"arm.length": [100, 120]})["P.x"].round(6)
+        array([50., 60.])
         """
         unit = self.description.angle_unit
         plan = self.plan(tuple(pose))

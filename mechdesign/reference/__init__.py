@@ -2,7 +2,9 @@
 
 from mechdesign.reference.entries import Entry
 from mechdesign.reference.keys import place
-from mechdesign.reference.lookup import below, find, near
+from mechdesign.reference.lookup import below, find, holding, near
+from mechdesign.reference.messages import find_messages
 from mechdesign.reference.sources import entries
+from mechdesign.reference.tables import tables
 
-__all__ = ["Entry", "below", "entries", "find", "near", "place"]
+__all__ = ["Entry", "below", "entries", "find", "find_messages", "holding", "near", "place", "tables"]

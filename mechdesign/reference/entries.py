@@ -48,5 +48,5 @@ class Entry:
 
     @property
     def last(self) -> str:
-        """The last part of a path, an option without its dashes."""
-        return self.plain.rpartition(".")[2].lstrip("-")
+        """The last part of a path, an option without its dashes, a table without its ending."""
+        return self.plain.removesuffix(".csv").rpartition(".")[2].lstrip("-")

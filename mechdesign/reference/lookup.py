@@ -33,6 +33,12 @@ def find(entries: Sequence[Entry], word: str) -> list[Entry]:
     return found
 
 
+def holding(entries: Sequence[Entry], words: str) -> list[Entry]:
+    """Entries in whose texts these words stand."""
+    asked = words.casefold()
+    return [entry for entry in entries if any(asked in text.casefold() for text in (entry.text, entry.formula))]
+
+
 def below(entries: Sequence[Entry], entry: Entry) -> list[Entry]:
     """Keys of a section, without those of sections in it."""
     inside = (each for each in entries if entry.kind == each.kind == KIND and each.word.startswith(f"{entry.word}."))

@@ -10,7 +10,7 @@ from itertools import chain
 from mechdesign.errors import EXIT_CODES
 from mechdesign.expressions import CONSTANTS, FUNCTIONS, meanings
 from mechdesign.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
-from mechdesign.reference import keys
+from mechdesign.reference import keys, tables
 from mechdesign.reference.entries import Entry
 from mechdesign.study.text.fields import quoted
 from mechdesign.study.text.forms import TERMS
@@ -70,7 +70,7 @@ def exit_codes() -> Iterator[Entry]:
 
 # A further kind of word is one more function here.
 SOURCES: tuple[Callable[[], Iterable[Entry]], ...] = (
-    keys.entries, terms, indices, results, expressions, units, exit_codes,
+    keys.entries, terms, indices, results, tables.entries, expressions, units, exit_codes,
 )  # fmt: skip
 
 

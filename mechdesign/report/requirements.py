@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError, Problem, StudyError
+from mechdesign.errors import AssemblyError, Problem, StudyError, few_comparisons
 from mechdesign.results import Result, Table
 from mechdesign.rows import IN_UNIT, UnknownColumnError, choose
 from mechdesign.study import Study
@@ -19,12 +19,12 @@ from mechdesign.study.schema.optimize import Requirement
 class Verdict:
     """What became of one requirement."""
 
-    requirement: str  # in words
-    met: bool  # whether the worst row meets it
-    worst: float  # the value of the worst row; nan where a row has none or no row was found
-    place: str = ""  # the pose or row where it is worst
-    margin: float = float("nan")  # of the worst row to the limit, negative beyond it
-    unit: str = ""  # of `worst` and `margin`
+    requirement: str  #: in words
+    met: bool  #: whether the worst row meets it
+    worst: float  #: the value of the worst row; nan where a row has none or no row was found
+    place: str = ""  #: the pose or row where it is worst
+    margin: float = float("nan")  #: of the worst row to the limit, negative beyond it
+    unit: str = ""  #: of `worst` and `margin`
 
     def __str__(self) -> str:
         place = f" at {self.place}" if self.place else ""
@@ -76,6 +76,7 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
         raise StudyError(problems)
 
 
+@few_comparisons()
 def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[Verdict, ...]:
     """Verdicts on those requirements of a study that concern a result, in the order of the study.
 

@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.errors import printable
 from mechdesign.results import Column, Table
 
 _DIGITS = 12
 _BLOCK = 20_000
+# Begin a formula in the cell of a spreadsheet.
+_FORMULA = ("=", "+", "-", "@")
 
 
 def _texts(values: NDArray[Any], digits: int) -> list[str]:
@@ -25,7 +28,20 @@ def _texts(values: NDArray[Any], digits: int) -> list[str]:
         return [format(value, f".{digits}g") for value in (values + 0.0).tolist()]
     if values.dtype.kind == "b":
         return ["1" if value else "0" for value in values.tolist()]
-    return [str(value) for value in values.tolist()]
+    return [printable(str(value)) for value in values.tolist()]
+
+
+def _harmless(text: str) -> str:
+    """A cell that no program takes for a formula: one that begins like one, and is no number, gets an apostrophe."""
+    return f"'{text}" if text.startswith(_FORMULA) and not _is_number(text) else text
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def cells(table: Table, digits: int = _DIGITS) -> list[list[str]]:
@@ -34,7 +50,10 @@ def cells(table: Table, digits: int = _DIGITS) -> list[list[str]]:
 
 
 def to_csv(table: Table) -> str:
-    """The table as CSV: a header, then a line a row, quoted as RFC 4180 asks, ``nan`` and ``inf`` as they are."""
+    """The table as CSV: a header, then a line a row, quoted as RFC 4180 asks, ``nan`` and ``inf`` as they are.
+
+    Words that begin with = + - or @, which spreadsheets would compute, stand after an apostrophe.
+    """
     return "".join(csv_blocks(table))
 
 
@@ -42,13 +61,14 @@ def csv_blocks(table: Table) -> Iterator[str]:
     """The text of `to_csv` in blocks of some thousand rows, for tables whose text would fill the memory."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(table.names)
+    writer.writerow([_harmless(printable(name)) for name in table.names])
     yield stream.getvalue()
     for start in range(0, len(table), _BLOCK):
         stream.seek(0)
         stream.truncate()
         rows = slice(start, start + _BLOCK)
-        writer.writerows(zip(*(_texts(column.values[rows], _DIGITS) for column in table.columns), strict=True))
+        texts = [(column.numeric, _texts(column.values[rows], _DIGITS)) for column in table.columns]
+        writer.writerows(zip(*(each if numeric else map(_harmless, each) for numeric, each in texts), strict=True))
         yield stream.getvalue()
 
 
@@ -67,7 +87,7 @@ def _values(texts: Sequence[str]) -> NDArray[Any]:
             return np.array([kind(text) for text in texts])
         except ValueError:
             continue
-    return np.array(texts)
+    return np.array([text[1:] if text[:1] == "'" and text[1:].startswith(_FORMULA) else text for text in texts])
 
 
 def plain(value: Any) -> Any:

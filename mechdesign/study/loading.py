@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import MechanismError, Problem, StudyError
+from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
@@ -38,8 +38,9 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
-from mechdesign.study.text.document import Document, KeyPath, Mark, leaves, plain, read
+from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
+from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 
@@ -52,26 +53,36 @@ _TEXT = "<study>"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study:
-    """A validated study; sections are None where it does not ask."""
+    """A validated study; sections are None where it does not ask.
 
-    name: str  # by default that of its file
-    path: pathlib.Path | None  # None of a study that was given as a text or a mapping
-    text: bytes  # as it was read; empty of a mapping
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
+    ... kinematics: {poses: [{arm: 60}]}
+    ... ''')
+    >>> study.questions, study.units.label("velocity"), study.mechanism.drives
+    (('kinematics',), 'mm/s', ('arm',))
+    """
+
+    name: str  #: by default that of its file
+    path: pathlib.Path | None  #: None of a study that was given as a text or a mapping
+    text: bytes  #: as it was read; empty of a mapping
     text_sha256: str
-    seed: int
-    overrides: tuple[str, ...]
-    units: Units
-    resolved: dict[str, Any]  # the study as plain data, overrides applied
-    mechanism: Mechanism
+    seed: int  #: of the random numbers
+    overrides: tuple[str, ...]  #: as ``a.b.c=value``, in the order in which they were applied
+    units: Units  #: of lengths, angles, forces and times, in the file as in the results
+    resolved: dict[str, Any]  #: the study as plain data, overrides applied
+    mechanism: Mechanism  #: which solves any pose
     parameters: Parameters
     kinematics: KinematicsSection | None
     workspace: WorkspaceSection | None
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[Requirement, ...]  #: in the order of the file
     targets: Mapping[str, Target]  # by the coordinate or point
-    warnings: tuple[Problem, ...] = ()  # what is likely a mistake, such as a parameter that nothing uses
+    folder: Folder  #: where the files lie that it names, and what they held when it was loaded
+    warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -80,7 +91,7 @@ class Study:
 
     @property
     def label(self) -> str:
-        """The name of its folder of results: that of its file, else its own."""
+        """The name of its folder of results, that of its file or else its own."""
         return self.path.stem if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
 
     def __repr__(self) -> str:
@@ -88,15 +99,9 @@ class Study:
         return f"<Study {shown(self.name)}: mobility {self.mechanism.mobility}; {questions}>"
 
     def inputs(self) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
-        """Files that the study reads: the keys of their names, the file, and what it holds."""
-        folder = self.path.parent if self.path is not None else pathlib.Path()
-        for keys, value in leaves(self.resolved):
-            if isinstance(value, str) and ({"path", "targets"}.intersection(keys[:-1]) or keys[-1] == "measured"):
-                try:
-                    content = (folder / value).read_text(encoding="utf-8-sig")
-                except (OSError, ValueError):
-                    continue
-                yield keys, folder / value, content
+        """Files that the study reads: the keys of their names, the file, and what it held when the study was loaded."""
+        for keys, name in files(self.resolved, self.questions):
+            yield keys, self.folder.path / name, self.folder.text(name)
 
     def unit_of(self, name: str) -> str | None:
         """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
@@ -117,11 +122,16 @@ class Study:
         """A mistake at a path of the data, with its place in the text."""
         if not self.text:
             return Problem(message, ".".join(map(str, keys)))
-        document = read(self.text, str(self.path or _TEXT))
-        override(document, self.overrides)
-        reporter = Reporter(document)
+        reporter = Reporter(self._document)
         reporter.report(keys, message)
         return reporter.problems[-1]
+
+    @cached_property
+    def _document(self) -> Document:
+        """The text once more, with the places of its entries."""
+        document = read(self.text, str(self.path or _TEXT))
+        override(document, self.overrides)
+        return document
 
 
 def load(
@@ -130,6 +140,7 @@ def load(
     seed: int | None = None,
     *,
     text: str | bytes | None = None,
+    allow_files: bool = False,
 ) -> Study:
     """Load a study from a file, a mapping or a text in YAML.
 
@@ -144,6 +155,8 @@ def load(
     text : str or bytes
         The study in YAML, in place of `source`. Files that it names are looked for in the working directory, as are
         those of a mapping.
+    allow_files : bool
+        Whether files that the study names may lie outside its folder.
 
     Raises
     ------
@@ -154,20 +167,23 @@ def load(
     if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):
         raise StudyError("give a study as one of a file's name, a mapping, or text=... in YAML")
     if text is not None:
-        return load_bytes(text.encode() if isinstance(text, str) else text, None, overrides, seed)
+        content = text.encode(errors="surrogateescape") if isinstance(text, str) else text
+        return load_bytes(content, None, overrides, seed, Folder(anywhere=allow_files))
     if isinstance(source, Mapping):
         data = _plain_data(source, "the study")
         document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
         override(document, changes)
         sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-        return load_document(document, None, b"", sha256, changes, seed)
+        return load_document(document, None, Folder(anywhere=allow_files), b"", sha256, changes, seed)
     assert source is not None
     file = pathlib.Path(source)
     try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise StudyError([Problem(f"cannot be read: {error.strerror or error}", file=str(source))]) from None
-    return load_bytes(content, file, overrides, seed)
+        with file.open("rb") as stream:
+            whole = stream.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise StudyError([Problem(f"cannot be read: {why}", file=str(source))]) from None
+    return load_bytes(whole, file, overrides, seed, Folder(file.parent, allow_files))
 
 
 @one_thread()
@@ -176,12 +192,14 @@ def load_bytes(
     path: pathlib.Path | None,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     seed: int | None = None,
+    folder: Folder | None = None,
 ) -> Study:
-    """Load a study from the bytes of a file; see `load`."""
+    """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
     document, changes = read(content, str(path or _TEXT)), _texts(overrides)
     override(document, changes)
     sha256 = hashlib.sha256(content).hexdigest()
-    return load_document(document, path, content, sha256, changes, seed)
+    folder = folder or Folder(path.parent if path is not None else pathlib.Path())
+    return load_document(document, path, folder, content, sha256, changes, seed)
 
 
 def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
@@ -212,9 +230,11 @@ def _plain_data(value: Any, what: str) -> Any:
         raise StudyError([Problem(message)]) from None
 
 
+@few_comparisons()
 def load_document(
     document: Document,
     path: pathlib.Path | None,
+    folder: Folder,
     text: bytes,
     text_sha256: str,
     changes: tuple[str, ...] = (),
@@ -227,7 +247,6 @@ def load_document(
     """
     if seed is not None and seed < 0:
         raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
-    folder = path.parent if path is not None else pathlib.Path()
     reporter = Reporter(document)
     data = _sections(document, reporter)
     context, formulas = _context(data, reporter)
@@ -265,6 +284,7 @@ def load_document(
         **{command: parts.get(command) for command in COMMANDS},
         requirements=parts["requirements"],
         targets=parts["targets"],
+        folder=folder,
         warnings=tuple(reporter.warnings),
     )
 
@@ -344,7 +364,7 @@ def _checked(checker: Checker) -> dict[str, Any]:
     return found
 
 
-def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: pathlib.Path) -> None:
+def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: Folder) -> None:
     """Check that the coordinates that poses give determine the mechanism, that they are not too many, and that the
     targets fit those of kinematics.
     """

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from mechdesign.mechanism.model import Description
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.study.schema import paths
 from mechdesign.study.schema.poses import PoseSection, Sweep
+from mechdesign.study.text.inputs import Folder
 
 MAX_POSES = 10_000_000
 
@@ -125,7 +125,7 @@ def sweep_values(sweep: Sweep) -> Floats:
     return sweep.from_ + sweep.step * np.arange(math.floor(steps) + 1, dtype=np.float64)
 
 
-def expand(section: PoseSection, folder: Path) -> Poses | None:
+def expand(section: PoseSection, folder: Folder) -> Poses | None:
     """Poses of a section, None where it gives none, or those of the workspace; files of paths lie in `folder`.
 
     Raises
@@ -169,7 +169,7 @@ def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> 
     return Poses((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
 
 
-def _path(path: Mapping[str, paths.PathSection], folder: Path) -> Poses:
+def _path(path: Mapping[str, paths.PathSection], folder: Folder) -> Poses:
     if not path:
         raise StudyError("an empty path")
     columns: dict[str, Floats] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 import re
@@ -10,8 +11,10 @@ from pathlib import Path
 
 import pytest
 from helpers.pages import faults
+from helpers.tables import said
 from matplotlib.figure import Figure
 
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
 from mechdesign.study import load, template_path, templates
@@ -63,6 +66,7 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
         folder = tmp_path / command
         manifest = json.loads((folder / "manifest.json").read_text())
         assert not manifest["failed"]
+        assert not said(manifest)[1], "mechdesign/reference/tables.yaml says otherwise"
         assert not [warning for warning in manifest["warnings"] if "could not be drawn" in warning]
         files = {path.name for path in folder.iterdir()}
         assert files == {*manifest["files"], "manifest.json"}
@@ -113,5 +117,29 @@ def test_pages_show_pictures_that_exist() -> None:
 def test_readme_shows_the_test_command_that_ci_runs_and_every_command() -> None:
     text = (ROOT / "README.md").read_text()
     assert "bash .ci/run" in text
-    for command in ("kinematics", "workspace", "optimize", "reliability", "stiffness", "run", "check", "new", "schema"):
+    for command in (*COMMANDS, "run", "check", "new", "docs", "schema"):
         assert f"mechdesign {command}" in text
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/questions.md"])
+def test_numbers_told_of_the_five_bar_are_those_of_its_results(page: str) -> None:
+    def row(table: str, **where: str) -> dict[str, float]:
+        with (ROOT / "results" / "five_bar" / f"{table}.csv").open() as file:
+            rows = [each for each in csv.DictReader(file) if all(each[name] == value for name, value in where.items())]
+        return {name: float(value) for name, value in rows[0].items() if re.fullmatch(r"[-+.\de]+", value)}
+
+    indices, stiff = row("workspace/indices"), row("stiffness/stiffness", **{"C.x": "0", "C.y": "220"})
+    near, far = (
+        100 * row("reliability/reliability", **{"C.x": "0", "C.y": y, "method": "monte_carlo"})["reliability"]
+        for y in ("220", "280")
+    )
+    told = {
+        "README.md": (
+            f"{indices['area']:,.0f} mm²", f"{100 * indices['SUI']:.1f} %", f"{indices['GII']:.3f}", f"{near:.1f} %",
+            f"{far:.1f} %",
+        ),
+        "docs/questions.md": (f"{stiff['k_x']:.0f} N/mm across", f"{stiff['k_y']:.0f} N/mm upwards"),
+    }  # fmt: skip
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for number in told[page]:
+        assert number in text

@@ -124,6 +124,20 @@ def test_junit_has_a_case_for_each_question_and_requirement(studies, invoke):
     assert any("kinematics.theta at most 80" in name for name in names)
 
 
+def test_names_cannot_spoil_junit_or_summary(studies, analysis, invoke):
+    analysis(lambda study, **options: answer(warnings=["\x1b[2J\x00"]))
+    names = ["=1+1\n\x1b]0;x\x07.yaml", "\u202e<b>&.yaml"]
+    for name in names:
+        (studies / name).write_text(SLIDER)
+    (studies / "wrong.yaml").write_text(WRONG.replace("q]", '"\\x01\\ufffe]]>"]'))
+    done = invoke("run", *names, "wrong.yaml", "--no-plots", "--junit", "report.xml")
+    assert [suite.name for suite in JUnitXml.fromfile("report.xml")][1:] == [
+        r"=1+1\n\x1b]0;x\x07", r"\u202e<b>&",
+    ]  # fmt: skip
+    assert [row[0] for row in summary(done)] == ["wrong", r"'=1+1\n\x1b]0;x\x07", r"\u202e<b>&"]
+    assert all(line.isprintable() for line in (*done.stderr.splitlines(), *done.stdout.splitlines()))
+
+
 def test_junit_shows_warnings_and_log_lines_name_their_study(studies, analysis, invoke):
     analysis(lambda study, **options: answer(warnings=["mind the gap"]))
     done = invoke("run", "slider.yaml", "both.yaml", "--no-plots", "--junit", "report.xml")

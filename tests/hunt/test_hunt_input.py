@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import json
+import resource
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,11 +21,16 @@ from typer.testing import CliRunner
 
 from mechdesign.cli.app import app
 from mechdesign.commands import COMMANDS
-from mechdesign.study import template, templates
+from mechdesign.errors import StudyError
+from mechdesign.study import load, template, templates
 from mechdesign.study.text.document import read
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SECONDS = 60
+LOAD_SECONDS = 5
+WAITING = 6  # times as long by the clock
+MOST_TOLD = 50_000  # characters of a message
+MOST_MEMORY = 1_000_000  # KB that a load may take
 CODES = {0, 1, 2, 3}
 NUMBERS = (0, -1, 1, 3, 1e308, -1e308, 1.7e308, 1e154, 1e80, 1e20, 1e-20, 1e-154, 1e-308, 5e-324, 1e9, 721, 90, -400)
 SCALES = (-1.0, 0.0, 1e-3, 0.1, 0.9, 1.1, 3.0, 1e3, 1e6, 1e12, 1e150, 1e300, 1e-12, 1e-150, 1e-300)
@@ -46,13 +52,17 @@ def in_time(seconds: float) -> Iterator[None]:
     def late(*arguments: object) -> None:
         raise TooLongError
 
-    before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    # Of the processor's time, for the machine may have other work; a wait without end is that of a clock.
+    timers = ((signal.SIGPROF, signal.ITIMER_PROF, seconds), (signal.SIGALRM, signal.ITIMER_REAL, WAITING * seconds))
+    before = {number: signal.signal(number, late) for number, *_ in timers}
+    for _, timer, end in timers:
+        signal.setitimer(timer, end)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for number, timer, _ in timers:
+            signal.setitimer(timer, 0)
+            signal.signal(number, before[number])
 
 
 def small(data: dict) -> dict:
@@ -229,6 +239,56 @@ def test_odd_overrides(seeds, tmp_path):
             f"seed {seed}: {command} {name}: {overrides}")  # fmt: skip
 
 
+MARKS = (
+    "{", "}", "[", "]", ":", ",", "-", "&a ", "*a", "!!python/object/apply:os.system ", "!x ", "|", ">", "'", '"', "#",
+    "\n", "\t", " ", "\x00", "\x1b", "\u202e", "\u2028", "\ufeff", "<<: ", "? ", "---\n", "...\n", "%YAML 9.9\n", "²",
+)  # fmt: skip
+
+
+def scrambled(rng: np.random.Generator, text: str) -> bytes:
+    """A text with some places cut, doubled, exchanged or overwritten."""
+    for _ in range(rng.integers(1, 4)):
+        start, end = sorted(int(place) for place in rng.integers(len(text) + 1, size=2))
+        end = min(end, start + int(rng.integers(1, 80)))
+        kind = rng.integers(5)
+        part = text[start:end]
+        new = ("", part * int(rng.integers(2, 50)), str(pick(rng, MARKS)), str(pick(rng, WORDS)), part[::-1])[kind]
+        text = text[:start] + new + text[end if kind else min(end, start + 3) :]
+    content = bytearray(text.encode(errors="surrogatepass"))
+    if rng.random() < 0.1 and content:
+        content[rng.integers(len(content))] = rng.integers(256)
+    return bytes(content)
+
+
+def test_loads(seeds):
+    """Whatever a text holds, it is a study or a `StudyError`: in time, without much memory, in a short message."""
+    for seed in seeds(400):
+        rng = np.random.default_rng([11, seed])
+        name = pick(rng, STUDIES)
+        data = copy.deepcopy(STUDIES[name])
+        content = written(data).encode(errors="surrogatepass")
+        if rng.random() < 0.6:
+            for _ in range(rng.integers(1, 6)):
+                damage(rng, data)
+            content = written(data).encode(errors="surrogatepass")
+        if rng.random() < 0.5:
+            content = scrambled(rng, content.decode(errors="surrogatepass"))
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        try:
+            with in_time(LOAD_SECONDS):
+                load(text=content)
+        except StudyError as error:
+            told = str(error)
+            assert told.isprintable() or "\n" in told, f"seed {seed}: {told!r}"
+            assert len(told) < MOST_TOLD, f"seed {seed}: {len(told)} characters: {told[:500]}"
+        except TooLongError:
+            pytest.fail(f"seed {seed}: {name}: more than {LOAD_SECONDS} s")
+        except Exception as error:
+            raise AssertionError(f"seed {seed}: {name}") from error
+        grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+        assert grown < MOST_MEMORY, f"seed {seed}: {name}: {grown} KB"
+
+
 # What was found, each as a shipped study, a command and overrides, and the code it ends with.
 FINDS = [
     ("whitworth", "kinematics", ["mechanism.parameters.r=1e308"], 2),
@@ -253,6 +313,7 @@ FINDS = [
     ("four_bar", "kinematics", ["kinematics.sweeep="], 2),
     ("four_bar", "kinematics", ["mechanism.parameters.nosuch=99"], 2),
     ("four_bar", "kinematics", ["x" * 100_000 + "=1"], 2),
+    ("two_rpr_printed", "kinematics", ["kinematics.path.C.1.0=5e-324"], None),
 ]
 
 

@@ -22,8 +22,10 @@ import mechdesign
 from mechdesign.cli.app import app
 from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
+from mechdesign.mechanism import Mechanism
+from mechdesign.results import Column, Table
+from mechdesign.study import Study, template, template_path
 from mechdesign.study import load as load_plain
-from mechdesign.study import template, template_path
 
 DATA = {
     "mechanism": {
@@ -295,7 +297,16 @@ def test_the_example_of_every_public_name_holds(name: str) -> None:
     told = getattr(mechdesign, name) if name else mechdesign
     if name == "__version__":
         return
-    (test,) = doctest.DocTestFinder(recurse=False).find(told, name or "mechdesign", module=False, globs={})
+    hold(told, name or "mechdesign")
+
+
+@pytest.mark.parametrize("told", [Study, Mechanism.solve, Table, Column], ids=lambda told: told.__qualname__)
+def test_the_example_of_what_they_return_holds(told: object) -> None:
+    hold(told, "returned")
+
+
+def hold(told: object, name: str) -> None:
+    (test,) = doctest.DocTestFinder(recurse=False).find(told, name, module=False, globs={})
     assert len(test.examples) > 1
     assert not doctest.DocTestRunner().run(test).failed
 

@@ -310,6 +310,19 @@ def test_conditioning_stands_in_every_motion() -> None:
     assert np.isnan(failed["conditioning"]).tolist() == [False, True]
 
 
+def test_conditioning_is_the_sine_of_the_angle_between_links_that_meet() -> None:
+    """Whatever their lengths."""
+    text = """
+mechanism:
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [75, 55]}
+"""
+    table = kinematics(study_of(text)).tables["motion"]
+    between = np.radians(table["rod.angle"] - table["rocker.angle"])
+    assert table["conditioning"] == pytest.approx(np.abs(np.sin(between)), rel=1e-12)
+
+
 def test_outputs_of_the_jacobian_are_named_apart_from_those_shown() -> None:
     poses = "kinematics={poses: [{t1: 30, t2: 75}], outputs: [P, fore.angle, bend], jacobian: [P]}"
     tables = kinematics(study_of(ARM, poses)).tables

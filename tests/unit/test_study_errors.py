@@ -1,9 +1,12 @@
 """Wrong studies: each mistake is told where it stands, with what would mend it, and all in one go."""
 
+import time
+
 import pytest
 
 import mechdesign
 from mechdesign.errors import StudyError
+from mechdesign.study import load
 
 STUDY = """\
 mechanism:
@@ -339,3 +342,38 @@ def test_a_missing_section_is_told_with_its_file_and_line(tmp_path, question, sa
     with pytest.raises(StudyError) as caught:
         getattr(mechdesign, question)(mechdesign.load(path))
     assert str(caught.value).startswith(f"{path}:1:1: {said}")
+
+
+@pytest.mark.parametrize("part", ["{}", "kinematics:\n  {}"])
+def test_thousands_of_mistakes_are_reported_in_proportion(part: str) -> None:
+    def seconds(number: int) -> float:
+        keys = f"\n{'  ' * ('kin' in part)}".join(f"kinematisc{index}: 1" for index in range(number))
+        begun = time.process_time()
+        with pytest.raises(StudyError) as caught:
+            load(text=part.format(keys))
+        told = str(caught.value).splitlines()
+        assert len(caught.value.problems) >= number
+        assert len(told) == 101
+        assert told[-1] == f"and {len(caught.value.problems) - 100} more"
+        return time.process_time() - begun
+
+    seconds(200)
+    assert seconds(10_000) < 5
+
+
+def test_names_are_suggested_for_the_first_twenty() -> None:
+    keys = "\n".join(f"kinematic{index}: 1" for index in range(50))
+    with pytest.raises(StudyError) as caught:
+        load(text=keys)
+    assert str(caught.value).count("did you mean 'kinematics'?") == 20
+
+
+def test_what_is_echoed_is_short_and_printable() -> None:
+    odd = r'"\x1b[2J\u202e\n\0' + "x" * 900 + '"'
+    text = f"{odd}: 1\nmechanism: {{links: {{{odd}: 1}}, drives: [{odd}]}}"
+    with pytest.raises(StudyError) as caught:
+        load(text=text, overrides=[f"seed={'9' * 500}x"])
+    told = str(caught.value).splitlines()
+    assert len(told) == len(caught.value.problems) >= 4
+    assert all(line.isprintable() and len(line) < 400 for line in told)
+    assert r"\x1b[2J\u202e\n\x00x" in told[0]

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-from mechdesign.report.tables import to_csv, to_json
+from mechdesign.report.tables import from_csv, to_csv, to_json
 from mechdesign.results import Column, Table
 
 
@@ -24,8 +24,16 @@ def test_booleans_are_one_and_zero_and_integers_stay_whole():
 
 
 def test_awkward_text_survives_a_csv_reader():
-    names = ['a "quoted", name', "two\nlines", "plain"]
+    names = ['a "quoted", name', "ünïcödé", "plain"]
     assert [row[0] for row in csv.reader(io.StringIO(to_csv(table(name=names))))][1:] == names
+
+
+def test_words_are_of_one_line_and_no_formula():
+    words = ["two\nlines", "\x1b[2J\u202e", "=1+1", "+x", "-x", "@x", "-inf", "-3", "a=b"]
+    text = to_csv(table(name=words))
+    cells = [row[0] for row in csv.reader(io.StringIO(text))][1:]
+    assert cells == [r"two\nlines", r"\x1b[2J\u202e", "'=1+1", "'+x", "'-x", "'@x", "-inf", "-3", "a=b"]
+    assert from_csv(text, "t", [{"name": "name"}])["name"].tolist()[2:] == words[2:]
 
 
 def test_json_has_null_for_what_is_not_a_number():

@@ -304,9 +304,10 @@ def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Bo
     places = as_given(motion, swept, np.array([e.place for e in ends]), np.array([e.position for e in ends]))
     columns = [
         Column(swept, places, unit, "value at the limit of motion"),
-        Column("kind", np.array([end.cause.kind for end in ends], dtype=str), "", "what ends the motion"),
+        Column("kind", np.array([end.cause.kind for end in ends], dtype=str), "",
+               "what ends the motion, such as a dead centre, a singularity or a limit"),
         Column("joint", np.array([end.cause.joint for end in ends], dtype=str), "", "where"),
-    ]
+    ]  # fmt: skip
     columns += [
         Column(
             output.name, _values(study, output, ends), study.units.label(output.quantity), f"{output.name} at the limit"

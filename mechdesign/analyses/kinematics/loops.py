@@ -84,7 +84,7 @@ def loops_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine | None)
                    "p + q - s - l; rod - crank - offset; |crank - frame| - offset: a link turns fully where positive"),
         ]  # fmt: skip
     columns = [Column(c.name, np.tile(c.values, poses.designs), c.unit, c.meaning) for c in columns]
-    at_unit, where = "", "row of the"
+    at_unit, where = "", "row at the"
     if line is not None:
         at_unit, where = study.units.label(study.mechanism.quantity(line.swept)), f"{line.swept} at the"
     both = _at_poses(motion, loops) if line is None else _between(motion, line, len(loops))

@@ -287,7 +287,8 @@ def _assembles_alike(
 ) -> bool:  # fmt: skip
     """Whether the study of this data has the assemblies of the mechanism that was evaluated, whatever is given."""
     try:
-        alone = load_bytes(yaml.safe_dump(dict(data), sort_keys=False).encode(), study.path).mechanism
+        text = yaml.safe_dump(dict(data), sort_keys=False).encode()
+        alone = load_bytes(text, study.path, folder=study.folder).mechanism
         return all(alone.plan(names).modes == mechanism.plan(names).modes for names in given)
     except MechdesignError:
         return False

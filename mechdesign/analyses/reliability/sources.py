@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -274,8 +273,7 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
         factor = study.units.angle_factor if turned else 1.0
         unit = study.units.label(LOADS[name]) if kind == "load" else study.unit_of(name)
         if dimension.measured is not None:
-            folder = study.path.parent if study.path is not None else Path()
-            law: Marginal = Measured.of(factor * dimension.deviations(nominal / factor, folder), nominal)
+            law: Marginal = Measured.of(factor * dimension.deviations(nominal / factor, study.folder), nominal)
         else:
             law = marginal(dimension, nominal, factor)
         scalars.append(Scalar(name, kind, law, moves, factor, unit))

@@ -17,7 +17,8 @@ from mechdesign.expressions import Expression
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import FILES, Context, StudyNumber, failure, read_expression, read_rows, shown
+from mechdesign.study.text.fields import Context, StudyNumber, failure, read_expression, read_rows, shown
+from mechdesign.study.text.inputs import file_of
 from mechdesign.study.text.units import QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
@@ -246,10 +247,9 @@ Wanted = Expression | tuple[tuple[float, ...], ...] | str
 
 
 def _target(raw: Any, context: Context) -> Wanted:
-    if isinstance(raw, dict) and list(raw) == ["file"] and isinstance(raw["file"], str):
-        return raw["file"]
-    if isinstance(raw, str) and raw.lower().endswith(FILES):
-        return raw
+    file = file_of(raw)
+    if file is not None and (raw is file or len(raw) == 1):
+        return file
     if raw is None or isinstance(raw, dict):
         raise failure(f"expected {TARGET_FORMS}, not {shown(raw)}")
     if isinstance(raw, list):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.inputs import Folder
 
 # Kinds of a coordinate, its rate and its acceleration.
 ORDERS: dict[Quantity | None, tuple[str, str, str]] = {
@@ -23,7 +23,7 @@ class Checker:
     """Looks names and units up, and notes what is wrong with them."""
 
     def __init__(
-        self, builder: Builder, parameters: Parameters, parts: Mapping[str, Any], folder: Path
+        self, builder: Builder, parameters: Parameters, parts: Mapping[str, Any], folder: Folder
     ) -> None:  # fmt: skip
         self.mechanism, self.places, self.reporter = builder.section, builder.places, builder.reporter
         self.parameters = parameters

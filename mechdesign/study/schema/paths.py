@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import math
-import pathlib
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any
@@ -19,7 +18,8 @@ from pydantic import Field, model_validator
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import FILES, Context, failure, read_number, read_rows
+from mechdesign.study.text.fields import MIN_NUMBER, Context, failure, read_number, read_rows
+from mechdesign.study.text.inputs import Folder, file_of
 
 # Numbers of poses where a study does not say them: of a circle (in steps of 5 deg); of a line or an arc, both ends too.
 CIRCLE_POSES = 72
@@ -118,7 +118,7 @@ class PathSection(fields.Model):
     @model_validator(mode="before")
     @classmethod
     def _long_form(cls, raw: Any) -> Any:
-        if isinstance(raw, str) and raw.lower().endswith(FILES):
+        if isinstance(raw, str) and file_of(raw) is not None:
             return {"file": raw}
         return raw if isinstance(raw, dict | PathSection) else {"through": raw}
 
@@ -144,7 +144,7 @@ class PointPath:
     closed: bool = False  # whether the path goes on from its last place to its first
 
 
-def course(name: str, given: PathSection, folder: pathlib.Path) -> PointPath | Floats:
+def course(name: str, given: PathSection, folder: Folder) -> PointPath | Floats:
     """The path of a point, or the values of a coordinate.
 
     Raises
@@ -162,7 +162,7 @@ def course(name: str, given: PathSection, folder: pathlib.Path) -> PointPath | F
             raise StudyError(f"path: the line of {name!r} needs two different places")
         return polyline(np.linspace(start, stop, given.points or LINE_POSES, dtype=np.complex128))
     point = "." not in name
-    table = read_table(folder / given.file) if given.file is not None else np.array(given.through, dtype=float)
+    table = read_table(folder, given.file) if given.file is not None else np.array(given.through, dtype=float)
     if point and table.shape[1] == 2:
         places = table[:, 0] + 1j * table[:, 1]
         if not given.spline:
@@ -188,6 +188,8 @@ def polyline(places: Complexes) -> PointPath:
     """Straight segments; a corner has the direction of the segment that begins there, directions nan for one place."""
     steps = np.diff(places)
     lengths = np.abs(steps)
+    # What is shorter than any number of a study is no step: its reciprocal would overflow.
+    lengths[lengths < MIN_NUMBER] = 0.0
     way = np.concatenate([[0.0], np.cumsum(lengths)])
     directions = np.full(len(places), complex(np.nan, np.nan))
     moving = np.flatnonzero(lengths > 0)
@@ -220,7 +222,7 @@ def spline(places: Complexes, points: int | None) -> PointPath:
     return PointPath(places if points is None else curve(x), np.interp(x, fine, length), unit, across / speed**2)
 
 
-def read_table(file: pathlib.Path, most: int = 2) -> Floats:
+def read_table(folder: Folder, file: str, most: int = 2) -> Floats:
     """Read a CSV file of one to `most` columns of numbers, with or without a line of names.
 
     Raises
@@ -229,23 +231,23 @@ def read_table(file: pathlib.Path, most: int = 2) -> Floats:
         Where it cannot be read or holds anything else.
     """
     rows: list[list[float]] = []
-    for number, line in _lines(file):
+    for number, line in _lines(folder, file):
         try:
             row = [float(part) for part in line.replace(";", ",").split(",")]
         except ValueError:
             if rows or number > 1:
-                raise StudyError(f"{file}:{number}: {line!r} is not a row of numbers") from None
+                raise StudyError(f"{file}:{number}: the line is not a row of numbers") from None
             continue
         if len(row) > most or (rows and len(row) != len(rows[0])) or not all(map(math.isfinite, row)):
             columns = "one or two" if most == 2 else f"one to {most}"
-            raise StudyError(f"{file}:{number}: {line!r} is not a row of the same {columns} finite numbers")
+            raise StudyError(f"{file}:{number}: the line is not a row of the same {columns} finite numbers")
         rows.append(row)
     if not rows:
         raise StudyError(f"{file} holds no numbers")
     return np.array(rows)
 
 
-def read_column(file: pathlib.Path, name: str | None) -> Floats:
+def read_column(folder: Folder, file: str, name: str | None) -> Floats:
     """Read the numbers of a CSV file's column of this name, or of a file with one number a line.
 
     Raises
@@ -253,7 +255,7 @@ def read_column(file: pathlib.Path, name: str | None) -> Floats:
     StudyError
         Where the file cannot be read, there is no such column, or it holds anything but finite numbers.
     """
-    lines = _lines(file)
+    lines = _lines(folder, file)
     if not lines:
         raise StudyError(f"{file} holds no numbers")
     separator = next((mark for mark in (";", "\t") if mark in lines[0][1]), ",")
@@ -263,7 +265,7 @@ def read_column(file: pathlib.Path, name: str | None) -> Floats:
         raise StudyError(f"{file} is no CSV file: {error}") from None
     first, place = rows[0], 0
     if name is not None and name not in first:
-        raise StudyError(f"{file} has no column {name!r}; its first line names {', '.join(first)}")
+        raise StudyError(f"{file} has no column {name!r} among the {len(first)} of its first line")
     if name is not None:
         place = first.index(name)
     elif len(first) > 1:
@@ -276,7 +278,7 @@ def read_column(file: pathlib.Path, name: str | None) -> Floats:
         elif row is not first or (name is None and value is not None):
             what = f" of column {name!r}" if name is not None else ""
             hint = "; a decimal is written with a point" if "," in line and separator != "," else ""
-            raise StudyError(f"{file}:{number}: {line!r} has no finite number{what}{hint}")
+            raise StudyError(f"{file}:{number}: the line has no finite number{what}{hint}")
     return np.array(found)
 
 
@@ -287,10 +289,7 @@ def _number(text: str) -> float | None:
         return None
 
 
-def _lines(file: pathlib.Path) -> list[tuple[int, str]]:
+def _lines(folder: Folder, file: str) -> list[tuple[int, str]]:
     """Lines of a text with their numbers, without empty ones and comments; a StudyError where it cannot be read."""
-    try:
-        lines = [line.strip() for line in file.read_text(encoding="utf-8-sig").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'not a text file'}") from None
+    lines = [line.strip() for line in folder.text(file).splitlines()]
     return [(number, line) for number, line in enumerate(lines, start=1) if line and not line.startswith("#")]

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from mechdesign.errors import Problem, StudyError, suggestion
+from mechdesign.errors import Problem, StudyError, cut, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement
 from mechdesign.study.schema.poses import KinematicsSection
@@ -66,7 +66,7 @@ def override(document: Document, overrides: Sequence[str]) -> None:
 
 
 def _apply(document: Document, text: str) -> None:
-    label = f"--set {text if len(text) <= 60 else text[:57] + '...'}"
+    label = f"--set {cut(text)}"
     name, separator, value = text.partition("=")
     segments = name.strip().split(".")
     if not separator or not all(segments):

@@ -89,7 +89,7 @@ def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, 
 def _table(checker: Checker, owner: str, value: Any, path: KeyPath, count: int, quantity: str) -> Floats | None:
     """The target's table, where its rows have `count` numbers or one more."""
     try:
-        table = read_table(checker.folder / value, most=3) if isinstance(value, str) else np.array(value)
+        table = read_table(checker.folder, value, most=3) if isinstance(value, str) else np.array(value)
     except StudyError as error:
         checker.report(path, str(error))
         return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
@@ -22,6 +21,7 @@ from mechdesign.study.schema.iso_tolerances import (
 from mechdesign.study.schema.paths import read_column
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import QuantityError
 
 DISTRIBUTIONS = {
@@ -188,7 +188,7 @@ class Dimension(fields.Model):
         """Lowest and highest deviation of the tolerance; none where sigma is given."""
         return self.tolerance.ends if isinstance(self.tolerance, ToleranceClass) else self.tolerance or (0.0, 0.0)
 
-    def deviations(self, nominal: float, folder: Path) -> Floats:
+    def deviations(self, nominal: float, folder: Folder) -> Floats:
         """Measured values less what they deviate from, in the study's units, by default `nominal`.
 
         Raises
@@ -197,8 +197,8 @@ class Dimension(fields.Model):
             Where the file has no such numbers, too few of them, or only one and the same.
         """
         assert self.measured is not None
-        file = folder / self.measured
-        values = read_column(file, self.column)
+        file = self.measured
+        values = read_column(folder, file, self.column)
         if len(values) < MIN_MEASURED:
             raise StudyError(f"{file}: {len(values)} measured values are too few: give {MIN_MEASURED} or more")
         if np.ptp(values) == 0:

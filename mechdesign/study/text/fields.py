@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
@@ -22,7 +22,7 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from mechdesign.errors import suggestion
+from mechdesign.errors import cut, suggestion
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.study.text.document import read
 from mechdesign.study.text.units import QUANTITY, QuantityError, Units
@@ -43,8 +43,8 @@ MAX_NUMBER = 1e60
 MIN_NUMBER = 1e-60
 MAX_LENGTH = 1e15
 MIN_LENGTH = 1e-15
-# Endings of the names of files with a table.
-FILES = (".csv", ".txt", ".dat")
+# Names that a message lists of those that might have stood in place of a wrong one.
+MAX_NAMED = 12
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,7 @@ def shown(value: object) -> str:
         return "a mapping"
     if isinstance(value, list):
         return f"a list of {len(value)}"
-    text = repr(value) if isinstance(value, str) else f"the number {value}"
-    return text if len(text) <= 60 else text[:57] + "..."
+    return repr(cut(value)) if isinstance(value, str) else cut(f"the number {value}")
 
 
 def read_number(raw: object, context: Context, kind: str | None = None) -> StudyNumber:
@@ -171,7 +170,7 @@ def read_rows(raw: list[Any], context: Context, most: int, rule: str, empty: str
 def _known_names(name: str, context: Context) -> str:
     if name in context.below:
         return f"; a parameter may use those above it, and {name!r} is below"
-    known = ", ".join(context.parameters)
+    known = ", ".join(islice(context.parameters, MAX_NAMED))
     return suggestion(name, context.parameters) or (f"; the parameters are {known}" if known else "")
 
 

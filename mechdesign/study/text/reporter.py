@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from mechdesign.errors import Problem, StudyError, nearest, suggestion
 from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
-from mechdesign.study.text.fields import LOST, Model, shown
+from mechdesign.study.text.fields import LOST, MAX_NAMED, Model, shown
 from mechdesign.study.text.units import QUANTITY, QuantityError, measure
 
 # A link written as a list has its keys at these places.
@@ -47,8 +47,14 @@ class Reporter:
 
     def __init__(self, document: Document) -> None:
         self.document = document
-        self.problems: list[Problem] = list(document.problems)
+        # In the order found, each once.
+        self._problems = dict.fromkeys(document.problems)
         self.warnings: list[Problem] = []
+
+    @property
+    def problems(self) -> list[Problem]:
+        """Those found so far, each once."""
+        return list(self._problems)
 
     def known(
         self, name: str, known: Iterable[str], what: str, path: Iterable[str | int], *, at_key: bool = False
@@ -57,20 +63,21 @@ class Reporter:
         candidates = list(known)
         if name in candidates:
             return True
-        hint = suggestion(name, candidates) or (f"; there are {', '.join(candidates[:12])}" if candidates else "")
+        hint = suggestion(name, candidates)
+        if candidates and not hint:
+            hint = f"; there are {', '.join(candidates[:MAX_NAMED])}"
         self.report(tuple(path), f"there is no {what} {name!r}{hint}", at_key=at_key)
         return False
 
     def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Note a problem at a path of the data; paths through the long form of a short form are understood."""
         found = self.written(path)
-        if any(found[: len(part)] == part for part in self.document.spoiled):
+        above = [found[:length] for length in range(len(found) + 1)]
+        if not self.document.spoiled.isdisjoint(above):
             return
-        comma = next((number for part, number in self.document.commas.items() if found[: len(part)] == part), None)
+        comma = next((self.document.commas[part] for part in above if part in self.document.commas), None)
         hint = f"; a decimal is written with a point: {comma}" if comma is not None else ""
-        problem = self._placed(found, message + hint, at_key)
-        if problem not in self.problems:
-            self.problems.append(problem)
+        self._problems[self._placed(found, message + hint, at_key)] = None
 
     def kind(self, path: KeyPath, kind: str) -> None:
         """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""

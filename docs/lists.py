@@ -1,0 +1,155 @@
+"""Pages of the reference: keys of the study, tables, indices, words, exit codes, messages, from `mechdesign.reference`.
+
+What `mechdesign docs WORD` prints in a terminal stands here, a page a subject.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+
+from mechdesign.reference import Entry, entries, tables
+from mechdesign.reference.messages import meaning, messages
+from mechdesign.reference.tables import TableText
+
+# Sections of the study with a page each, in the order of the format; keys that stand alone share one.
+ALONE = "study_file"
+# Lists with pages: title, what is said before, kinds of entries.
+LISTS = {
+    "indices": (
+        "Indices and results of workspaces",
+        "Local indices are asked for by `workspace.indices`; each has statistics over the region, such as "
+        "`sigma_min_mean`. The results below are there for every workspace. All of them can be goals of `optimize` "
+        "and be judged by `requirements`.",
+        ("local index", "result of workspace"),
+    ),
+    "words": (
+        "Words, functions and units",
+        "Words that a key chooses out of a list, and what numbers and expressions are made of.",
+        (),
+    ),
+    "exit_codes": ("Exit codes", "What a command ends with; of several questions the largest.", ("exit code",)),
+}
+_APART = ("key", "table", "column", "local index", "result of workspace", "exit code")
+_SPECIAL = re.compile(r"([\\*_<>\[\]$|#])")
+_CODE = re.compile(r"(`[^`]+`)")
+
+
+def markdown(text: str) -> str:
+    """A plain text as Markdown that shows it as it is; what is between backticks stays code."""
+    parts = _CODE.split(text)
+    return "".join(part if k % 2 else _SPECIAL.sub(r"\\\1", part) for k, part in enumerate(parts))
+
+
+def code(text: str) -> str:
+    """A text in the type of code."""
+    fence = "``" if "`" in text else "`"
+    return f"{fence}{text}{fence}"
+
+
+def _told(entry: Entry) -> Iterator[str]:
+    """What is said of an entry, paragraph by paragraph."""
+    yield markdown(entry.text)
+    facts = {
+        "Takes": code(entry.takes) if entry.takes else "",
+        "Mapping": markdown(entry.mapping),
+        "Unit": markdown(entry.unit),
+        "Formula": code(entry.formula) if entry.formula else "",
+        "Source": markdown(entry.source),
+        "Left out": code(entry.default) if entry.default else "",
+        "Stands in": ", ".join(map(code, entry.where)),
+    }
+    lines = [f"- {what}: {text}" for what, text in facts.items() if text]
+    lines += [f"- {code(word)}: {markdown(text)}" for word, text in entry.words]
+    lines += [f"- Example: {code(f'{entry.last}: {example}')}" for example in entry.examples]
+    if lines:
+        yield "\n".join(lines)
+
+
+def _page(title: str, parts: Iterable[str]) -> str:
+    return "\n\n".join([f"# {title}", *parts]) + "\n"
+
+
+def section(found: list[Entry]) -> str:
+    """The page of a section of the study: the section, then every key in it."""
+    first, *keys = found
+    parts = [*_told(first)]
+    for entry in keys:
+        path = entry.word.partition(".")[2]
+        parts += [f"{'###' if '.' in path else '##'} {code(path)}", *_told(entry)]
+    return _page(code(first.word), parts)
+
+
+def listed(title: str, before: str, found: Iterable[Entry]) -> str:
+    """The page of a list: a part a kind, its words in the order of the source."""
+    parts = [before]
+    for kind, words in groupby(found, key=lambda entry: entry.kind):
+        parts.append(f"## {kind[0].upper()}{kind[1:]}")
+        for entry in words:
+            text, *facts = _told(entry)
+            parts += [f"**{code(entry.word)}**: {text}", *facts]
+    return _page(title, parts)
+
+
+def table_page(command: str, found: Iterable[TableText]) -> str:
+    """The page of a command's tables, with every column."""
+    parts = [
+        f"What `mechdesign {command}` writes. `<names>` stand for those of a study. Lengths, angles, times and forces "
+        "are in the study's units; an empty cell or `nan` has no value."
+    ]
+    for table in found:
+        rows = [[code(column.name), markdown(column.meaning), markdown(column.unit.replace("_", " ")),
+                 code(column.formula.replace("|", r"\|")) if column.formula else ""]
+                for column in table.columns]  # fmt: skip
+        lines = ["| column | meaning | unit | formula |", "| --- | --- | --- | --- |",
+                 *("| " + " | ".join(row) + " |" for row in rows)]  # fmt: skip
+        parts += [f"## {table.name}", f"{markdown(table.meaning[0].upper() + table.meaning[1:])}.", "\n".join(lines)]
+    return _page(f"Tables of {command}", parts)
+
+
+def messages_page() -> str:
+    """The page of errors and warnings."""
+    parts = [
+        "Every error and warning, by what it speaks of; `<names>` stand for what differs. `mechdesign docs TEXT` finds "
+        'those that contain a text, for example `mechdesign docs "singular position"`. A message about a key of the '
+        "study begins with the file, the line and the key."
+    ]
+    for subject, about in groupby(messages(), key=lambda message: message.subject):
+        parts.append(f"## {subject[0].upper()}{subject[1:]}")
+        of_subject = sorted(about, key=lambda message: (message.code is None, message.code or 0))
+        for number, same in groupby(of_subject, key=lambda message: message.code):
+            said = meaning(number)
+            parts += [f"{said[0].upper()}{said[1:]}.", "\n".join(f"- {code(message.text)}" for message in same)]
+    return _page("Messages", parts)
+
+
+def pages() -> dict[str, str]:
+    """The texts of all pages by their paths in the folder of the site."""
+    known = entries()
+    keys = [entry for entry in known if entry.kind == "key"]
+    sections = {name: list(found) for name, found in groupby(keys, key=lambda entry: entry.word.partition(".")[0])}
+    alone = [name for name, found in sections.items() if len(found) == 1]
+    text: dict[str, str] = {
+        f"reference/study/{name}.md": section(found) for name, found in sections.items() if name not in alone
+    }
+    single = [part for name in alone for part in (f"## {code(name)}", *_told(sections[name][0]))]
+    text[f"reference/study/{ALONE}.md"] = _page("Keys without a section", single)
+    names = "\n".join([ALONE, *(name for name in sections if name not in alone)])
+    text["reference/study/index.md"] = _page("The study file", [
+        "Every key, with what it takes, its unit, what is taken where it is left out, and an example. In a path `*` "
+        "stands for a name of yours or a place in a list: `mechanism.joints.*.angle`.",
+        f"```{{toctree}}\n:maxdepth: 1\n\n{names}\n```",
+    ])  # fmt: skip
+    commands = {name: list(found) for name, found in groupby(tables(), key=lambda table: table.command)}
+    text |= {f"reference/tables/{name}.md": table_page(name, found) for name, found in commands.items()}
+    listing = "\n".join(commands)
+    text["reference/tables/index.md"] = _page("Tables and columns", [
+        "Every table that a command writes. The `manifest.json` of a run has the meaning and the unit of every column.",
+        f"```{{toctree}}\n:maxdepth: 1\n\n{listing}\n```",
+    ])  # fmt: skip
+    for name, (title, before, kinds) in LISTS.items():
+        found = [entry for entry in known if (entry.kind in kinds if kinds else entry.kind not in _APART)]
+        text[f"reference/lists/{name}.md"] = listed(title, before, found)
+    text["reference/lists/messages.md"] = messages_page()
+    return text

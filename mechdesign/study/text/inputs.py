@@ -1,0 +1,82 @@
+"""Files that a study names: where they may lie, and what is read of them."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mechdesign.errors import StudyError
+from mechdesign.study.text.document import KeyPath
+
+# Endings of the names of files with a table.
+FILES = (".csv", ".txt", ".dat")
+# Largest file that is read, in bytes.
+MAX_FILE_BYTES = 50_000_000
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The folder of a study, in which the files lie that it names; `anywhere`, those may lie elsewhere as well.
+
+    A file is read once: what becomes of it while the study is computed changes nothing.
+    """
+
+    path: Path = Path()
+    anywhere: bool = False
+    _read: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
+
+    def text(self, name: str) -> str:
+        """What a file holds.
+
+        Raises
+        ------
+        StudyError
+            Where it lies elsewhere, cannot be read, or is no text of a bounded size.
+        """
+        if name not in self._read:
+            self._read[name] = self._text(self.path / name)
+        return self._read[name]
+
+    def _text(self, file: Path) -> str:
+        try:
+            if not self.anywhere and not file.resolve().is_relative_to(self.path.resolve()):
+                raise StudyError(f"{file} is not in the folder of the study; --allow-files reads it all the same")
+            # Opened without waiting: a pipe might never be written to.
+            with open(file, "rb", opener=_without_waiting) as stream:
+                if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                    raise StudyError(f"{file} cannot be read: not a file")
+                content = stream.read(MAX_FILE_BYTES + 1)
+            if len(content) > MAX_FILE_BYTES:
+                raise StudyError(f"{file} cannot be read: larger than {MAX_FILE_BYTES // 1_000_000} MB")
+            return content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise StudyError(f"{file} cannot be read: not a text file") from None
+        except (OSError, ValueError, RuntimeError) as error:
+            # A name may hold what no file system knows, and links may go round in a circle.
+            raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'no such name'}") from None
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def file_of(raw: Any) -> str | None:
+    """The file that a path or a target is: ``{file: NAME}``, or a name with the ending of a table; else None."""
+    name = raw.get("file") if isinstance(raw, Mapping) else raw
+    return name if isinstance(name, str) and (name is not raw or name.lower().endswith(FILES)) else None
+
+
+def files(data: Mapping[str, Any], commands: Iterable[str]) -> Iterator[tuple[KeyPath, str]]:
+    """Every file that a valid study names, by the keys at which its name stands."""
+    owners: list[tuple[str, str]] = [("mechanism", "targets"), *((command, "path") for command in commands)]
+    for section, key in owners:
+        for name, raw in ((data.get(section) or {}).get(key) or {}).items():
+            if (file := file_of(raw)) is not None:
+                yield (section, key, name, "file") if isinstance(raw, Mapping) else (section, key, name), file
+    for name, raw in ((data.get("reliability") or {}).get("dimensions") or {}).items():
+        if isinstance(raw, Mapping) and isinstance(raw.get("measured"), str):
+            yield ("reliability", "dimensions", name, "measured"), raw["measured"]

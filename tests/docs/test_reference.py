@@ -1,0 +1,195 @@
+"""The reference is whole: every table, column, message, word and study stands in it, and every example is run."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import examples
+import gallery
+import lists
+import pytest
+from helpers.studies import study_of
+from helpers.tables import Said, said
+
+import mechdesign
+from mechdesign.errors import MechdesignError
+from mechdesign.reference import entries, tables
+from mechdesign.reference.messages import find_messages, messages
+from mechdesign.results import Result
+
+ROOT = Path(__file__).parents[2]
+FIVE_BAR = """
+units: {length: dimensionless}
+mechanism:
+  parameters: {a: 0.25, b: 0.4, h: 0.15, low: 30, high: 200, both: a + b}
+  links:
+    ground: {A: [-h, 0], B: [h, 0]}
+    left: [A, C, a]
+    right: [B, D, a]
+    fore_left: [C, P, b]
+    fore_right: [D, P, b]
+  drives: {t1: {angle: left}, t2: {angle: right}}
+  limits: [{drive: t1, min: low, max: high}, {drive: t2, min: 180 - high, max: 180 - low}]
+  targets: {P: [[0, 0.5]]}
+  sketch: {C: [-0.3, 0.2], D: [0.3, 0.2], P: [0, 0.48]}
+kinematics: {poses: [{P.x: 0, P.y: 0.5}], outputs: [C], jacobian: [P.x, P.y]}
+workspace: {point: P, scan: {about: [0.05, 0.45]}, indices: [], integrate: {rule: midpoint}}
+optimize:
+  variables: {a: {from: 0.25, to: 0.27, step: 0.01}}
+  minimize: [both, kinematics.P_error]
+"""
+FOUR_BAR = """
+mechanism:
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
+  drives: [crank]
+  limits: [{drive: crank, min: 0, max: 90}]
+  sketch: {A: [0, 30], B: [75, 55]}
+workspace: {point: B}
+"""
+ARM = """
+units: {length: dimensionless}
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 1.5], lower: [E, W, 1], hand: [W, P, 0.3]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}, q3: {angle: hand, from: lower}}
+  limits: [{drive: q1, min: 0, max: 120}, {drive: q2, min: -150, max: -20}]
+  sketch: {E: [0, 1.5], W: [1, 1.5], P: [1.3, 1.5]}
+workspace:
+  {point: P, at: {hand.angle: {from: 0, to: 20}}, scan: {about: [0.5, 1.5], from: 0, to: 5, rays: 5},
+   characteristic_length: 1}
+"""
+PLATFORM = ROOT / "configs" / "planar_3rpr.yaml"
+
+
+@cache
+def asked() -> tuple[tuple[str, Result, Any], ...]:
+    """Answers to what no shipped study asks: pieces, paths of points, ranges, modes, eigen-stiffnesses, ..."""
+    bar, four = study_of(FIVE_BAR), study_of(FOUR_BAR)
+    front = study_of(FIVE_BAR, "optimize.method=pareto", "optimize.evaluations=60",
+                     "optimize.variables.a={from: 0.25, to: 0.27}")  # fmt: skip
+    ranged = study_of(ARM)
+    stiff = mechdesign.load(PLATFORM, ["stiffness.characteristic_length=0.2", "stiffness.direction=30"])
+    return (
+        ("pieces", mechdesign.workspace(bar), bar),
+        ("goals", mechdesign.optimize(bar), bar),
+        ("front", mechdesign.optimize(front), front),
+        ("target", mechdesign.kinematics(bar), bar),
+        ("path", mechdesign.workspace(four), four),
+        ("modes", mechdesign.kinematics(four, all_modes=True), four),
+        ("range", mechdesign.workspace(ranged), ranged),
+        ("eigen", mechdesign.stiffness(stiff), stiff),
+    )
+
+
+def manifest(result: Result, study: Any) -> dict[str, Any]:
+    """What the manifest of a result says of its tables."""
+    units = study.units
+    return {
+        "study": {"resolved": {"units": {each: getattr(units, each) for each in ("length", "angle", "time", "force")}}},
+        "tables": {
+            f"{table.name}.csv": {
+                "meaning": table.meaning,
+                "columns": [{"name": c.name, "unit": c.unit, "meaning": c.meaning} for c in table.columns],
+            }
+            for table in result.tables.values()
+        },
+    }
+
+
+def test_columns_of_answers_that_no_shipped_study_asks_for_are_in_the_reference():
+    wrong = {name: found for name, result, study in asked() if (found := said(manifest(result, study))[1])}
+    assert not wrong
+
+
+def test_no_column_of_the_reference_is_idle():
+    seen: set[Said] = set()
+    for path in (ROOT / "results").rglob("manifest.json"):
+        seen |= said(json.loads(path.read_text(encoding="utf-8")))[0]
+    for _, result, study in asked():
+        seen |= said(manifest(result, study))[0]
+    known = {(table.name, table.meaning, column.name) for table in tables() for column in table.columns
+             if table.command != "run"}  # fmt: skip
+    assert known - seen == set()
+
+
+def test_every_table_that_the_package_names_is_in_the_reference():
+    named = {
+        f"{call.args[0].value}.csv"
+        for folder in ("analyses", "cli")
+        for path in (ROOT / "mechdesign" / folder).rglob("*.py")
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Table"
+        and isinstance(call.args[0], ast.Constant)
+    }  # fmt: skip
+    assert named == {table.name for table in tables()}
+
+
+def test_warnings_of_shipped_studies_are_messages_of_the_reference():
+    told = {
+        warning
+        for path in (ROOT / "results").rglob("manifest.json")
+        for warning in json.loads(path.read_text(encoding="utf-8"))["warnings"]
+    }
+    assert told
+    assert [warning for warning in told if not find_messages(warning)] == []
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ("mechanism.links.crank=[O, Q, 30]", 2),
+        ("mechanism.drives=[crank, rod]", 2),
+        ("mechanism.links.crank=[O, A, 30 furlong]", 2),
+        ("mechanism.links.crank=[O, A, 3*(2]", 2),
+        ("kinematics.sweep={crank: {from: 0, to: 360, step: -5}}", 2),
+        ("kinematics.rate={crank: 1}", 2),
+        ("reliability={dimensions: {rod.length: {tolerance: h77}}}", 2),
+    ],
+)
+def test_what_a_wrong_study_is_told_is_a_message_of_the_reference(change, code):
+    with pytest.raises(MechdesignError) as raised:
+        mechdesign.kinematics(study_of(FOUR_BAR, change))
+    problems = getattr(raised.value, "problems", None)
+    for words in [problem.message for problem in problems] if problems else [str(raised.value)]:
+        assert find_messages(words), words
+    assert raised.value.exit_code == code
+
+
+def test_messages_are_texts():
+    assert len(messages()) > 300
+    assert [told for told in messages() if not re.search("[a-z] [a-z'(<]", told.text)] == []
+
+
+def test_the_pages_have_every_word():
+    pages = lists.pages()
+    for entry in entries():
+        word = entry.word.partition(".")[2] if entry.kind == "key" and "." in entry.word else entry.word
+        written = entry.takes if entry.kind == "column" and entry.takes else word
+        assert any(written in text for text in pages.values()), (entry.kind, entry.word)
+    for table in tables():
+        page = pages[f"reference/tables/{table.command}.md"]
+        for column in table.columns:
+            assert lists.code(column.name) in page
+            assert lists.markdown(column.meaning) in page
+
+
+def test_every_study_is_in_one_group_and_has_a_page():
+    names = [name for group in gallery.GROUPS.values() for name in group]
+    assert sorted(names) == sorted(gallery.studies())
+    assert {f"gallery/{name}.md" for name in (*names, "index")} == set(gallery.pages())
+
+
+def test_every_yaml_of_a_page_is_run():
+    made = {*lists.pages(), *gallery.pages()}
+    for page in (each for each in examples.ROOT.rglob("*.md") if "_" not in each.relative_to(examples.ROOT).parts[0]):
+        place = page.relative_to(examples.ROOT)
+        kinds = re.findall(
+            r"(?m)^`{3,}((?!\{literalinclude\}).*ya?ml.*)$", page.read_text(encoding="utf-8"), re.IGNORECASE
+        )
+        assert place.as_posix() not in made or not kinds
+        assert not kinds or place.parts[0] in examples.FOLDERS, place
+        assert {kind.strip() for kind in kinds} <= {"yaml", "{code-block} yaml"}, place

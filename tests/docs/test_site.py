@@ -1,0 +1,70 @@
+"""The site: it builds without a warning, every command and option is in it, and it asks for nothing from anywhere."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+import typer.main
+
+from mechdesign.cli.app import app
+
+ROOT = Path(__file__).parents[2]
+AWAY = re.compile(r"\s*(?:https?:)?//")
+IN_STYLE = re.compile(r"""(?:url\(|@import)\s*['"]?\s*(?:https?:)?//[^)'"]*""")
+# What a browser loads by itself; an `a` waits for a click.
+LOADED = {"src", "srcset", "href", "data", "poster", "action"}
+
+
+class Requests(HTMLParser):
+    """What a page makes a browser ask for from another place."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            if tag != "a" and name in LOADED and AWAY.match(value or ""):
+                self.found.append(f"{tag} {value}")
+            if name == "style":
+                self.found += IN_STYLE.findall(value or "")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the built site."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-n", "-W", "-q", "-d", str(folder / "doctrees"), str(ROOT / "docs")]
+    done = subprocess.run([*command, str(folder / "html")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder / "html"
+
+
+def test_the_site_asks_for_nothing_from_anywhere(site: Path) -> None:
+    pages = sorted(site.rglob("*.html"))
+    assert len(pages) > 80
+    for page in pages:
+        requests = Requests()
+        requests.feed(page.read_text(encoding="utf-8"))
+        assert requests.found == [], page
+    for style in site.rglob("*.css"):
+        assert IN_STYLE.findall(style.read_text(encoding="utf-8")) == [], style
+
+
+def test_every_command_and_option_is_in_the_site(site: Path) -> None:
+    text = (site / "reference" / "commands.html").read_text(encoding="utf-8")
+    for name, command in typer.main.get_command(app).commands.items():
+        part = text.partition(f"mechdesign {name} ")[2].partition("Usage: ")[0]
+        for given in command.params:
+            assert given.metavar in part if given.param_type_name == "argument" else given.opts[0] in part, name
+
+
+def test_a_request_would_be_found() -> None:
+    requests = Requests()
+    requests.feed('<a href="https://a.b/"></a><img src="//a.b/c.png"><p style="background: url(https://a.b/d)">')
+    assert requests.found == ["img //a.b/c.png", "url(https://a.b/d"]
